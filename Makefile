@@ -1,0 +1,42 @@
+# Every target sets up what it needs: a virtual environment inside the checkout, no root.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check soak bench-startup pictures clean
+
+help:   ## this list
+	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
+
+$(VENV)/.run: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.run
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,check]'
+	@touch $@
+
+demo: $(VENV)/.run   ## clear a table: designed where foreseen, planned where not
+	$(BIN)/dsc run clean-up-table --seed 7 --faults 0.2
+
+test: $(VENV)/.test check   ## static checks, then all tests, on all cores
+	$(BIN)/python -m pytest -n auto
+
+check: $(VENV)/.test   ## ruff, mypy strict, import contracts
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+
+soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every report true? (SEEDS=N FAULTS=P)
+	$(BIN)/python benchmarks/clean_up_seeds.py --seeds $(or $(SEEDS),200) --faults $(or $(FAULTS),0.2)
+
+bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
+	$(BIN)/python benchmarks/startup.py
+
+pictures: $(VENV)/.run   ## draw the pictures that README and docs show
+	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg
+
+clean:   ## forget the environment and caches
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
