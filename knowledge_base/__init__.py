@@ -1,0 +1,51 @@
+"""The world model: typed things, facts and numbers in a graph, asked in one language."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from knowledge_base._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from knowledge_base.errors import ConflictError as ConflictError
+    from knowledge_base.errors import InputError as InputError
+    from knowledge_base.errors import ParseError as ParseError
+    from knowledge_base.errors import Place as Place
+    from knowledge_base.errors import SchemaError as SchemaError
+    from knowledge_base.errors import UnknownNameError as UnknownNameError
+    from knowledge_base.facts import Change as Change
+    from knowledge_base.facts import Delta as Delta
+    from knowledge_base.facts import Fact as Fact
+    from knowledge_base.facts import Value as Value
+    from knowledge_base.facts import fact as fact
+    from knowledge_base.overlay import Overlay as Overlay
+    from knowledge_base.schema import Schema as Schema
+    from knowledge_base.schema import Signature as Signature
+    from knowledge_base.state import WorldState as WorldState
+    from knowledge_base.store import Binding as Binding
+    from knowledge_base.store import KnowledgeBase as KnowledgeBase
+    from knowledge_base.transaction import Transaction as Transaction
+
+__getattr__, __dir__, __all__ = lazy_exports(
+    __name__,
+    {
+        "Binding": "store",
+        "Change": "facts",
+        "ConflictError": "errors",
+        "Delta": "facts",
+        "Fact": "facts",
+        "InputError": "errors",
+        "KnowledgeBase": "store",
+        "Overlay": "overlay",
+        "ParseError": "errors",
+        "Place": "errors",
+        "Schema": "schema",
+        "SchemaError": "errors",
+        "Signature": "schema",
+        "Transaction": "transaction",
+        "UnknownNameError": "errors",
+        "Value": "facts",
+        "WorldState": "state",
+        "fact": "facts",
+    },
+)

@@ -1,0 +1,91 @@
+"""Whether a change may be made to a world: every name declared, every argument of the right type."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.language.check import check_arity, value_fits
+from knowledge_base.language.expression import TypedVariable
+from knowledge_base.language.world import World
+from knowledge_base.schema import ROOT_TYPE, VALUE_TYPES, Signature
+
+
+def check_delta(delta: Delta, world: World) -> None:
+    """Raise an error unless `delta` can be applied to `world`.
+
+    Raises:
+        UnknownNameError: an undeclared type, predicate or function, or a thing that is not there.
+        SchemaError: a wrong number of arguments, a wrong type, a second type for a thing.
+        InputError: a number that is not finite, a name that is empty.
+    """
+    admission = _Admission(delta, world)
+    # Facts may be removed together with the things they are about.
+    before = _Admission(replace(delta, removed_nodes=()), world)
+    for name, type_name in delta.nodes.items():
+        admission.node(name, type_name)
+    for fact in delta.added:
+        admission.fact(fact, world.schema.predicate(fact.predicate))
+    for fact in delta.removed:
+        before.fact(fact, world.schema.predicate(fact.predicate))
+    for fluent, number in delta.values.items():
+        admission.fact(fluent, world.schema.function(fluent.predicate))
+        admission.number(fluent, number)
+    for name in delta.removed_nodes:
+        if name in world.schema.constants and name not in delta.nodes:
+            raise SchemaError(f"'{name}' is a constant of the domain and cannot be removed")
+
+
+class _Admission:
+    def __init__(self, delta: Delta, world: World) -> None:
+        self.delta = delta
+        self.world = world
+        self.schema = world.schema
+
+    def node(self, name: str, type_name: str) -> None:
+        if not isinstance(name, str) or not name:
+            raise InputError(f"a thing's name is text that is not empty, not {name!r}")
+        self.schema.require_type(type_name)
+        known = None if name in self.delta.removed_nodes else self.world.type_of(name)
+        if known is not None and known != type_name:
+            raise SchemaError(f"'{name}' is of type '{known}' and cannot become '{type_name}'")
+
+    def fact(self, fact: Fact, signature: Signature) -> None:
+        check_arity(signature, len(fact.args))
+        for parameter, value in zip(signature.parameters, fact.args, strict=True):
+            self.argument(value, parameter, fact)
+
+    def argument(self, value: Value, parameter: TypedVariable, fact: Fact) -> None:
+        wanted = parameter.types or (ROOT_TYPE,)
+        known = self.type_of(value)
+        if known is not None and self.schema.fits(known, wanted):
+            return
+        if value_fits(value, wanted):
+            return
+        expected = f"the argument '?{parameter.name}' of {fact} is of type {' or '.join(wanted)}"
+        if known is not None:
+            raise SchemaError(f"{expected}, and '{value}' is of type {known}", found=str(value))
+        if not isinstance(value, str) or set(wanted) <= set(VALUE_TYPES):
+            raise SchemaError(f"{expected}, not {value!r}")
+        raise UnknownNameError(f"there is no object '{value}', used in {fact}", found=value, valid=self.things(wanted))
+
+    def type_of(self, value: Value) -> str | None:
+        if not isinstance(value, str):
+            return None
+        new = self.delta.nodes.get(value)
+        if new is not None or value in self.delta.removed_nodes:
+            return new
+        return self.world.type_of(value)
+
+    def things(self, types: Iterable[str]) -> set[str]:
+        known = {t for t in types if t not in VALUE_TYPES}
+        return {name for t in known for name in self.world.objects(t)} | self.delta.nodes.keys()
+
+    def number(self, fluent: Fact, number: float) -> None:
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            raise SchemaError(f"{fluent} is a number, not {number!r}")
+        if not math.isfinite(number):
+            raise InputError(f"{fluent} is a finite number, not {number}")

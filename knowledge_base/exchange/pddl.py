@@ -1,0 +1,8 @@
+"""PDDL domain and problem files: the one reader of their outer form."""
+
+from __future__ import annotations
+
+from knowledge_base.exchange.domain_text import ActionText, DomainText, parse_domain, read_domain
+from knowledge_base.exchange.problem_text import ProblemText, read_problem
+
+__all__ = ["ActionText", "DomainText", "ProblemText", "parse_domain", "read_domain", "read_problem"]

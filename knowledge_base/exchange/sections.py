@@ -1,0 +1,148 @@
+"""The outer form that PDDL domain and problem files share: `(define (domain NAME) (:section ...) ...)`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from knowledge_base.errors import ParseError, Place
+from knowledge_base.language.sexpr import Group, Node, Word, read
+
+REQUIREMENTS = frozenset(
+    {
+        ":strips",
+        ":typing",
+        ":negative-preconditions",
+        ":disjunctive-preconditions",
+        ":equality",
+        ":existential-preconditions",
+        ":universal-preconditions",
+        ":quantified-preconditions",
+        ":conditional-effects",
+        ":fluents",
+        ":numeric-fluents",
+        ":object-fluents",
+        ":adl",
+        ":durative-actions",
+        ":duration-inequalities",
+        ":continuous-effects",
+        ":derived-predicates",
+        ":timed-initial-literals",
+        ":preferences",
+        ":constraints",
+        ":action-costs",
+        ":time",
+    }
+)
+"""What PDDL 1.2 to 3.1 can require; only what is really used is judged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """One `(define ...)`: its name, and its sections in order, each with its keyword in lower case."""
+
+    name: str
+    place: Place
+    sections: tuple[tuple[str, Group], ...]
+
+    def single(self, keyword: str) -> Group | None:
+        """The only section with that keyword, or `None` when it is left out.
+
+        Raises:
+            ParseError: there are two.
+        """
+        found = [group for name, group in self.sections if name == keyword]
+        if len(found) > 1:
+            raise ParseError(f"a second '{keyword}' section; the first is at {found[0].place}", place=found[1].place)
+        return found[0] if found else None
+
+    def nodes(self, keyword: str) -> Sequence[Node]:
+        """What stands in that section after its keyword; nothing when it is left out."""
+        group = self.single(keyword)
+        return group.items[1:] if group else ()
+
+    def requirements(self) -> tuple[str, ...]:
+        """The `:requirements` in lower case.
+
+        Raises:
+            ParseError: one that PDDL does not know.
+        """
+        words = [_requirement(node) for node in self.nodes(":requirements")]
+        return tuple(words)
+
+
+def read_definition(text: str, source: str | None, kind: str, known: Mapping[str, str | None]) -> Definition:
+    """Read a whole file of one definition.
+
+    Args:
+        text: the file's text.
+        source: its name for messages.
+        kind: `domain` or `problem`.
+        known: the sections it may have; those with a reason are known but not supported.
+
+    Raises:
+        ParseError: it is no such definition, or a section is unknown or not supported.
+    """
+    define = _define(read(text, source), source)
+    if len(define.items) < 2 or not isinstance(define.items[1], Group):
+        raise ParseError(f"'define' is followed by ({kind} NAME)", place=define.place)
+    name, place = _name(define.items[1], kind)
+    sections = tuple(_section(node, kind, known) for node in define.items[2:])
+    return Definition(name, place, sections)
+
+
+def word(node: Node, what: str) -> Word:
+    """`node` as a word.
+
+    Raises:
+        ParseError: it is a group; `what` says what was expected.
+    """
+    if isinstance(node, Group):
+        raise ParseError(f"{what} is expected here, not '('", place=node.place)
+    return node
+
+
+def _define(nodes: list[Node], source: str | None) -> Group:
+    if not nodes:
+        raise ParseError("the file is empty; (define ...) is expected", place=Place(source, 1, 1))
+    if len(nodes) > 1:
+        raise ParseError("the (define ...) ends before this; a file holds one", place=nodes[1].place)
+    first = nodes[0]
+    if isinstance(first, Word) or first.head() != "define":
+        raise ParseError("a PDDL file begins with (define", place=first.place)
+    return first
+
+
+def _name(group: Group, kind: str) -> tuple[str, Place]:
+    head = group.head()
+    if head != kind:
+        raise ParseError(
+            f"a {kind} file is expected, this defines a '{head}'",
+            place=group.place,
+            found=head,
+            valid=("domain", "problem"),
+        )
+    if len(group.items) != 2:
+        raise ParseError(f"a {kind} has one name: ({kind} NAME)", place=group.place)
+    name = word(group.items[1], "a name")
+    return name.folded(), name.place
+
+
+def _section(node: Node, kind: str, known: Mapping[str, str | None]) -> tuple[str, Group]:
+    head = node.head() if isinstance(node, Group) else None
+    if not isinstance(node, Group) or head is None:
+        raise ParseError(f"a section of the {kind} is expected: (:keyword ...)", place=node.place)
+    if head not in known:
+        raise ParseError(f"a {kind} has no section '{head}'", place=node.items[0].place, found=head, valid=known)
+    if known[head] is not None:
+        raise ParseError(f"'{head}' is not supported: {known[head]}", place=node.place)
+    return head, node
+
+
+def _requirement(node: Node) -> str:
+    found = word(node, "a requirement")
+    if found.folded() not in REQUIREMENTS:
+        raise ParseError(
+            f"PDDL has no requirement '{found.text}'", place=found.place, found=found.text, valid=REQUIREMENTS
+        )
+    return found.folded()

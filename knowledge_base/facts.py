@@ -1,0 +1,81 @@
+"""Facts and changes as values: what skills observe, transactions write and listeners hear."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+Value = str | int | float | bool
+"""What a fact's argument or a bound variable may be: an object's name, a number, a truth value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A predicate that holds of its arguments, e.g. `Fact("on", ("cup3", "table1"))`."""
+
+    predicate: str
+    args: tuple[Value, ...] = ()
+
+    def __str__(self) -> str:
+        """In PDDL: `(on cup3 table1)`."""
+        return "(" + " ".join([self.predicate, *map(str, self.args)]) + ")"
+
+
+def fact(predicate: str, *args: Value) -> Fact:
+    """`fact("on", "cup3", "table1")`, the everyday way to write a `Fact`."""
+    return Fact(predicate, args)
+
+
+@dataclass(frozen=True, slots=True)
+class Delta:
+    """A change of the world model as a value: applied as a whole or not at all.
+
+    Removals come before additions, as in PDDL effects, so that a fact in both stays true.
+
+    Attributes:
+        nodes: things that are there now, name -> type; naming a known one again with its type is fine.
+        removed: facts that hold no longer; one that did not hold is fine.
+        added: facts that hold now.
+        values: numeric fluents' new values, by function and arguments.
+        removed_nodes: things that are there no longer, nor any fact or number about them; this comes first
+            of all, so that a thing in `nodes` too begins anew. One that was not there is fine.
+    """
+
+    nodes: Mapping[str, str] = field(default_factory=dict)
+    removed: tuple[Fact, ...] = ()
+    added: tuple[Fact, ...] = ()
+    values: Mapping[Fact, float] = field(default_factory=dict)
+    removed_nodes: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Whether it says anything at all."""
+        return bool(self.nodes or self.removed or self.added or self.values or self.removed_nodes)
+
+    def then(self, later: Delta) -> Delta:
+        """This change followed by `later`, as one change."""
+        undone, gone = set(later.removed), set(later.removed_nodes)
+        added = [a for a in self.added if a not in undone and gone.isdisjoint(a.args)]
+        redone = set(later.added)
+        removed = [r for r in (*self.removed, *later.removed) if r not in redone]
+        return Delta(
+            nodes={**{n: t for n, t in self.nodes.items() if n not in gone}, **later.nodes},
+            removed=tuple(dict.fromkeys(removed)),
+            added=tuple(dict.fromkeys([*added, *later.added])),
+            values={**{f: v for f, v in self.values.items() if gone.isdisjoint(f.args)}, **later.values},
+            removed_nodes=tuple(dict.fromkeys([*self.removed_nodes, *later.removed_nodes])),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What one committed transaction really changed (facts already so are not in it).
+
+    Attributes:
+        version: the knowledge base's version after it; versions count up by one.
+        author: who changed it, e.g. a component's name.
+        delta: the effective change.
+    """
+
+    version: int
+    author: str
+    delta: Delta

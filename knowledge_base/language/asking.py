@@ -1,0 +1,112 @@
+"""Is it true, who makes it true, what is it worth: conditions and terms on a world.
+
+Conditions are compiled when they are first used and remembered by identity, so that asking the same
+expression again costs no more than the look-ups it needs. Nothing is ever executed as text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from knowledge_base.facts import Value
+from knowledge_base.language.binding import check_answers, check_bound
+from knowledge_base.language.compiler import compile_query, compile_test
+from knowledge_base.language.expression import (
+    Constant,
+    Expression,
+    Term,
+    Variable,
+    free_variables,
+    variables_in_order,
+)
+from knowledge_base.language.lookups import Search
+from knowledge_base.language.memory import IdentityCache
+from knowledge_base.language.terms import Bindings, Test, compile_term
+from knowledge_base.language.world import World
+from knowledge_base.schema import Schema
+
+NO_BINDINGS: Bindings = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class _Condition:
+    free: frozenset[str]
+    test: Test
+
+
+@dataclass(frozen=True, slots=True)
+class _Query:
+    answers: tuple[str, ...]
+    search: Search
+
+
+@dataclass(frozen=True, slots=True)
+class _Queries:
+    """The ways to search for an expression's variables, by those that are bound."""
+
+    free: frozenset[str]
+    by_bound: dict[frozenset[str], _Query]
+
+
+_conditions: IdentityCache[Expression, _Condition] = IdentityCache()
+_queries: IdentityCache[Expression, _Queries] = IdentityCache()
+
+
+def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> bool:
+    """Whether `e` is true of `world`; variables in `bindings` that `e` does not have are ignored.
+
+    Raises:
+        UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
+        SchemaError: a wrong number of arguments, or `<` and the like met something that is no number.
+    """
+    condition = _conditions.get(e, world.schema, lambda: _compiled(e, world.schema))
+    if not condition.free <= bindings.keys():
+        check_bound(e, bindings)
+    return condition.test(world, bindings)
+
+
+def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> list[dict[str, Value]]:
+    """The values of the free variables of `e`, each choice once, that make it true of `world`.
+
+    Without unbound variables the answer is `[{}]` when `e` is true and `[]` when it is not. The order of
+    answers and of their variables depends on nothing but the text and the world with its order of insertion.
+
+    Raises:
+        InputError: an unbound variable occurs only under `not` or in a comparison.
+        UnknownNameError, SchemaError: as for `holds`.
+    """
+    queries = _queries.get(e, world.schema, lambda: _Queries(free_variables(e), {}))
+    bound = queries.free.intersection(bindings)
+    found = queries.by_bound.get(bound)
+    if found is None:
+        found = queries.by_bound[bound] = _compiled_query(e, world.schema, bound)
+    choices = (tuple([b[name] for name in found.answers]) for b in found.search(world, bindings))
+    return [dict(zip(found.answers, choice, strict=True)) for choice in dict.fromkeys(choices)]
+
+
+def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
+    """What `term` is worth on `world`.
+
+    Raises:
+        UnknownNameError: a free variable is not bound, or a function is not declared.
+        SchemaError: arithmetic met something that is no number.
+        InputError: a division by zero.
+    """
+    if isinstance(term, Constant):
+        return term.value
+    if isinstance(term, Variable) and term.name in bindings:
+        return bindings[term.name]
+    check_bound(term, bindings)
+    return compile_term(term, world.schema)(world, bindings)
+
+
+def _compiled(e: Expression, schema: Schema) -> _Condition:
+    return _Condition(free_variables(e), compile_test(e, schema))
+
+
+def _compiled_query(e: Expression, schema: Schema, bound: frozenset[str]) -> _Query:
+    check_answers(e, bound)
+    answers = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
+    return _Query(answers, compile_query(e, schema, bound))

@@ -1,0 +1,73 @@
+"""Free variables: which of them a condition finds values for, which must be bound, and the errors if not.
+
+An atom finds values; `not`, `imply`, `forall` and comparisons only test, so that a variable occurring
+nowhere else has no answers that could be listed (safe queries in the sense of Datalog).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from knowledge_base.errors import InputError, Place, UnknownNameError
+from knowledge_base.facts import Value
+from knowledge_base.language.expression import (
+    And,
+    Atom,
+    Exists,
+    Expression,
+    Or,
+    Term,
+    Variable,
+    free_variables,
+    variable_place,
+)
+
+_NONE: frozenset[str] = frozenset()
+
+
+def found_variables(e: Expression, bound: frozenset[str] = _NONE) -> frozenset[str]:
+    """The free variables of `e` that it finds values for, when those in `bound` already have some."""
+    match e:
+        case Atom(_, args):
+            return frozenset(a.name for a in args if isinstance(a, Variable))
+        case And(parts):
+            return _NONE.union(*(found_variables(p, bound) for p in parts))
+        case Or(parts) if parts:
+            branches = [found_variables(p, bound) | bound for p in parts]
+            return branches[0].intersection(*branches[1:])
+        case Exists(variables, body):
+            own = {v.name for v in variables}
+            return found_variables(body, bound | own) - own
+        case _:
+            return _NONE
+
+
+def only_tested(e: Expression, bound: frozenset[str] = _NONE) -> frozenset[str]:
+    """The free variables of `e` beyond `bound` that nothing in it finds values for."""
+    return free_variables(e) - found_variables(e, bound) - bound
+
+
+def check_answers(e: Expression, bound: frozenset[str]) -> None:
+    """Raise `InputError` if a free variable of the query `e`, not in `bound`, can only be tested."""
+    for name in sorted(only_tested(e, bound)):
+        raise InputError(
+            f"the variable '?{name}' occurs only under 'not', in a comparison or in a part of an 'or', where "
+            f"it finds no values; say what it is, e.g. (object ?{name})",
+            place=variable_place(e, name),
+        )
+
+
+def check_bound(e: Expression | Term, bindings: Mapping[str, Value]) -> None:
+    """Raise `UnknownNameError` if a free variable of `e` is not among `bindings`."""
+    for name in sorted(free_variables(e) - bindings.keys()):
+        raise unbound_error(name, variable_place(e, name), bindings)
+
+
+def unbound_error(name: str, place: Place | None, bound: Mapping[str, object]) -> UnknownNameError:
+    """The error for a free variable in a condition that must be true or false."""
+    return UnknownNameError(
+        f"the variable '?{name}' is not bound; to ask whether there is one, use (exists (?{name}) ...)",
+        place=place,
+        found=f"?{name}",
+        valid=[f"?{known}" for known in bound],
+    )

@@ -1,0 +1,278 @@
+"""Conditions and effects against a schema: names, numbers of arguments and types, before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Literal
+
+from knowledge_base.errors import Place, SchemaError, UnknownNameError
+from knowledge_base.facts import Value
+from knowledge_base.language.binding import check_answers, unbound_error
+from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
+from knowledge_base.language.expression import (
+    And,
+    Arithmetic,
+    Atom,
+    Call,
+    Comparison,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    TypedVariable,
+    Variable,
+)
+from knowledge_base.schema import VALUE_TYPES, Schema, Signature
+
+Free = Literal["error", "answers"]
+
+
+def check(
+    e: Expression,
+    schema: Schema,
+    variables: Mapping[str, str | None] | None = None,
+    free: Free = "error",
+    objects: Mapping[str, str] | None = None,
+) -> None:
+    """Raise an error with its place unless `e` can be evaluated on worlds of `schema`.
+
+    Args:
+        e: the condition.
+        schema: what may be said.
+        variables: the variables that will be bound, with their types (`None`: anything).
+        free: whether other variables are an error, or what a query asks for.
+        objects: the known things with their types, if the names in `e` are to be checked against them;
+            without it only the schema's constants are known and other names pass.
+
+    Raises:
+        UnknownNameError: an undeclared predicate, function, type, variable or object.
+        SchemaError: a wrong number of arguments, or a type that can never fit.
+        InputError: a query's variable that occurs only under `not` or in a comparison.
+    """
+    checker = _Checker(schema, objects, variables or {}, free)
+    checker.condition(e)
+    if free == "answers":
+        check_answers(e, frozenset(variables or ()))
+
+
+def check_effect(
+    effect: Effect,
+    schema: Schema,
+    variables: Mapping[str, str | None] | None = None,
+    objects: Mapping[str, str] | None = None,
+) -> None:
+    """Raise an error with its place unless `effect` can be applied to worlds of `schema`.
+
+    Args and errors are those of `check`; a type as effect is a `SchemaError`, since things keep their type.
+    """
+    _Checker(schema, objects, variables or {}, "error").effect(effect)
+
+
+def check_parameters(parameters: tuple[TypedVariable, ...], schema: Schema) -> dict[str, str | None]:
+    """Check the parameters' types; gives them in the form that `check` takes as `variables`.
+
+    A parameter of several types (`either`) is given as `None`.
+
+    Raises:
+        UnknownNameError: a type that is not declared.
+    """
+    for parameter in parameters:
+        for type_name in parameter.types:
+            if type_name not in VALUE_TYPES:
+                schema.require_type(type_name, parameter.place)
+    return {p.name: _single(p.types) for p in parameters}
+
+
+def check_arity(signature: Signature, count: int, place: Place | None = None) -> None:
+    """Raise `SchemaError` unless `signature` takes `count` arguments."""
+    if signature.arity != count:
+        raise SchemaError(
+            f"'{signature.name}' takes {signature.arity} arguments, as in {signature}; found {count}",
+            place=place,
+        )
+
+
+def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
+    """Whether a value that is no thing's name may stand where one of the `wanted` types is expected."""
+    if isinstance(value, bool):
+        return "boolean" in wanted
+    return ("text" if isinstance(value, str) else "number") in wanted
+
+
+def _single(types: tuple[str, ...]) -> str | None:
+    if not types:
+        return "object"
+    return types[0] if len(types) == 1 else None
+
+
+class _Checker:
+    """One walk through an expression; `scope` holds the visible variables with their possible types."""
+
+    def __init__(
+        self,
+        schema: Schema,
+        objects: Mapping[str, str] | None,
+        variables: Mapping[str, str | None],
+        free: Free,
+    ) -> None:
+        self.schema = schema
+        self.objects = objects
+        self.free = free
+        self.scope: dict[str, tuple[str, ...] | None] = {
+            name: None if type_name is None else (type_name,) for name, type_name in variables.items()
+        }
+
+    def condition(self, e: Expression) -> None:
+        match e:
+            case Atom():
+                self.atom(e)
+            case Not(body):
+                self.condition(body)
+            case And(parts) | Or(parts):
+                for part in parts:
+                    self.condition(part)
+            case Imply(premise, conclusion):
+                self.condition(premise)
+                self.condition(conclusion)
+            case Exists(variables, body) | Forall(variables, body):
+                with self.inside(variables):
+                    self.condition(body)
+            case Comparison():
+                self.comparison(e)
+
+    def effect(self, effect: Effect) -> None:
+        match effect:
+            case Add(atom) | Delete(atom):
+                if self.schema.is_type(atom.predicate, len(atom.args)):
+                    raise SchemaError(f"'{atom.predicate}' is a type; things keep theirs", place=atom.place)
+                self.atom(atom)
+            case AllOf(parts):
+                for part in parts:
+                    self.effect(part)
+            case ForEach(variables, inner):
+                with self.inside(variables):
+                    self.effect(inner)
+            case When(condition, inner):
+                self.condition(condition)
+                self.effect(inner)
+            case Assign(_, call, value):
+                self.term(call)
+                self.number(value, effect.operator)
+
+    def atom(self, atom: Atom) -> None:
+        if self.schema.is_type(atom.predicate, len(atom.args)):
+            self.term(atom.args[0])
+            return
+        self.arguments(self.schema.predicate(atom.predicate, atom.place), atom)
+
+    def comparison(self, e: Comparison) -> None:
+        if e.operator in ("=", "!="):
+            self.term(e.left)
+            self.term(e.right)
+            return
+        self.number(e.left, e.operator)
+        self.number(e.right, e.operator)
+
+    def term(self, term: Term) -> None:
+        match term:
+            case Variable(name):
+                self.known_variable(term, name)
+            case Constant():
+                self.known_constant(term)
+            case Call(function):
+                self.arguments(self.schema.function(function, term.place), term)
+            case Arithmetic(operator, args):
+                for arg in args:
+                    self.number(arg, operator)
+
+    def number(self, term: Term, operator: str) -> None:
+        """A term used as a number; a variable must be able to be one."""
+        self.term(term)
+        types = self.types_of(term)
+        if types is not None and "number" not in types:
+            raise SchemaError(f"'{operator}' works on numbers, and this is none", place=term.place)
+
+    def arguments(self, signature: Signature, used: Atom | Call) -> None:
+        check_arity(signature, len(used.args), used.place)
+        for parameter, arg in zip(signature.parameters, used.args, strict=True):
+            self.term(arg)
+            self.fits(arg, parameter, signature)
+
+    def fits(self, arg: Term, parameter: TypedVariable, signature: Signature) -> None:
+        wanted = parameter.types or ("object",)
+        types = self.types_of(arg)
+        if types is None or any(self.compatible(arg, t, w) for t in types for w in wanted):
+            return
+        if isinstance(arg, Constant) and types == ("text",):
+            raise unknown_object(str(arg.value), arg.place, self.names())
+        written = f"'?{arg.name}'" if isinstance(arg, Variable) else "the argument"
+        raise SchemaError(
+            f"{written} is of type {' or '.join(types)}, but '?{parameter.name}' of '{signature.name}' is of "
+            f"type {' or '.join(wanted)}",
+            place=arg.place or signature.place,
+        )
+
+    def compatible(self, arg: Term, given: str, wanted: str) -> bool:
+        """A thing's type must be the wanted one or below; a variable may also turn out to be."""
+        return self.schema.is_a(given, wanted) or (isinstance(arg, Variable) and self.schema.is_a(wanted, given))
+
+    def types_of(self, term: Term) -> tuple[str, ...] | None:
+        """The types the term's value can have; `None` when nothing is known."""
+        match term:
+            case Variable(name):
+                return self.scope.get(name)
+            case Constant(value, quoted):
+                return self.types_of_value(value, quoted=quoted)
+            case _:
+                return ("number",)
+
+    def types_of_value(self, value: Value, *, quoted: bool) -> tuple[str, ...] | None:
+        if isinstance(value, bool):
+            return ("boolean",)
+        if not isinstance(value, str):
+            return ("number",)
+        known = self.schema.constants.get(value) or (self.objects or {}).get(value)
+        if known is not None:
+            return (known, "text") if quoted else (known,)
+        return ("text",) if quoted and self.objects is not None else None
+
+    def known_variable(self, variable: Variable, name: str) -> None:
+        if name in self.scope or self.free == "answers":
+            return
+        raise unbound_error(name, variable.place, self.scope)
+
+    def known_constant(self, constant: Constant) -> None:
+        value = constant.value
+        if self.objects is None or constant.quoted or not isinstance(value, str):
+            return
+        if value not in self.objects and value not in self.schema.constants:
+            raise unknown_object(value, constant.place, self.names())
+
+    def names(self) -> tuple[str, ...]:
+        """All things that can be named."""
+        return (*(self.objects or ()), *self.schema.constants)
+
+    @contextmanager
+    def inside(self, variables: tuple[TypedVariable, ...]) -> Iterator[None]:
+        """The scope of a quantifier."""
+        for variable in variables:
+            for type_name in variable.types:
+                self.schema.require_type(type_name, variable.place)
+        outer = self.scope
+        self.scope = {**outer, **{v.name: v.types or ("object",) for v in variables}}
+        try:
+            yield
+        finally:
+            self.scope = outer
+
+
+def unknown_object(name: str, place: Place | None, valid: tuple[str, ...]) -> UnknownNameError:
+    """The error for a name that is no known thing."""
+    return UnknownNameError(
+        f"there is no object '{name}' (text is written in quotes)", place=place, found=name, valid=valid
+    )

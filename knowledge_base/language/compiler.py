@@ -1,0 +1,241 @@
+"""Conditions compiled to closures, once per condition and schema: tests and searches.
+
+A *test* answers whether a condition holds when all its free variables are bound. A *search* gives the
+bindings that make it hold. Quantifiers are searches too: `exists` looks for a witness and `forall` for a
+counterexample, through the index and not by trying all objects.
+
+A search decides at every step anew which condition to look up next: the one with the fewest matches, given
+what is bound by then. What can be prepared for a step depends only on the conditions that are left, and is
+kept (`_Plan`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from knowledge_base.language.check import check_arity
+from knowledge_base.language.expression import (
+    And,
+    Atom,
+    Comparison,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    TypedVariable,
+    Variable,
+    free_variables,
+)
+from knowledge_base.language.joins import Conjunct, Range, Step, candidates, conjuncts, opposite, order
+from knowledge_base.language.lookups import Lookup, Search, alternatives, distinct, smallest, things
+from knowledge_base.language.terms import (
+    Bindings,
+    Getter,
+    Test,
+    compile_arguments,
+    compile_comparison,
+    compile_term,
+)
+from knowledge_base.language.world import World
+from knowledge_base.schema import Schema
+
+_MOST_STAGES = 1000
+
+
+def compile_test(e: Expression, schema: Schema) -> Test:
+    """A function that says whether `e` holds; all free variables of `e` must then be bound.
+
+    Raises:
+        UnknownNameError: an undeclared predicate, type or function.
+        SchemaError: a wrong number of arguments.
+    """
+    test: Test
+    match e:
+        case Atom():
+            test = _atom(e, schema)
+        case Comparison():
+            test = compile_comparison(e, schema)
+        case Not(body):
+            test = _negation(compile_test(body, schema))
+        case And(parts):
+            test = _all([compile_test(p, schema) for p in parts])
+        case Or(parts):
+            test = _any([compile_test(p, schema) for p in parts])
+        case Imply(premise, conclusion):
+            test = _any([_negation(compile_test(premise, schema)), compile_test(conclusion, schema)])
+        case Exists():
+            test = _found(witnesses(e, schema))
+        case Forall():
+            test = _negation(_found(counterexamples(e, schema)))
+    return test
+
+
+def compile_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Search:
+    """A search for values of the free variables of `e` that are not in `bound`.
+
+    Raises:
+        InputError: such a variable is only tested; and what `compile_test` raises.
+    """
+    return _search(conjuncts(e), schema, bound)
+
+
+def witnesses(e: Exists, schema: Schema) -> Search:
+    """A search for the choices of objects that make the body true."""
+    return _quantified(e.variables, e.body, schema, free_variables(e))
+
+
+def counterexamples(e: Forall, schema: Schema) -> Search:
+    """A search for the choices of objects that make the body false."""
+    return _quantified(e.variables, opposite(e.body), schema, free_variables(e))
+
+
+def _quantified(
+    variables: tuple[TypedVariable, ...], body: Expression, schema: Schema, bound: frozenset[str]
+) -> Search:
+    for variable in variables:
+        for type_name in variable.types:
+            schema.require_type(type_name, variable.place)
+    return _search([*map(Range, variables), *conjuncts(body)], schema, bound)
+
+
+def _atom(atom: Atom, schema: Schema) -> Test:
+    if schema.is_type(atom.predicate, len(atom.args)):
+        return _type_test(compile_term(atom.args[0], schema), (atom.predicate,), schema)
+    check_arity(schema.predicate(atom.predicate, atom.place), len(atom.args), atom.place)
+    predicate, arguments = atom.predicate, compile_arguments(atom.args, schema)
+    return lambda world, bindings: world.holds(predicate, arguments(world, bindings))
+
+
+def _type_test(get: Getter, types: tuple[str, ...], schema: Schema) -> Test:
+    allowed = {t for wanted in types or ("object",) for t in schema.subtypes(wanted)}
+
+    def test(world: World, bindings: Bindings) -> bool:
+        value = get(world, bindings)
+        return isinstance(value, str) and world.type_of(value) in allowed
+
+    return test
+
+
+def _negation(test: Test) -> Test:
+    return lambda world, bindings: not test(world, bindings)
+
+
+def _all(tests: list[Test]) -> Test:
+    def test(world: World, bindings: Bindings) -> bool:
+        for part in tests:  # noqa: SIM110  a generator costs twice as much here
+            if not part(world, bindings):
+                return False
+        return True
+
+    return test
+
+
+def _any(tests: list[Test]) -> Test:
+    def test(world: World, bindings: Bindings) -> bool:
+        for part in tests:  # noqa: SIM110  as above
+            if part(world, bindings):
+                return True
+        return False
+
+    return test
+
+
+def _found(search: Search) -> Test:
+    return lambda world, bindings: next(search(world, bindings), None) is not None
+
+
+def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Search:
+    plan = _Plan([_as_range(c, schema) for c in conditions], schema, bound)
+
+    def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
+        """Backtracking with a stack of its own, so that long conjunctions do not recurse."""
+        stack: list[tuple[_Stage, Iterator[Bindings]]] = [(plan.first, iter((bindings,)))]
+        while stack:
+            stage, found = stack[-1]
+            candidate = next(found, None)
+            if candidate is None:
+                stack.pop()
+            elif stage.test(world, candidate):
+                if not stage.choices:
+                    yield candidate
+                    continue
+                i, lookup = smallest(stage.choices, world, candidate)
+                stack.append((plan.after(stage, i), lookup(world, candidate)))
+
+    return search
+
+
+@dataclass(frozen=True, slots=True)
+class _Stage:
+    """What to do when these conditions (by number) are left: the tests, then one of the look-ups."""
+
+    test: Test
+    choices: tuple[tuple[int, Lookup | Search], ...]
+    left: tuple[int, ...]
+    bound: frozenset[str]
+
+
+class _Plan:
+    """The stages of one search, each prepared when it is first reached."""
+
+    def __init__(self, conditions: list[Conjunct], schema: Schema, bound: frozenset[str]) -> None:
+        self._steps = order(conditions, bound)
+        self._schema = schema
+        self._stages: dict[tuple[int, ...], _Stage] = {}
+        self.first = stage = self._stage(tuple(range(len(self._steps))), bound)
+        while stage.choices:  # one way through, so that every mistake in the text shows now
+            stage = self.after(stage, stage.choices[0][0])
+
+    def after(self, stage: _Stage, chosen: int) -> _Stage:
+        """The stage that follows when the condition `chosen` was looked up."""
+        left = tuple([i for i in stage.left if i != chosen])
+        found = self._stages.get(left)
+        if found is None:
+            if len(self._stages) >= _MOST_STAGES:
+                self._stages.clear()
+            found = self._stages[left] = self._stage(left, stage.bound | self._steps[chosen].free)
+        return found
+
+    def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> _Stage:
+        steps = {i: self._steps[i] for i in left}
+        tests = [_conjunct_test(s.conjunct, self._schema) for s in steps.values() if s.free <= bound]
+        open_steps = {i: s for i, s in steps.items() if not s.free <= bound}
+        choices = [(i, _lookup(s, self._schema, bound)) for i, s in candidates(open_steps, bound)]
+        return _Stage(_all(tests), tuple(choices), tuple(open_steps), bound)
+
+
+def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
+    """A type's atom about a variable ranges over the things of that type."""
+    match conjunct:
+        case Atom(name, (Variable(variable),)) if schema.is_type(name, 1):
+            return Range(TypedVariable(variable, (name,), place=conjunct.place))
+        case _:
+            return conjunct
+
+
+def _conjunct_test(conjunct: Conjunct, schema: Schema) -> Test:
+    if isinstance(conjunct, Range):
+        variable = conjunct.variable
+        return _type_test(compile_term(Variable(variable.name), schema), variable.types, schema)
+    return compile_test(conjunct, schema)
+
+
+def _lookup(step: Step, schema: Schema, bound: frozenset[str]) -> Lookup | Search:
+    """Finds values for the variables of a condition that are not in `bound`."""
+    finds = step.free - bound
+    match step.conjunct:
+        case Range(variable):
+            return things(variable)
+        case Atom() as atom:
+            check_arity(schema.predicate(atom.predicate, atom.place), len(atom.args), atom.place)
+            return Lookup(atom, schema, finds)
+        case Or(parts):
+            return distinct(alternatives([_search(conjuncts(p), schema, bound) for p in parts]), finds)
+        case Exists(variables, body):
+            hidden = frozenset(v.name for v in variables)
+            return distinct(_quantified(variables, body, schema, bound - hidden), finds)
+        case _:
+            raise AssertionError("only these conditions find values")

@@ -1,0 +1,10 @@
+"""The language's verbs on any `World`: ask, query, compute, apply, explain. The door to its evaluation."""
+
+from __future__ import annotations
+
+from knowledge_base.language.application import apply_effect
+from knowledge_base.language.asking import evaluate_term, holds, query
+from knowledge_base.language.explanation import Explanation, explain
+from knowledge_base.language.world import World
+
+__all__ = ["Explanation", "World", "apply_effect", "evaluate_term", "explain", "holds", "query"]

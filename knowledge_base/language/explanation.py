@@ -1,0 +1,163 @@
+"""Why a condition is true or false of a world: its tree with truth values and the leaf that decides."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from knowledge_base.facts import Value
+from knowledge_base.language.application import choices
+from knowledge_base.language.asking import NO_BINDINGS, evaluate_term, holds
+from knowledge_base.language.binding import check_bound
+from knowledge_base.language.compiler import counterexamples, witnesses
+from knowledge_base.language.expression import (
+    And,
+    Arithmetic,
+    Atom,
+    Call,
+    Comparison,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    substitute,
+)
+from knowledge_base.language.printer import to_text, value_text
+from knowledge_base.language.terms import Bindings
+from knowledge_base.language.world import World
+
+MOST_TRIED = 200
+"""How many choices of a false `exists` are looked at for the one that comes nearest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """A condition with its variables filled in, its truth, and the same for its parts.
+
+    Attributes:
+        text: the condition in the language.
+        truth: whether it holds.
+        children: its parts, all of them judged; for `exists` and `forall` the one choice that shows it, if
+            there is one (a witness, the nearest miss, a counterexample).
+        detail: for a comparison with computed sides what they are worth; for a choice, what was chosen.
+        decider: which of the children decides; `None` for a leaf.
+    """
+
+    text: str
+    truth: bool
+    children: tuple[Explanation, ...] = ()
+    detail: str | None = None
+    decider: int | None = None
+
+    @property
+    def deciding(self) -> Explanation:
+        """The leaf that makes the whole what it is: the first false part of an `and`, and so on."""
+        here = self
+        while here.decider is not None:
+            here = here.children[here.decider]
+        return here
+
+    def __str__(self) -> str:
+        """One line, e.g. `(< (failures cup1) 2) is false: 3 < 2`."""
+        said = f"{self.text} is {'true' if self.truth else 'false'}"
+        return f"{said}: {self.detail}" if self.detail else said
+
+    def to_json(self) -> dict[str, Any]:
+        """The tree as plain data, without what is empty."""
+        found: dict[str, Any] = {"text": self.text, "truth": self.truth}
+        if self.detail:
+            found["detail"] = self.detail
+        if self.children:
+            found["children"] = [c.to_json() for c in self.children]
+        return found
+
+
+def explain(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Explanation:
+    """Why `e` is true or false of `world`.
+
+    Raises:
+        UnknownNameError: a free variable is not bound, or a name is not declared.
+        SchemaError: as for `holds`.
+    """
+    check_bound(e, bindings)
+    return _explain(e, world, bindings)
+
+
+def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
+    text = to_text(substitute(e, bindings))
+    match e:
+        case Atom() | Comparison():
+            detail = _computed(e, world, bindings) if isinstance(e, Comparison) else None
+            found = Explanation(text, holds(e, world, bindings), detail=detail)
+        case Not(body):
+            child = _explain(body, world, bindings)
+            found = Explanation(text, not child.truth, (child,), decider=0)
+        case And(parts):
+            found = _junction(text, [_explain(p, world, bindings) for p in parts], neutral=True)
+        case Or(parts):
+            found = _junction(text, [_explain(p, world, bindings) for p in parts], neutral=False)
+        case Imply(premise, conclusion):
+            first, second = (_explain(p, world, bindings) for p in (premise, conclusion))
+            found = _implication(text, first, second)
+        case Exists():
+            found = _existence(text, e, world, bindings)
+        case Forall():
+            found = _universality(text, e, world, bindings)
+    return found
+
+
+def _junction(text: str, children: Sequence[Explanation], *, neutral: bool) -> Explanation:
+    """`and` (neutral: true) or `or` (neutral: false); the first part that is not neutral decides."""
+    deciding = [i for i, c in enumerate(children) if c.truth is not neutral]
+    truth = not neutral if deciding else neutral
+    decider = (deciding or [0])[0] if children else None
+    return Explanation(text, truth, tuple(children), decider=decider)
+
+
+def _implication(text: str, premise: Explanation, conclusion: Explanation) -> Explanation:
+    truth = conclusion.truth or not premise.truth
+    return Explanation(text, truth, (premise, conclusion), decider=1 if premise.truth else 0)
+
+
+def _existence(text: str, e: Exists, world: World, bindings: Bindings) -> Explanation:
+    names = [v.name for v in e.variables]
+    witness = next(witnesses(e, world.schema)(world, bindings), None)
+    if witness is not None:
+        return _shown(text, e.body, names, world, witness, truth=True)
+    tried = itertools.islice(choices(e.variables, world), MOST_TRIED)
+    misses = [_explain(e.body, world, {**bindings, **choice}) for choice in tried]
+    if not misses:
+        return Explanation(text, truth=False, detail="there is nothing to choose from")
+    nearest = max(misses, key=_nearness)
+    return Explanation(text, truth=False, children=(nearest,), detail="the nearest miss", decider=0)
+
+
+def _universality(text: str, e: Forall, world: World, bindings: Bindings) -> Explanation:
+    counterexample = next(counterexamples(e, world.schema)(world, bindings), None)
+    if counterexample is None:
+        return Explanation(text, truth=True)
+    return _shown(text, e.body, [v.name for v in e.variables], world, counterexample, truth=False)
+
+
+def _shown(
+    text: str, body: Expression, names: Sequence[str], world: World, choice: Bindings, *, truth: bool
+) -> Explanation:
+    chosen = ", ".join(f"?{name} = {value_text(choice[name])}" for name in names)
+    child = _explain(body, world, choice)
+    return Explanation(text, truth, (child,), detail=chosen or None, decider=0)
+
+
+def _nearness(miss: Explanation) -> float:
+    """The share of parts that hold, so that the nearest miss can be shown."""
+    return sum(c.truth for c in miss.children) / len(miss.children) if miss.children else 0.0
+
+
+def _computed(e: Comparison, world: World, bindings: Bindings) -> str | None:
+    if not any(isinstance(side, Call | Arithmetic) for side in (e.left, e.right)):
+        return None
+    left, right = (value_text(evaluate_term(side, world, bindings)) for side in (e.left, e.right))
+    return f"{left} {e.operator} {right}"

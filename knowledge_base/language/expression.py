@@ -1,0 +1,255 @@
+"""Conditions as frozen values: what a text means, without saying on which world.
+
+The forms are those of PDDL 2.1 conditions (Fox & Long 2003) plus `!=`, quoted text and truth values; a type
+is also a unary predicate. Two expressions are equal when they say the same, wherever they were written:
+places take no part in comparison.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from knowledge_base.errors import Place
+from knowledge_base.facts import Value
+
+# What can be written without quotes and is read back as the same text (names are folded to lower case).
+_PLAIN_NAME = re.compile(r"[^\s()\";?:]+[^\s()\";]*")
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?")
+TRUTH_VALUES: Mapping[str, bool] = {"true": True, "false": False}
+"""The two words that are read as truth values, not as names."""
+
+
+def is_number(text: str) -> bool:
+    """Whether `text` is written as a number: `3`, `-0.5`, `1e-3`."""
+    return _NUMBER.fullmatch(text) is not None
+
+
+def is_plain_name(text: str) -> bool:
+    """Whether `text` is a name that needs no quotes: lower case, no blanks, no number, no truth value."""
+    return (
+        _PLAIN_NAME.fullmatch(text) is not None
+        and text == text.lower()
+        and not is_number(text)
+        and text not in TRUTH_VALUES
+        and text != "-"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """Base of everything that was written somewhere; `place` is for messages only."""
+
+    place: Place | None = field(default=None, compare=False, repr=False, kw_only=True)
+
+
+@dataclass(frozen=True, slots=True)
+class TypedVariable(Located):
+    """A parameter or quantified variable; no types or `object` means anything, several mean `either`."""
+
+    name: str
+    types: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.types == ("object",):
+            object.__setattr__(self, "types", ())
+
+
+@dataclass(frozen=True, slots=True)
+class Variable(Located):
+    """`?x`, by its name without the question mark; `?event.item` has the name `event.item`."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Constant(Located):
+    """An object's name, a number, a truth value, or text in quotes.
+
+    Text that cannot stand without quotes (blanks, upper case) is quoted whatever `quoted` says, so that
+    printing and reading give the same value again. Quoted text names the object of exactly that spelling.
+    """
+
+    value: Value
+    quoted: bool = False
+
+    def __post_init__(self) -> None:
+        if isinstance(self.value, str) and not is_plain_name(self.value):
+            object.__setattr__(self, "quoted", True)
+
+
+@dataclass(frozen=True, slots=True)
+class Call(Located):
+    """A numeric fluent's value: `(failures ?item)`."""
+
+    function: str
+    args: tuple[Term, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic(Located):
+    """`+ - * /` on numbers; `-` with one argument negates."""
+
+    operator: str
+    args: tuple[Term, ...]
+
+
+Term = Variable | Constant | Call | Arithmetic
+
+
+@dataclass(frozen=True, slots=True)
+class Atom(Located):
+    """A predicate of its arguments, or a type of one: `(on ?o table)`, `(cup ?o)`."""
+
+    predicate: str
+    args: tuple[Term, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Not(Located):
+    """True when `body` is not."""
+
+    body: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class And(Located):
+    """True when all parts are; `(and)` is true."""
+
+    parts: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Or(Located):
+    """True when some part is; `(or)` is false."""
+
+    parts: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Imply(Located):
+    """False only when `premise` is true and `conclusion` is not."""
+
+    premise: Expression
+    conclusion: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Exists(Located):
+    """True when `body` is for some choice of known objects."""
+
+    variables: tuple[TypedVariable, ...]
+    body: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Forall(Located):
+    """True when `body` is for all choices of known objects."""
+
+    variables: tuple[TypedVariable, ...]
+    body: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison(Located):
+    """`= != < <= > >=`; the first two compare anything, the others numbers."""
+
+    operator: str
+    left: Term
+    right: Term
+
+
+Expression = Atom | Not | And | Or | Imply | Exists | Forall | Comparison
+
+TRUE = And(())
+"""`(and)`, the condition that always holds."""
+
+COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
+ARITHMETIC = ("+", "-", "*", "/")
+KEYWORDS = ("and", "or", "not", "imply", "exists", "forall", *COMPARISONS)
+"""The words that open a condition and are not predicates."""
+
+
+def variables_in_order(e: Expression | Term) -> Iterator[str]:
+    """Names of the free variables as they are met reading from left to right; repeated ones again."""
+    match e:
+        case Variable(name):
+            yield name
+        case Constant():
+            return
+        case Exists(variables, body) | Forall(variables, body):
+            bound = {v.name for v in variables}
+            yield from (name for name in variables_in_order(body) if name not in bound)
+        case _:
+            for part in parts_of(e):
+                yield from variables_in_order(part)
+
+
+def parts_of(e: Expression | Term) -> tuple[Expression | Term, ...]:
+    """The expressions and terms that `e` directly consists of."""
+    match e:
+        case Atom(_, args) | Call(_, args) | Arithmetic(_, args):
+            return args
+        case And(parts) | Or(parts):
+            return parts
+        case Not(body) | Exists(_, body) | Forall(_, body):
+            return (body,)
+        case Imply(first, second) | Comparison(_, first, second):
+            return (first, second)
+        case _:
+            return ()
+
+
+def free_variables(e: Expression | Term) -> frozenset[str]:
+    """The names of the variables in `e` that no quantifier binds."""
+    return frozenset(variables_in_order(e))
+
+
+def variable_place(e: Expression | Term, name: str) -> Place | None:
+    """Where the variable `name` is first written in `e`."""
+    if isinstance(e, Variable):
+        return e.place if e.name == name else None
+    found = (variable_place(part, name) for part in parts_of(e))
+    return next((place for place in found if place is not None), None)
+
+
+def substitute(e: Expression, bindings: Mapping[str, Value]) -> Expression:
+    """`e` with the free variables in `bindings` replaced by constants; quantified ones shadow.
+
+    Names in `bindings` that do not occur free in `e` are ignored. Places are kept.
+    """
+    match e:
+        case Atom():
+            return replace(e, args=_all(e.args, bindings))
+        case Not(body):
+            return replace(e, body=substitute(body, bindings))
+        case And(parts) | Or(parts):
+            return replace(e, parts=tuple(substitute(p, bindings) for p in parts))
+        case Imply(premise, conclusion):
+            return replace(e, premise=substitute(premise, bindings), conclusion=substitute(conclusion, bindings))
+        case Exists() | Forall():
+            return replace(e, body=substitute(e.body, unshadowed(e.variables, bindings)))
+        case Comparison(_, left, right):
+            return replace(e, left=substitute_term(left, bindings), right=substitute_term(right, bindings))
+
+
+def substitute_term(term: Term, bindings: Mapping[str, Value]) -> Term:
+    """`term` with the variables in `bindings` replaced by constants."""
+    match term:
+        case Variable(name) if name in bindings:
+            return Constant(bindings[name], place=term.place)
+        case Call(_, args) | Arithmetic(_, args):
+            return replace(term, args=_all(args, bindings))
+        case _:
+            return term
+
+
+def unshadowed(variables: tuple[TypedVariable, ...], bindings: Mapping[str, Value]) -> dict[str, Value]:
+    """The bindings that are still visible inside a quantifier over `variables`."""
+    own = {v.name for v in variables}
+    return {name: value for name, value in bindings.items() if name not in own}
+
+
+def _all(args: tuple[Term, ...], bindings: Mapping[str, Value]) -> tuple[Term, ...]:
+    return tuple(substitute_term(a, bindings) for a in args)

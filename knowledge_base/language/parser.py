@@ -1,0 +1,228 @@
+"""Text or read groups to conditions, effects and terms.
+
+Names are folded to lower case, as PDDL compares them; quoted text stays as it is. What is checked here is
+form only; whether names are declared is checked against a schema (`check`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from knowledge_base.errors import ParseError, Place, nearest
+from knowledge_base.language.effect import (
+    ASSIGNMENTS,
+    EFFECT_KEYWORDS,
+    Add,
+    AllOf,
+    Assign,
+    Delete,
+    Effect,
+    ForEach,
+    When,
+)
+from knowledge_base.language.expression import (
+    ARITHMETIC,
+    COMPARISONS,
+    KEYWORDS,
+    TRUTH_VALUES,
+    And,
+    Arithmetic,
+    Atom,
+    Call,
+    Comparison,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    Variable,
+    is_number,
+)
+from knowledge_base.language.sexpr import Group, Node, Word, read
+from knowledge_base.language.typed_list import parse_typed_list, parse_variables
+
+__all__ = ["parse_condition", "parse_effect", "parse_term", "parse_typed_list", "parse_variables"]
+
+_LONGEST_NUMBER = 40
+
+
+def parse_condition(text: str | Node, source: str | None = None) -> Expression:
+    """A condition from its text or from a group already read; `()` is true, as in PDDL.
+
+    Raises:
+        ParseError: the form is wrong; it says where and what was expected.
+    """
+    group = _group(_only(text, source, "condition"), "a condition")
+    if not group.items:
+        return And((), place=group.place)
+    head, args = _head(group, "a predicate or one of " + " ".join(KEYWORDS)), group.items[1:]
+    if head in KEYWORDS:
+        return _keyword_condition(head, args, group)
+    return _atom(group, head, KEYWORDS)
+
+
+def parse_effect(text: str | Node, source: str | None = None) -> Effect:
+    """An effect from its text or from a group already read; `()` changes nothing.
+
+    Raises:
+        ParseError: the form is wrong, or a word of conditions (`or`, `exists`) is used as an effect.
+    """
+    group = _group(_only(text, source, "effect"), "an effect")
+    if not group.items:
+        return AllOf((), place=group.place)
+    head, args = _head(group, "a predicate or one of " + " ".join(EFFECT_KEYWORDS)), group.items[1:]
+    if head in EFFECT_KEYWORDS:
+        return _keyword_effect(head, args, group)
+    if head in KEYWORDS:
+        raise ParseError(f"'{head}' is no effect", place=group.place, found=head, valid=EFFECT_KEYWORDS)
+    return Add(_atom(group, head, EFFECT_KEYWORDS), place=group.place)
+
+
+def parse_term(text: str | Node, source: str | None = None) -> Term:
+    """A variable, name, number, quoted text, numeric fluent or arithmetic.
+
+    Raises:
+        ParseError: the form is wrong.
+    """
+    node = _only(text, source, "term")
+    return _simple_term(node) if isinstance(node, Word) else _compound_term(node)
+
+
+def _only(text: str | Node, source: str | None, kind: str) -> Node:
+    if not isinstance(text, str):
+        return text
+    nodes = read(text, source)
+    if not nodes:
+        raise ParseError(f"the text is empty where a {kind} is expected", place=Place(source, 1, 1))
+    if len(nodes) > 1:
+        raise ParseError(f"one {kind} is expected, and here a second begins", place=nodes[1].place)
+    return nodes[0]
+
+
+def _group(node: Node, what: str) -> Group:
+    if isinstance(node, Group):
+        return node
+    raise ParseError(f"{what} is written in parentheses: ({node.text})", place=node.place)
+
+
+def _head(group: Group, wanted: str) -> str:
+    head = group.head()
+    if head is None or head.startswith("?") or is_number(head):
+        place = group.items[0].place if group.items else group.place
+        raise ParseError(f"after '(' comes {wanted}", place=place)
+    return head
+
+
+def _take(args: Sequence[Node], count: int, group: Group, form: str) -> Sequence[Node]:
+    if len(args) == count:
+        return args
+    place = args[count].place if len(args) > count else group.place
+    raise ParseError(f"'{group.head()}' is written {form}; found {len(args)} parts", place=place)
+
+
+def _keyword_condition(head: str, args: Sequence[Node], group: Group) -> Expression:
+    place = group.place
+    if head in COMPARISONS:
+        left, right = _take(args, 2, group, f"({head} LEFT RIGHT)")
+        return Comparison(head, parse_term(left), parse_term(right), place=place)
+    if head in ("exists", "forall"):
+        variables, body = _take(args, 2, group, f"({head} (?x - TYPE) CONDITION)")
+        quantifier = Exists if head == "exists" else Forall
+        return quantifier(parse_variables(variables), parse_condition(body), place=place)
+    if head == "not":
+        return Not(parse_condition(_take(args, 1, group, "(not CONDITION)")[0]), place=place)
+    if head == "imply":
+        premise, conclusion = _take(args, 2, group, "(imply PREMISE CONCLUSION)")
+        return Imply(parse_condition(premise), parse_condition(conclusion), place=place)
+    parts = tuple(parse_condition(a) for a in args)
+    return And(parts, place=place) if head == "and" else Or(parts, place=place)
+
+
+def _keyword_effect(head: str, args: Sequence[Node], group: Group) -> Effect:
+    place = group.place
+    if head == "and":
+        return AllOf(tuple(parse_effect(a) for a in args), place=place)
+    if head == "not":
+        return Delete(_effect_atom(_take(args, 1, group, "(not (PREDICATE ...))")[0]), place=place)
+    if head == "forall":
+        variables, effect = _take(args, 2, group, "(forall (?x - TYPE) EFFECT)")
+        return ForEach(parse_variables(variables), parse_effect(effect), place=place)
+    if head == "when":
+        condition, effect = _take(args, 2, group, "(when CONDITION EFFECT)")
+        return When(parse_condition(condition), parse_effect(effect), place=place)
+    fluent, value = _take(args, 2, group, f"({head} (FUNCTION ...) NUMBER)")
+    return Assign(head, _call(_group(fluent, "a numeric fluent")), parse_term(value), place=place)
+
+
+def _effect_atom(node: Node) -> Atom:
+    group = _group(node, "a predicate")
+    head = _head(group, "a predicate")
+    if head in (*KEYWORDS, *ASSIGNMENTS, "when"):
+        raise ParseError(f"only a predicate can be deleted, not '{head}'", place=group.place)
+    return _atom(group, head, EFFECT_KEYWORDS)
+
+
+def _atom(group: Group, head: str, keywords: Iterable[str]) -> Atom:
+    try:
+        return Atom(head, tuple(parse_term(a) for a in group.items[1:]), place=group.place)
+    except ParseError:
+        nested = any(isinstance(a, Group) for a in group.items[1:])
+        if nested and nearest(head, keywords) is not None:  # a misspelt keyword explains more
+            raise ParseError(
+                f"'{head}' is read as a predicate, whose arguments are names, variables or numbers",
+                place=group.place,
+                found=head,
+                valid=keywords,
+            ) from None
+        raise
+
+
+def _simple_term(word: Word) -> Term:
+    if word.quoted:
+        return Constant(word.text, quoted=True, place=word.place)
+    text = word.folded()
+    if text.startswith("?"):
+        if len(text) == 1:
+            raise ParseError("'?' without a variable's name", place=word.place)
+        return Variable(text[1:], place=word.place)
+    if is_number(text):
+        return Constant(_number(word), place=word.place)
+    if text in TRUTH_VALUES:
+        return Constant(TRUTH_VALUES[text], place=word.place)
+    if text == "-" or text.startswith(":"):
+        raise ParseError(f"'{text}' is no name, variable or number", place=word.place)
+    return Constant(text, place=word.place)
+
+
+def _number(word: Word) -> int | float:
+    if len(word.text) > _LONGEST_NUMBER:
+        raise ParseError(f"a number has at most {_LONGEST_NUMBER} characters", place=word.place)
+    try:
+        return int(word.text)
+    except ValueError:
+        value = float(word.text)
+    if not math.isfinite(value):
+        raise ParseError(f"the number {word.text} is too large", place=word.place)
+    return value
+
+
+def _compound_term(group: Group) -> Term:
+    head = _head(group, "a function's name or one of + - * /")
+    if head not in ARITHMETIC:
+        return _call(group)
+    args = tuple(parse_term(a) for a in group.items[1:])
+    fewest, most = (1 if head == "-" else 2), (2 if head in "-/" else len(args))
+    if not fewest <= len(args) <= most:
+        raise ParseError(f"'{head}' takes two numbers; found {len(args)}", place=group.place)
+    return Arithmetic(head, args, place=group.place)
+
+
+def _call(group: Group) -> Call:
+    head = _head(group, "a function's name")
+    if head in (*KEYWORDS, *ARITHMETIC):
+        raise ParseError(f"'{head}' is not a function; a name, number or numeric fluent is expected", place=group.place)
+    return Call(head, tuple(parse_term(a) for a in group.items[1:]), place=group.place)

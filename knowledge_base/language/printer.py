@@ -1,0 +1,91 @@
+"""Expressions, terms and effects back to text; reading the text gives an equal value again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from knowledge_base.facts import Value
+from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
+from knowledge_base.language.expression import (
+    And,
+    Arithmetic,
+    Atom,
+    Call,
+    Comparison,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    TypedVariable,
+    Variable,
+)
+
+_Form = Call | Arithmetic | Atom | And | Or | Not | Imply | Comparison | AllOf | Delete | When | Assign
+
+
+def to_text(node: Expression | Term | Effect) -> str:
+    """`node` on one line of PDDL, losslessly: `parse(to_text(x)) == x`."""
+    match node:
+        case Variable(name):
+            return f"?{name}"
+        case Constant(value, quoted):
+            return value_text(value, quoted=quoted)
+        case Add(atom):
+            return to_text(atom)
+        case Exists(variables, body) | Forall(variables, body) | ForEach(variables, body):
+            head = "exists" if isinstance(node, Exists) else "forall"
+            return f"({head} {variables_text(variables)} {to_text(body)})"
+        case _:
+            head, parts = _form(node)
+            return "(" + " ".join([head, *map(to_text, parts)]) + ")"
+
+
+def value_text(value: Value, *, quoted: bool = False) -> str:
+    """A value as the language writes it: `cup1`, `0.5`, `true`, `"red cup"`."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not isinstance(value, str):
+        return repr(value)
+    if not Constant(value, quoted).quoted:
+        return value
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+def variables_text(variables: Iterable[TypedVariable]) -> str:
+    """A typed list in parentheses: `(?a - cup ?b - object)`, each variable with a type of its own."""
+    listed = tuple(variables)
+    if not any(v.types for v in listed):
+        return "(" + " ".join(f"?{v.name}" for v in listed) + ")"
+    return "(" + " ".join(_typed(v) for v in listed) + ")"
+
+
+def _typed(variable: TypedVariable) -> str:
+    types = variable.types or ("object",)  # left out, it would take the type of the next one
+    return f"?{variable.name} - " + (types[0] if len(types) == 1 else f"(either {' '.join(types)})")
+
+
+def _form(node: _Form) -> tuple[str, Sequence[Expression | Term | Effect]]:
+    form: tuple[str, Sequence[Expression | Term | Effect]]
+    match node:
+        case Call(head, args) | Arithmetic(head, args) | Atom(head, args):
+            form = head, args
+        case And(parts):
+            form = "and", parts
+        case AllOf(effects):
+            form = "and", effects
+        case Or(parts):
+            form = "or", parts
+        case Not(body) | Delete(body):
+            form = "not", (body,)
+        case Imply(premise, conclusion):
+            form = "imply", (premise, conclusion)
+        case When(condition, effect):
+            form = "when", (condition, effect)
+        case Comparison(operator, left, right) | Assign(operator, left, right):
+            form = operator, (left, right)
+    return form

@@ -1,0 +1,118 @@
+"""Terms compiled to closures: what an argument or a side of a comparison is worth on a world."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping
+
+from knowledge_base.errors import InputError, Place, SchemaError
+from knowledge_base.facts import Value
+from knowledge_base.language.check import check_arity
+from knowledge_base.language.expression import Arithmetic, Call, Comparison, Constant, Term, Variable
+from knowledge_base.language.world import World
+from knowledge_base.schema import Schema
+
+Bindings = Mapping[str, Value]
+Getter = Callable[[World, Bindings], Value]
+Test = Callable[[World, Bindings], bool]
+Number = int | float
+
+_ORDER: Mapping[str, Callable[[Number, Number], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+_FOLD: Mapping[str, Callable[[Number, Number], Number]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+}
+
+
+def compile_term(term: Term, schema: Schema) -> Getter:
+    """A function that gives the term's value; all its variables must then be bound.
+
+    Raises:
+        UnknownNameError: an undeclared function.
+        SchemaError: a wrong number of arguments.
+    """
+    match term:
+        case Variable(name):
+            return lambda _world, bindings: bindings[name]
+        case Constant(value):
+            return lambda _world, _bindings: value
+        case Call():
+            return _call(term, schema)
+        case Arithmetic():
+            return _arithmetic(term, schema)
+
+
+def compile_arguments(terms: tuple[Term, ...], schema: Schema) -> Callable[[World, Bindings], tuple[Value, ...]]:
+    """A function that gives the values of all terms."""
+    constants = tuple(t.value for t in terms if isinstance(t, Constant))
+    if len(constants) == len(terms):
+        return lambda _world, _bindings: constants
+    getters = tuple(compile_term(t, schema) for t in terms)
+    return lambda world, bindings: tuple([get(world, bindings) for get in getters])
+
+
+def compile_comparison(e: Comparison, schema: Schema) -> Test:
+    """A function that compares; `=` and `!=` anything, the others numbers.
+
+    The function raises `SchemaError` when it meets a side that is no number.
+    """
+    left, right = compile_term(e.left, schema), compile_term(e.right, schema)
+    if e.operator == "=":
+        return lambda world, b: same(left(world, b), right(world, b))
+    if e.operator == "!=":
+        return lambda world, b: not same(left(world, b), right(world, b))
+    ordered, name = _ORDER[e.operator], e.operator
+    places = (e.left.place or e.place, e.right.place or e.place)
+
+    def test(world: World, b: Bindings) -> bool:
+        first = as_number(left(world, b), name, places[0])
+        return ordered(first, as_number(right(world, b), name, places[1]))
+
+    return test
+
+
+def same(left: Value, right: Value) -> bool:
+    """Equality of values; a truth value is no number, though Python takes `True` for 1."""
+    return left == right and isinstance(left, bool) == isinstance(right, bool)
+
+
+def as_number(value: Value, used_by: str, place: Place | None) -> Number:
+    """`value` as a number.
+
+    Raises:
+        SchemaError: it is a name, text or truth value.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise SchemaError(f"'{used_by}' works on numbers, not on '{value}'", place=place)
+    return value
+
+
+def _call(call: Call, schema: Schema) -> Getter:
+    check_arity(schema.function(call.function, call.place), len(call.args), call.place)
+    function, arguments = call.function, compile_arguments(call.args, schema)
+    return lambda world, bindings: world.value(function, arguments(world, bindings))
+
+
+def _arithmetic(term: Arithmetic, schema: Schema) -> Getter:
+    name, place = term.operator, term.place
+    combine, arguments = _FOLD[name], compile_arguments(term.args, schema)
+
+    def compute(world: World, bindings: Bindings) -> Value:
+        first, *rest = (as_number(v, name, place) for v in arguments(world, bindings))
+        try:
+            if not rest:
+                return -first
+            for number in rest:
+                first = combine(first, number)
+        except ArithmeticError as error:
+            raise InputError(f"'{name}' cannot be computed: {error}", place=place) from None
+        return first
+
+    return compute

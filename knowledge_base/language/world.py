@@ -1,0 +1,43 @@
+"""What the language is evaluated on, whoever keeps it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from knowledge_base.facts import Value
+from knowledge_base.schema import Schema
+
+
+class World(Protocol):
+    """A state of the world: the store, pending changes on top of it, a planner's state.
+
+    Predicates are the declared ones; types as predicates, quantifiers and comparisons are the language's
+    affair and are built from these five answers. A world that also has `estimate(predicate, pattern) -> int`,
+    at most how many facts match, lets conjunctions begin with the rarest.
+    """
+
+    @property
+    def schema(self) -> Schema:
+        """What may be said about it."""
+        ...
+
+    def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
+        """Whether the fact is true."""
+        ...
+
+    def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
+        """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
+        ...
+
+    def value(self, function: str, args: tuple[Value, ...]) -> float:
+        """The numeric fluent's value; 0 until it is set."""
+        ...
+
+    def objects(self, type_name: str) -> Iterable[str]:
+        """The things of that type or a subtype, in order of insertion."""
+        ...
+
+    def type_of(self, name: str) -> str | None:
+        """The thing's type; `None` if there is no such thing."""
+        ...

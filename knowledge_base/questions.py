@@ -1,0 +1,72 @@
+"""Questions as people write them, read and checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+
+from knowledge_base.facts import Value
+from knowledge_base.language.check import Free, check
+from knowledge_base.language.expression import Expression
+from knowledge_base.language.memory import IdentityCache
+from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.world import World
+
+_parsed = lru_cache(maxsize=1024)(parse_condition)
+
+
+class Questions:
+    """Reads texts and checks them against the schema and the things that are known.
+
+    A question that passed is not checked again: what it names may be removed later, and then nothing holds
+    of it.
+    """
+
+    def __init__(self) -> None:
+        self._passed: IdentityCache[Expression, set[tuple[Free, frozenset[str]]]] = IdentityCache(1024)
+
+    def condition(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
+        """The condition, all of whose free variables are in `params`.
+
+        Raises:
+            ParseError: the text is no condition.
+            UnknownNameError: an undeclared predicate, function, type, variable or object.
+            SchemaError: a wrong number of arguments or a type that can never fit.
+        """
+        return self._checked(text, params, world, "error")
+
+    def query(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
+        """The query, whose free variables not in `params` are asked for.
+
+        Raises:
+            InputError: as for `condition`, or a variable occurs only under `not` or in a comparison.
+        """
+        return self._checked(text, params, world, "answers")
+
+    def _checked(self, text: str | Expression, params: Mapping[str, Value], world: World, free: Free) -> Expression:
+        e = _parsed(text) if isinstance(text, str) else text
+        passed = self._passed.get(e, world.schema, set)
+        kind = (free, frozenset(params))
+        if kind not in passed:
+            check(e, world.schema, dict.fromkeys(params), free, objects=_Things(world))
+            passed.add(kind)
+        return e
+
+
+class _Things(Mapping[str, str]):
+    """The things of a world with their types, looked up one by one."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def __getitem__(self, name: str) -> str:
+        found = self._world.type_of(name)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._world.objects("object"))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)

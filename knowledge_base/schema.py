@@ -1,0 +1,272 @@
+"""What may be said about a world: types, constants, predicates and functions (from a PDDL domain)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from knowledge_base.errors import Place, SchemaError, UnknownNameError
+from knowledge_base.exchange.domain_text import DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.language.expression import KEYWORDS, TypedVariable
+from knowledge_base.language.typed_list import TypedName
+
+ROOT_TYPE = "object"
+VALUE_TYPES = ("number", "text", "boolean")
+"""Types of arguments that are values and not things; they have no subtypes and cannot be quantified over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """A predicate's or function's name and the parameters it takes, in order."""
+
+    name: str
+    parameters: tuple[TypedVariable, ...] = ()
+    place: Place | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def arity(self) -> int:
+        """The number of arguments it takes."""
+        return len(self.parameters)
+
+    def __str__(self) -> str:
+        """As declared: `(on ?a - item ?b - place)`."""
+        typed = (f"?{p.name} - {' or '.join(p.types or (ROOT_TYPE,))}" for p in self.parameters)
+        return "(" + " ".join([self.name, *typed]) + ")"
+
+    def means(self, other: Signature) -> bool:
+        """Whether both take the same types in the same order, whatever the parameters are called."""
+        return [p.types for p in self.parameters] == [p.types for p in other.parameters]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Schema:
+    """The declarations of a world; every instance is consistent. Equality is identity.
+
+    Attributes:
+        types: each type's parent; `object` is always there and has none.
+        constants: things that every world of this schema has, with their types.
+        predicates: by name.
+        functions: numeric fluents, by name.
+        places: where types and constants are declared, for messages.
+
+    Raises:
+        SchemaError: an unknown parent, parameter or constant type, a cycle of types, or one name used twice.
+    """
+
+    types: Mapping[str, str | None] = field(default_factory=dict)
+    constants: Mapping[str, str] = field(default_factory=dict)
+    predicates: Mapping[str, Signature] = field(default_factory=dict)
+    functions: Mapping[str, Signature] = field(default_factory=dict)
+    places: Mapping[str, Place] = field(default_factory=dict, repr=False)
+    _ancestors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.types.get(ROOT_TYPE) not in (None, ROOT_TYPE):
+            raise SchemaError("'object' is the type of all things", place=self.places.get(ROOT_TYPE))
+        parents = {ROOT_TYPE: None, **{t: p for t, p in self.types.items() if t != ROOT_TYPE}}
+        copies: dict[str, Mapping[str, object]] = {
+            "types": {t: p or (None if t == ROOT_TYPE else ROOT_TYPE) for t, p in parents.items()},
+            "constants": dict(self.constants),
+            "predicates": dict(self.predicates),
+            "functions": dict(self.functions),
+            "places": dict(self.places),
+        }
+        for name, copy in copies.items():
+            object.__setattr__(self, name, copy)
+        object.__setattr__(self, "_ancestors", {t: tuple(self._lineage(t)) for t in self.types})
+        self._check_names()
+        self._check_types()
+
+    @classmethod
+    def from_pddl(cls, path: str | Path) -> Schema:
+        """The schema of a PDDL domain file.
+
+        Raises:
+            InputError: the file cannot be read or does not declare a consistent schema.
+        """
+        return cls.from_text(read_domain(Path(path)))
+
+    @classmethod
+    def parse(cls, text: str, source: str | None = None) -> Schema:
+        """The schema of a PDDL domain given as text.
+
+        Raises:
+            InputError: the text is no domain or does not declare a consistent schema.
+        """
+        return cls.from_text(parse_domain(text, source))
+
+    @classmethod
+    def from_text(cls, domain: DomainText) -> Schema:
+        """The schema that a domain's declarations make.
+
+        Raises:
+            SchemaError: two declarations contradict each other; both places are named.
+        """
+        types = _typed_names(domain.types, "type")
+        constants = _typed_names(domain.constants, "constant")
+        return cls(
+            types={name: declared.types[0] for name, declared in types.items()},
+            constants={name: declared.types[0] for name, declared in constants.items()},
+            predicates=_signatures(domain.predicates, "predicate"),
+            functions=_signatures(domain.functions, "function"),
+            places={name: declared.place for name, declared in {**types, **constants}.items()},
+        )
+
+    def merged(self, other: Schema) -> Schema:
+        """Everything that one of the two declares.
+
+        Raises:
+            SchemaError: they declare one name differently.
+        """
+        for kind, mine, theirs in (
+            ("type", self.types, other.types),
+            ("constant", self.constants, other.constants),
+        ):
+            for name, declared in mine.items():
+                if theirs.get(name, declared) != declared:
+                    raise _twice(kind, name, self.places.get(name), other.places.get(name))
+        both = (*self.predicates.values(), *other.predicates.values())
+        functions = (*self.functions.values(), *other.functions.values())
+        return Schema(
+            types={**self.types, **other.types},
+            constants={**self.constants, **other.constants},
+            predicates=_united(both, "predicate"),
+            functions=_united(functions, "function"),
+            places={**other.places, **self.places},
+        )
+
+    def is_a(self, type_name: str, ancestor: str) -> bool:
+        """Whether everything of type `type_name` is of type `ancestor`; a type is its own ancestor."""
+        return ancestor in self._ancestors.get(type_name, ()) or (type_name == ancestor and type_name in VALUE_TYPES)
+
+    def fits(self, type_name: str, wanted: Iterable[str]) -> bool:
+        """Whether `type_name` is one of the `wanted` types; none wanted means any object."""
+        return any(self.is_a(type_name, w) for w in (tuple(wanted) or (ROOT_TYPE,)))
+
+    def subtypes(self, type_name: str) -> tuple[str, ...]:
+        """`type_name` and all types below it, in the order declared."""
+        return tuple(t for t in self.types if self.is_a(t, type_name))
+
+    def ancestors(self, type_name: str) -> tuple[str, ...]:
+        """`type_name` and all types above it, up to `object`.
+
+        Raises:
+            UnknownNameError: there is no such type.
+        """
+        self.require_type(type_name)
+        return self._ancestors[type_name]
+
+    def require_type(self, name: str, place: Place | None = None) -> None:
+        """Raise `UnknownNameError` unless `name` is a type of things."""
+        if name not in self.types:
+            raise UnknownNameError(f"there is no type '{name}'", place=place, found=name, valid=self.types)
+
+    def is_type(self, name: str, arity: int) -> bool:
+        """Whether an atom of that name and number of arguments tests a type."""
+        return arity == 1 and name in self.types and name not in self.predicates
+
+    def predicate(self, name: str, place: Place | None = None) -> Signature:
+        """The predicate of that name.
+
+        Raises:
+            UnknownNameError: there is none; predicates, types and keywords are suggested.
+        """
+        found = self.predicates.get(name)
+        if found is None:
+            valid = (*self.predicates, *self.types, *KEYWORDS)
+            raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
+        return found
+
+    def function(self, name: str, place: Place | None = None) -> Signature:
+        """The numeric fluent of that name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        found = self.functions.get(name)
+        if found is None:
+            raise UnknownNameError(f"there is no function '{name}'", place=place, found=name, valid=self.functions)
+        return found
+
+    def _lineage(self, type_name: str) -> Iterator[str]:
+        seen: dict[str, None] = {}
+        here: str | None = type_name
+        while here is not None:
+            if here in seen:
+                cycle = " - ".join([*list(seen)[list(seen).index(here) :], here])
+                raise SchemaError(f"types in a circle: {cycle}", place=self.places.get(type_name))
+            if here not in self.types:
+                raise SchemaError(
+                    f"the type '{type_name}' has an unknown parent '{here}'",
+                    place=self.places.get(type_name),
+                    found=here,
+                    valid=self.types.keys() - seen.keys(),
+                )
+            seen[here] = None
+            yield here
+            here = self.types[here]
+
+    def _check_names(self) -> None:
+        for name in VALUE_TYPES:
+            if name in self.types:
+                raise SchemaError(f"'{name}' is a type of values, not of things", place=self.places.get(name))
+        for name, signature in self.predicates.items():
+            if signature.arity == 1 and name in self.types:
+                raise SchemaError(
+                    f"the predicate '{name}' has the name of a type{_at(self.places.get(name))}, "
+                    "which already is a predicate of one argument",
+                    place=signature.place,
+                )
+            if name in self.functions:
+                raise SchemaError(
+                    f"the function '{name}' has the name of a predicate{_at(signature.place)}",
+                    place=self.functions[name].place,
+                )
+
+    def _check_types(self) -> None:
+        for name, type_name in self.constants.items():
+            self._known(type_name, f"the constant '{name}'", self.places.get(name), values=False)
+        for signature in (*self.predicates.values(), *self.functions.values()):
+            for parameter in signature.parameters:
+                for type_name in parameter.types:
+                    owner = f"the parameter '?{parameter.name}' of '{signature.name}'"
+                    self._known(type_name, owner, parameter.place or signature.place, values=True)
+
+    def _known(self, type_name: str, owner: str, place: Place | None, *, values: bool) -> None:
+        if type_name in self.types or (values and type_name in VALUE_TYPES):
+            return
+        raise SchemaError(f"{owner} has an unknown type '{type_name}'", place=place, found=type_name, valid=self.types)
+
+
+def _at(place: Place | None) -> str:
+    return f" (at {place})" if place else ""
+
+
+def _twice(kind: str, name: str, first: Place | None, second: Place | None) -> SchemaError:
+    return SchemaError(f"the {kind} '{name}' is declared differently before{_at(first)}", place=second)
+
+
+def _typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
+    found: dict[str, TypedName] = {}
+    for name, types, place in names:
+        if len(types) > 1:
+            raise SchemaError(f"the {kind} '{name}' can have only one type", place=place)
+        declared = TypedName(name, types or (ROOT_TYPE,), place)
+        first = found.setdefault(name, declared)
+        if first.types != declared.types:
+            raise _twice(kind, name, first.place, place)
+    return found
+
+
+def _signatures(declarations: Iterable[DeclarationText], kind: str) -> dict[str, Signature]:
+    return _united((Signature(d.name, d.parameters, d.place) for d in declarations), kind)
+
+
+def _united(signatures: Iterable[Signature], kind: str) -> dict[str, Signature]:
+    found: dict[str, Signature] = {}
+    for signature in signatures:
+        first = found.setdefault(signature.name, signature)
+        if not first.means(signature):
+            raise _twice(kind, signature.name, first.place, signature.place)
+    return found

@@ -1,0 +1,104 @@
+"""One state of the world in memory: things with their types, facts, and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.index import FactIndex
+from knowledge_base.schema import Schema
+
+
+class WorldState:
+    """A `World` of its own. It begins with the schema's constants and nothing known about them."""
+
+    def __init__(self, schema: Schema) -> None:
+        self._schema = schema
+        self._facts = FactIndex()
+        self._values: dict[Fact, float] = {}
+        self._types: dict[str, str] = {}
+        self._members: dict[str, dict[str, None]] = {t: {} for t in schema.types}
+        for name, type_name in schema.constants.items():
+            self._add_node(name, type_name)
+
+    @property
+    def schema(self) -> Schema:
+        """What may be said about it."""
+        return self._schema
+
+    @property
+    def nodes(self) -> Mapping[str, str]:
+        """All things with their types, in order of insertion."""
+        return self._types
+
+    @property
+    def facts(self) -> FactIndex:
+        """All facts."""
+        return self._facts
+
+    @property
+    def values(self) -> Mapping[Fact, float]:
+        """The numbers that were set."""
+        return self._values
+
+    def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
+        """Whether the fact is true."""
+        return self._facts.holds(predicate, args)
+
+    def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
+        """The arguments of all facts that agree with `pattern`, found while iterating; `None` is open."""
+        return self._facts.match(predicate, pattern)
+
+    def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
+        """At most how many facts agree with `pattern`."""
+        return self._facts.estimate(predicate, pattern)
+
+    def value(self, function: str, args: tuple[Value, ...]) -> float:
+        """The numeric fluent's value; 0 until it is set."""
+        return self._values.get(Fact(function, args), 0)
+
+    def objects(self, type_name: str) -> list[str]:
+        """The things of that type or a subtype.
+
+        Raises:
+            UnknownNameError: there is no such type.
+        """
+        if type_name not in self._members:
+            self._schema.require_type(type_name)
+        return list(self._members[type_name])
+
+    def type_of(self, name: str) -> str | None:
+        """The thing's type; `None` if there is no such thing."""
+        return self._types.get(name)
+
+    def commit(self, effective: Delta) -> None:
+        """Make a change that was checked and worked out on this very state (`Overlay.delta`)."""
+        for name in effective.removed_nodes:
+            self._remove_node(name)
+        for name, type_name in effective.nodes.items():
+            self._add_node(name, type_name)
+        for fact in effective.removed:
+            self._facts.discard(fact)
+        for fact in effective.added:
+            self._facts.add(fact)
+        self._values.update(effective.values)
+
+    def copy(self) -> WorldState:
+        """An independent state that says the same."""
+        twin = WorldState(self._schema)
+        twin._facts = self._facts.copy()
+        twin._values = self._values.copy()
+        twin._types = self._types.copy()
+        twin._members = {t: members.copy() for t, members in self._members.items()}
+        return twin
+
+    def _add_node(self, name: str, type_name: str) -> None:
+        self._types[name] = type_name
+        for ancestor in self._schema.ancestors(type_name):
+            self._members[ancestor][name] = None
+
+    def _remove_node(self, name: str) -> None:
+        """Its facts are among the change's removed ones; its numbers are found here."""
+        for ancestor in self._schema.ancestors(self._types.pop(name)):
+            del self._members[ancestor][name]
+        self._values = {f: v for f, v in self._values.items() if name not in f.args}

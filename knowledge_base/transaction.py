@@ -1,0 +1,101 @@
+"""Several changes made as one, in everyday verbs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from knowledge_base.errors import ConflictError, InputError, UnknownNameError
+from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.language.evaluation import holds, query
+from knowledge_base.language.expression import Expression
+from knowledge_base.overlay import Overlay
+from knowledge_base.questions import Questions
+
+
+class Transaction:
+    """The changes of one `with kb.transaction(...)` block; errors are raised where the mistake is made.
+
+    Questions asked of it see its own changes; nobody else does before it is committed.
+    """
+
+    def __init__(self, view: Overlay, questions: Questions) -> None:
+        self._view = view
+        self._questions = questions
+        self._closed = False
+
+    @property
+    def delta(self) -> Delta:
+        """The changes so far."""
+        return self._view.delta
+
+    def add_node(self, name: str, type_name: str) -> None:
+        """There is a thing of that type now.
+
+        Raises:
+            UnknownNameError: there is no such type.
+            SchemaError: there is such a thing of another type.
+        """
+        self.apply(Delta(nodes={name: type_name}))
+
+    def remove_node(self, name: str) -> None:
+        """The thing is there no longer, nor any fact or number about it.
+
+        Raises:
+            UnknownNameError: there is no such thing.
+        """
+        if self._view.type_of(name) is None:
+            raise UnknownNameError(f"there is no object '{name}'", found=name, valid=self._view.objects("object"))
+        self.apply(Delta(removed_nodes=(name,)))
+
+    def tell(self, predicate: str, *args: Value) -> None:
+        """The fact holds now.
+
+        Raises:
+            UnknownNameError: an undeclared predicate, or a thing that is not there.
+            SchemaError: a wrong number of arguments or a wrong type.
+        """
+        self.apply(Delta(added=(Fact(predicate, args),)))
+
+    def retract(self, predicate: str, *args: Value) -> None:
+        """The fact holds no longer; errors as for `tell`."""
+        self.apply(Delta(removed=(Fact(predicate, args),)))
+
+    def set(self, function: str, *args_and_number: Value) -> None:
+        """The numeric fluent has this value now: `tx.set("failures", "cup1", 2)`.
+
+        Raises:
+            UnknownNameError: an undeclared function, or a thing that is not there.
+            SchemaError: a wrong number of arguments, a wrong type, or the last one is no number.
+            InputError: the number is missing or not finite.
+        """
+        if not args_and_number:
+            raise InputError(f"set('{function}', ...) ends with the number to set")
+        *args, number = args_and_number
+        if isinstance(number, str):
+            raise InputError(f"set('{function}', ...) ends with the number to set, not '{number}'")
+        self.apply(Delta(values={Fact(function, tuple(args)): number}))
+
+    def apply(self, delta: Delta) -> None:
+        """Make all the changes of `delta`, or none when one of them is an error.
+
+        Raises:
+            InputError: as for the single verbs.
+            ConflictError: the transaction is over.
+        """
+        if self._closed:
+            raise ConflictError("the transaction is over; changes are made inside its 'with' block")
+        self._view.apply(delta)
+
+    def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[dict[str, Value]]:
+        """As `KnowledgeBase.query`, with the changes so far."""
+        params = params or {}
+        return query(self._questions.query(text, params, self._view), self._view, params)
+
+    def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
+        """As `KnowledgeBase.ask`, with the changes so far."""
+        params = params or {}
+        return holds(self._questions.condition(text, params, self._view), self._view, params)
+
+    def close(self) -> None:
+        """No more changes; called when the block is left."""
+        self._closed = True

@@ -1,0 +1,70 @@
+"""The world model as a networkx graph, for everyone who wants to look at it or run algorithms on it.
+
+Things are nodes with a `type`. A fact about two things is an arc from the first to the second whose key is
+the predicate; a fact about one thing is an arc from it to itself (S4.4). Numeric fluents of one or two
+things are arcs likewise, with the number as `value` (S4.3: arcs have symbolic or numeric content). Facts and
+fluents with another number of arguments, or with values among them, are nodes of their own: the `Fact` itself
+with `relation` set to its name (and `value`), and an arc to each thing in it whose key is the position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import networkx as nx
+
+from knowledge_base.facts import Delta, Fact
+from knowledge_base.schema import VALUE_TYPES, Schema, Signature
+
+Graph: TypeAlias = "nx.MultiDiGraph[Any]"
+
+
+class WorldGraph:
+    """Keeps the graph in step with committed changes."""
+
+    def __init__(self, schema: Schema) -> None:
+        self._schema = schema
+        self._graph: Graph = nx.MultiDiGraph()
+        self.view: Graph = self._graph.copy(as_view=True)
+        """The graph, live and read-only."""
+        self._graph.add_nodes_from((name, {"type": t}) for name, t in schema.constants.items())
+
+    def commit(self, effective: Delta) -> None:
+        """Make a change that lists exactly what becomes different."""
+        for fact in effective.removed:
+            self._remove(fact)
+        for name in effective.removed_nodes:
+            self._remove_node(name)
+        for name, type_name in effective.nodes.items():
+            self._graph.add_node(name, type=type_name)
+        for fact in effective.added:
+            self._put(fact, self._schema.predicates[fact.predicate], {})
+        for fluent, number in effective.values.items():
+            self._put(fluent, self._schema.functions[fluent.predicate], {"value": number})
+
+    def _put(self, fact: Fact, signature: Signature, content: Mapping[str, float]) -> None:
+        if _is_arc(signature):
+            self._graph.add_edge(fact.args[0], fact.args[-1], key=fact.predicate, **content)
+            return
+        self._graph.add_node(fact, relation=fact.predicate, **content)
+        for position in _thing_positions(signature):
+            self._graph.add_edge(fact, fact.args[position], key=position)
+
+    def _remove(self, fact: Fact) -> None:
+        if _is_arc(self._schema.predicates[fact.predicate]):
+            self._graph.remove_edge(fact.args[0], fact.args[-1], key=fact.predicate)
+        else:
+            self._graph.remove_node(fact)
+
+    def _remove_node(self, name: str) -> None:
+        relations = [n for n in self._graph.predecessors(name) if isinstance(n, Fact)]
+        self._graph.remove_nodes_from([name, *relations])
+
+
+def _is_arc(signature: Signature) -> bool:
+    return signature.arity in (1, 2) and len(_thing_positions(signature)) == signature.arity
+
+
+def _thing_positions(signature: Signature) -> list[int]:
+    return [i for i, p in enumerate(signature.parameters) if not set(p.types) & set(VALUE_TYPES)]

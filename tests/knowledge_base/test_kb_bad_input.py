@@ -1,0 +1,232 @@
+"""What people get wrong: one clear error with its place and the nearest right name, and nothing changed."""
+
+from __future__ import annotations
+
+import pytest
+from kb_strategies import SCHEMA, THINGS
+
+from knowledge_base import (
+    Delta,
+    InputError,
+    KnowledgeBase,
+    ParseError,
+    Schema,
+    SchemaError,
+    UnknownNameError,
+    fact,
+)
+from knowledge_base.exchange.pddl import read_domain, read_problem
+from knowledge_base.language.parser import parse_effect
+
+QUESTIONS = [
+    # text, kind of error, line:column, nearest name
+    ("", ParseError, "1:1", None),
+    ("quiet", ParseError, "1:1", None),
+    ("(quiet", ParseError, "1:1", None),
+    ("(quiet))", ParseError, "1:8", None),
+    ("(quiet) (quiet)", ParseError, "1:9", None),
+    ('(heavy "cup1)', ParseError, "1:8", None),
+    ("((quiet))", ParseError, "1:2", None),
+    ("(?x cup1)", ParseError, "1:2", None),
+    ("(not)", ParseError, "1:1", None),
+    ("(not (quiet) (quiet))", ParseError, "1:14", None),
+    ("(imply (quiet))", ParseError, "1:1", None),
+    ("(exists ?i (heavy ?i))", ParseError, "1:9", None),
+    ("(exists (i - cup) (heavy i))", ParseError, "1:10", None),
+    ("(exists (?i ?i - cup) (heavy ?i))", ParseError, "1:13", None),
+    ("(exists (?i -) (heavy ?i))", ParseError, "1:13", None),
+    ("(exists (- cup) (quiet))", ParseError, "1:10", None),
+    ("(exist (?i - cup) (heavy ?i))", ParseError, "1:1", "exists"),
+    ("(< 1)", ParseError, "1:1", None),
+    ("(< 1 (+ 1))", ParseError, "1:6", None),
+    ("(< 1 (and))", ParseError, "1:6", None),
+    ("(< 1 1e999)", ParseError, "1:6", None),
+    (f"(< 1 {'9' * 5000})", ParseError, "1:6", None),
+    ("(heavy ?)", ParseError, "1:8", None),
+    ("(annd (quiet))", UnknownNameError, "1:1", "and"),
+    ("\n  (heavi cup1)", UnknownNameError, "2:3", "heavy"),
+    ("(heavy cup11)", UnknownNameError, "1:8", "cup1"),
+    ("(heavy ?i)", UnknownNameError, "1:8", None),
+    ("(heavy ?thin)", UnknownNameError, "1:8", "?thing"),
+    ("(exists (?i - cupp) (heavy ?i))", UnknownNameError, "1:10", "cup"),
+    ("(exists (?n - number) (quiet))", UnknownNameError, "1:10", None),
+    ("(< (wait cup1) 3)", UnknownNameError, "1:4", "weight"),
+    ("(= ?thing shelv)", UnknownNameError, "1:11", "shelf"),
+    ("(on cup1)", SchemaError, "1:1", None),
+    ("(on cup1 cup2)", SchemaError, "1:10", None),
+    ("(forall (?p - place) (heavy ?p))", SchemaError, "1:29", None),
+    ("(on 3 shelf)", SchemaError, "1:5", None),
+    ("(level cup1 shelf)", SchemaError, "1:13", None),
+    ("(< cup1 3)", SchemaError, "1:4", None),
+    ("(> (weight shelf) 1)", SchemaError, "1:12", None),
+]
+
+
+@pytest.mark.parametrize(("text", "kind", "where", "nearest"), QUESTIONS, ids=[q[0][:30] for q in QUESTIONS])
+def test_questions(text: str, kind: type[InputError], where: str, nearest: str | None) -> None:
+    kb = KnowledgeBase(SCHEMA)
+    kb.apply(Delta(nodes=THINGS), author="test")
+    with pytest.raises(kind) as caught:
+        kb.ask(text, {"thing": "cup1"})
+    assert str(caught.value.place) == f"<text>:{where}"
+    if nearest is not None:
+        assert caught.value.nearest == nearest
+
+
+EFFECTS = [
+    ("(or (quiet))", "'or' is no effect"),
+    ("(not (not (quiet)))", "only a predicate can be deleted"),
+    ("(increase (weight cup1))", r"\(increase \(FUNCTION ...\) NUMBER\)"),
+    ("(increase weight 1)", "in parentheses"),
+    ("(when (quiet))", r"\(when CONDITION EFFECT\)"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), EFFECTS)
+def test_effects(text: str, message: str) -> None:
+    with pytest.raises(ParseError, match=message) as caught:
+        parse_effect(text, "d.pddl")
+    assert str(caught.value).startswith("d.pddl:1:")
+
+
+DOMAINS = [
+    # sections, kind, place, text of the message, nearest
+    ("(:typos a)", ParseError, "1:21", "no section ':typos'", ":types"),
+    ("(:durative-action a)", ParseError, "1:20", "not supported", None),
+    ("(:requirements :typing :strip)", ParseError, "1:43", "no requirement", ":strips"),
+    ("(:types a) (:types b)", ParseError, "1:31", "the first is at d:1:20", None),
+    ("(:types a - b)", SchemaError, "1:28", "unknown parent 'b'", None),
+    ("(:types cup - itm item)", SchemaError, "1:28", "unknown parent", "item"),
+    ("(:types a - b b - a)", SchemaError, "1:28", "circle: a - b - a", None),
+    ("(:types b c - object a - b a - c)", SchemaError, "1:", "declared differently before", None),
+    ("(:types a - (either b c) b c)", SchemaError, "1:28", "only one type", None),
+    ("(:types cup) (:predicates (cup ?x))", SchemaError, "1:46", r"name of a type \(at d:1:28\)", None),
+    ("(:predicates (p ?x) (p ?x ?y))", SchemaError, "1:40", r"differently before \(at d:1:33\)", None),
+    ("(:types c) (:predicates (p ?x - cc))", SchemaError, "1:47", "unknown type 'cc'", "c"),
+    ("(:types number)", SchemaError, "1:28", "type of values", None),
+    ("(:types object - a a)", SchemaError, "1:28", "all things", None),
+    ("(:predicates p)", ParseError, "1:33", "in parentheses", None),
+    ("(:predicates (p x))", ParseError, "1:36", r"begins with '\?'", None),
+    ("(:predicates (p)) (:functions (p))", SchemaError, "1:50", "name of a predicate", None),
+    ("(:functions (f) - item)", ParseError, "1:38", "functions to numbers", None),
+    ("(:constants a - cup)", SchemaError, "1:32", "unknown type 'cup'", None),
+    ("(:constants 1)", ParseError, "1:32", "cannot be a name", None),
+    ("(:action)", ParseError, "1:20", "an action has a name", None),
+    ("(:action a :precondition)", ParseError, "1:31", "followed by nothing", None),
+    ("(:action a :effects (p))", ParseError, "1:31", "no part ':effects'", ":effect"),
+    ("(:action a) (:action A)", SchemaError, "1:41", "second time; first at d:1:29", None),
+    ("(:action a :parameters ?x)", ParseError, "1:43", "in parentheses", None),
+]
+
+
+@pytest.mark.parametrize(("text", "kind", "where", "message", "nearest"), DOMAINS, ids=[d[0] for d in DOMAINS])
+def test_domains(text: str, kind: type[InputError], where: str, message: str, nearest: str | None) -> None:
+    with pytest.raises(kind, match=message) as caught:
+        Schema.parse(f"(define (domain d) {text})", "d")
+    assert str(caught.value.place).startswith(f"d:{where}")
+    if nearest is not None:
+        assert caught.value.nearest == nearest
+
+
+PROBLEMS = [
+    ("(:objects cup1 - cupp)", UnknownNameError, "unknown|no type 'cupp'", "cup"),
+    ("(:objects a - cup a - can)", SchemaError, "of type 'cup' already", None),
+    ("(:objects home - cup)", SchemaError, "of type 'place' already", None),
+    ("(:objects ?a - cup)", ParseError, "cannot be a name", None),
+    ("(:init (quiett))", UnknownNameError, "no predicate", "quiet"),
+    ("(:init (on cup1 home))", UnknownNameError, "no object 'cup1'", None),
+    ("(:objects a b - cup) (:init (on a b))", SchemaError, "is of type cup", None),
+    ("(:objects a - cup) (:init (cup a))", SchemaError, "say it in :objects", None),
+    ("(:init (= (time) (+ 1 1)))", ParseError, "':init' has facts", None),
+    ("(:init (and (quiet)))", ParseError, "':init' has facts", None),
+    ("(:goal (quiet) (quiet))", ParseError, "one goal", None),
+    ("(:gaol (quiet))", ParseError, "no section", ":goal"),
+    ("(:goal (exists (?x - cup) (on ?x hom)))", UnknownNameError, "no object 'hom'", "home"),
+    ("(:goal (heavy ?x))", UnknownNameError, "not bound", None),
+]
+
+
+@pytest.mark.parametrize(("text", "kind", "message", "nearest"), PROBLEMS, ids=[p[0] for p in PROBLEMS])
+def test_problems(text: str, kind: type[InputError], message: str, nearest: str | None) -> None:
+    with pytest.raises(kind, match=message) as caught:
+        read_problem(f"(define (problem p) (:domain small)\n {text})", SCHEMA, "p.pddl")
+    assert str(caught.value.place).startswith("p.pddl:2:")
+    if nearest is not None:
+        assert caught.value.nearest == nearest
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "empty"),
+        ("; nothing", "empty"),
+        ("(domain d)", "begins with"),
+        ("(define domain d)", "followed by"),
+        ("(define (problem p))", "this defines a 'problem'"),
+        ("(define (domain))", "one name"),
+        ("(define (domain d)) )", "without a"),
+        ("(define (domain d)) (define (domain e))", "holds one"),
+        ("(define (domain d) types)", "a section"),
+    ],
+)
+def test_files_that_are_no_domain(text: str, message: str) -> None:
+    with pytest.raises(ParseError, match=message) as caught:
+        read_domain(text, "d.pddl")
+    assert str(caught.value).startswith("d.pddl:1:")
+
+
+def test_files_that_cannot_be_read(tmp_path) -> None:
+    (tmp_path / "domain.pddl").write_bytes(b"(define\n\xff")
+    with pytest.raises(InputError, match=r"did you mean 'domain.pddl'"):
+        read_domain(tmp_path / "domian.pddl")
+    with pytest.raises(ParseError, match=r"domain.pddl:2: the file is not UTF-8"):
+        read_domain(str(tmp_path / "domain.pddl"))
+    with pytest.raises(InputError, match="cannot read"):
+        read_domain(tmp_path)
+    with pytest.raises(InputError, match="cannot read"):
+        read_domain("a\0b")
+
+
+TELLS = [
+    (Delta(nodes={"cup9": "cpu"}), UnknownNameError, "no type 'cpu'.*'cup'"),
+    (Delta(nodes={"": "cup"}), InputError, "not empty"),
+    (Delta(nodes={"cup1": "can"}), SchemaError, "of type 'cup' and cannot become"),
+    (Delta(nodes={"n": "number"}), UnknownNameError, "no type"),
+    (Delta(added=(fact("onn", "cup1", "shelf"),)), UnknownNameError, "'on'"),
+    (Delta(added=(fact("cup", "cup1"),)), UnknownNameError, "no predicate"),
+    (Delta(added=(fact("on", "cup1"),)), SchemaError, "takes 2 arguments"),
+    (Delta(added=(fact("on", "cup1", "shelv"),)), UnknownNameError, "'shelf'"),
+    (Delta(added=(fact("on", "shelf", "cup1"),)), SchemaError, "'shelf' is of type place"),
+    (Delta(added=(fact("on", 3, "shelf"),)), SchemaError, "not 3"),
+    (Delta(added=(fact("level", "cup1", "high"),)), SchemaError, "not 'high'"),
+    (Delta(removed=(fact("on", "cup9", "shelf"),)), UnknownNameError, "'cup1'|'cup2'"),
+    (Delta(values={fact("weigth", "cup1"): 1}), UnknownNameError, "'weight'"),
+    (Delta(values={fact("weight", "shelf"): 1}), SchemaError, "of type place"),
+    (Delta(values={fact("time"): float("nan")}), InputError, "finite"),
+    (Delta(values={fact("time"): True}), SchemaError, "not True"),
+    (Delta(removed_nodes=("home",)), SchemaError, "constant"),
+    (Delta(removed_nodes=("cup1",), added=(fact("heavy", "cup1"),)), UnknownNameError, "no object 'cup1'"),
+]
+
+
+@pytest.mark.parametrize(("delta", "kind", "message"), TELLS, ids=[t[2] for t in TELLS])
+def test_changes(delta: Delta, kind: type[InputError], message: str) -> None:
+    kb = KnowledgeBase(SCHEMA)
+    kb.apply(Delta(nodes=THINGS), author="test")
+    facts, version = kb.facts(), kb.version
+    with pytest.raises(kind, match=message):
+        kb.apply(delta, author="test")
+    assert (kb.facts(), kb.version) == (facts, version)
+
+
+def test_transaction_verbs() -> None:
+    kb = KnowledgeBase(SCHEMA)
+    with kb.transaction(author="test") as tx:
+        with pytest.raises(UnknownNameError, match="did you mean 'home'"):
+            tx.remove_node("hom")
+        with pytest.raises(InputError, match="number to set"):
+            tx.set("time")
+        with pytest.raises(InputError, match="not 'now'"):
+            tx.set("time", "now")
+        with pytest.raises(UnknownNameError, match="no type"):
+            kb.objects("cups")
