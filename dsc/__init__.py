@@ -1,0 +1,49 @@
+"""State charts: what a plot is, how it runs, which plot is chosen and why."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from knowledge_base._lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from dsc.dynamic.library import Library as Library
+    from dsc.engine.machine import Machine as Machine
+    from dsc.events import Event as Event
+    from dsc.model.plot import ActionPlot as ActionPlot
+    from dsc.primitive import primitive_plot as primitive_plot
+    from dsc.sequencer.sequencer import RunEnd as RunEnd
+    from dsc.sequencer.sequencer import Sequencer as Sequencer
+    from dsc.skills import Component as Component
+    from dsc.skills import Outcome as Outcome
+    from dsc.skills import SkillCall as SkillCall
+    from dsc.skills import skill as skill
+    from dsc.text.plots import load_library as load_library
+    from dsc.text.plots import load_plot as load_plot
+    from dsc.text.plots import parse_plot as parse_plot
+    from dsc.trace import Record as Record
+    from dsc.validation import validate_library as validate_library
+    from dsc.validation import validate_plot as validate_plot
+
+__getattr__, __dir__, __all__ = lazy_exports(
+    __name__,
+    {
+        "ActionPlot": "model.plot",
+        "Component": "skills",
+        "Event": "events",
+        "Library": "dynamic.library",
+        "Machine": "engine.machine",
+        "Outcome": "skills",
+        "Record": "trace",
+        "RunEnd": "sequencer.sequencer",
+        "Sequencer": "sequencer.sequencer",
+        "SkillCall": "skills",
+        "load_library": "text.plots",
+        "load_plot": "text.plots",
+        "parse_plot": "text.plots",
+        "primitive_plot": "primitive",
+        "skill": "skills",
+        "validate_library": "validation",
+        "validate_plot": "validation",
+    },
+)

@@ -1,0 +1,187 @@
+"""`dsc plot`: check, show and draw action plots from the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from dsc.dynamic.library import Library
+    from dsc.errors import Finding
+    from dsc.model.plot import ActionPlot
+    from knowledge_base.errors import InputError
+    from knowledge_base.schema import Schema
+
+app = typer.Typer(
+    name="plot",
+    rich_markup_mode=None,
+    no_args_is_help=True,
+    help="Check, show and draw action plots.",
+)
+
+BAD_INPUT = 2
+"""Exit status of `check` with findings, and of bad input to any command."""
+UNKNOWN_PLOT = "known plot"
+"""The rule of findings that may be there because a neighbouring file cannot be read."""
+PIPE_WIDTH = 160
+"""Columns of a tree that is not printed on a terminal."""
+
+
+@app.command()
+def check(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Plot files (YAML).")],
+    domain: Annotated[
+        Path | None,
+        typer.Option(
+            "--domain",
+            metavar="D.pddl",
+            help="What conditions may speak of.  [default: domain.pddl beside FILE or one folder up]",
+        ),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print a JSON list of findings.")] = False,
+) -> None:
+    """Say what is wrong with plots, one finding a line.
+
+    A plot may use the other plots in its folder. Exit status: 0 nothing found, 2 findings.
+    """
+    found = [(file, finding) for file in files for finding in _findings(file, domain)]
+    if json:
+        _print_json([_as_data(file, finding) for file, finding in found])
+    else:
+        for file, finding in found:
+            typer.echo(f"{finding}" if finding.place else f"{file}: {finding}")
+        if not found:
+            typer.echo(f"{len(files)} plot{'s' * (len(files) != 1)} checked, nothing found")
+    raise typer.Exit(BAD_INPUT if found else 0)
+
+
+@app.command()
+def show(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A plot file (YAML).")],
+    svg: Annotated[
+        str | None, typer.Option("--svg", metavar="OUT.svg", help="Draw it to a file; - is standard output.")
+    ] = None,
+    yaml: Annotated[bool, typer.Option("--yaml", help="Print it as YAML.")] = False,
+    expanded: Annotated[
+        bool, typer.Option("--expanded", help="With its rules carried out, as drawings always have them.")
+    ] = False,
+) -> None:
+    """Show a plot: as a tree in the terminal, as a drawing, or as YAML."""
+    from dsc.text.diagram import draw
+    from dsc.text.plots import load_plot, plot_to_yaml
+    from knowledge_base.errors import UnknownNameError
+
+    plot = load_plot(file)
+    library, broken = _neighbours(file, plot)
+    try:
+        shown = library.expanded(plot) if expanded else plot
+        drawing = draw(plot, library) if svg is not None else ""
+    except UnknownNameError as error:
+        # A plot that is not there may be in a file that cannot be read; then that is what to say.
+        raise (broken or [error])[0] from None
+    if svg is not None:
+        _write(svg, drawing)
+    if yaml:
+        typer.echo(plot_to_yaml(shown), nl=False)
+    elif svg is None:
+        _print_tree(shown)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of plot files, for editors."""
+    from dsc.text.plots import json_schema
+
+    _print_json(json_schema())
+
+
+def _findings(file: Path, domain: Path | None) -> list[Finding]:
+    """All that is wrong with one file; what cannot be read at all is one finding."""
+    from dsc.errors import Finding
+    from dsc.text.plots import load_plot
+    from dsc.validation import validate_plot
+    from knowledge_base.errors import InputError
+
+    known = _schema(file, domain)
+    try:
+        plot = load_plot(file)
+        library, broken = _neighbours(file, plot)
+        findings = validate_plot(plot, library, known)
+    except InputError as error:
+        return [Finding(error, "readable")]
+    if any(finding.rule == UNKNOWN_PLOT for finding in findings):
+        findings += [Finding(error, "readable") for error in broken]
+    return findings
+
+
+def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
+    """The plot with the others of its folder, and why some of those are not among them."""
+    from dsc.dynamic.library import Library
+    from dsc.text.plots import load_plot
+    from knowledge_base.errors import InputError
+
+    library, broken = Library([plot]), []
+    for other in sorted(file.parent.glob("*.yaml")):
+        if other.resolve() == file.resolve():
+            continue
+        try:
+            library.add(load_plot(other))
+        except InputError as error:
+            broken.append(error)
+    return library, broken
+
+
+def _schema(file: Path, domain: Path | None) -> Schema | None:
+    from knowledge_base.schema import Schema
+
+    if domain is not None:
+        return Schema.from_pddl(domain)
+    folder = file.resolve().parent
+    places = (folder / "domain.pddl", folder.parent / "domain.pddl")
+    found = next((place for place in places if place.is_file()), None)
+    return None if found is None else Schema.from_pddl(found)
+
+
+def _as_data(file: Path, finding: Finding) -> dict[str, Any]:
+    error, place = finding.error, finding.place
+    return {
+        "file": (place.source if place else None) or str(file),
+        "line": place.line if place else None,
+        "column": place.column if place else None,
+        "message": error.message,
+        "found": error.found,
+        "nearest": error.nearest,
+        "rule": finding.rule,
+        "fix": finding.fix or None,
+    }
+
+
+def _write(target: str, text: str) -> None:
+    from knowledge_base.errors import InputError, Place
+
+    if target == "-":
+        typer.echo(text, nl=False)
+        return
+    try:
+        Path(target).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write the drawing: {error.strerror}", place=Place(target)) from None
+
+
+def _print_json(data: object) -> None:
+    import json
+
+    typer.echo(json.dumps(data, indent=2))
+
+
+def _print_tree(plot: ActionPlot) -> None:
+    from rich.console import Console
+
+    from dsc.text.diagram.tree import plot_tree
+
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=PIPE_WIDTH)
+    console.print(plot_tree(plot))

@@ -1,0 +1,93 @@
+"""The library of plots: found by name, with rules carried out and tables made once (S0.9)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from dsc.dynamic.rules import expand_rules
+from dsc.engine.compiler import CompiledPlot, compile_plot
+from dsc.model.plot import ActionPlot
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+
+
+class Library:
+    """Plots by name; also gives the engine their compiled form."""
+
+    def __init__(self, plots: Iterable[ActionPlot] = ()) -> None:
+        self._plots: dict[str, ActionPlot] = {}
+        self._compiled: dict[str, CompiledPlot] = {}
+        self._bound: dict[str, CompiledPlot] = {}
+        self._bound_by_identity: dict[int, tuple[Mapping[str, Any], CompiledPlot]] = {}
+        for plot in plots:
+            self.add(plot)
+
+    def __iter__(self) -> Iterator[ActionPlot]:
+        """All plots, in the order in which they were added."""
+        return iter(self._plots.values())
+
+    def __contains__(self, name: object) -> bool:
+        """Whether a plot of that name is there."""
+        return name in self._plots
+
+    def add(self, plot: ActionPlot) -> None:
+        """Add a plot.
+
+        Raises:
+            SchemaError: another plot has its name.
+        """
+        if self._plots.get(plot.name, plot) != plot:
+            raise SchemaError(
+                f"two different plots are named '{plot.name}'", place=plot.place(("plot",)), found=plot.name
+            )
+        self._plots[plot.name] = plot
+
+    def plot(self, name: str) -> ActionPlot:
+        """The plot as it was written; raises `UnknownNameError`."""
+        found = self._plots.get(name)
+        if found is None:
+            raise UnknownNameError(f"there is no plot '{name}'", found=name, valid=self._plots)
+        return found
+
+    def expanded(self, plot: ActionPlot) -> ActionPlot:
+        """The plot with its rules as states and transitions; raises `UnknownNameError`."""
+        return expand_rules(plot, self)
+
+    def implementing(self, planning_action: str) -> tuple[ActionPlot, ...]:
+        """The plots that carry out a planning action, in the order of the library."""
+        return tuple(plot for plot in self if plot.implements == planning_action)
+
+    def compiled(self, name: str) -> CompiledPlot:
+        """The plot's tables; raises `UnknownNameError`."""
+        if name not in self._compiled:
+            self._compiled[name] = compile_plot(self.expanded(self.plot(name)))
+        return self._compiled[name]
+
+    def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
+        """A plot given as data; equal data share their tables.
+
+        Raises:
+            InputError: the data are no plot, or it names unknown plots.
+        """
+        if not isinstance(form, Mapping):  # whatever a variable may hold
+            raise InputError(f"the value to be bound is no plot: {form!r}")
+        # The engine hands back the very same object at every step; comparing contents is for the first time.
+        kept = self._bound_by_identity.get(id(form))
+        if kept is not None and kept[0] is form:
+            return kept[1]
+        key = json.dumps(form)  # the order of states counts
+        if key not in self._bound:
+            self._bound[key] = compile_plot(self.expanded(_read(form)), form)
+        compiled = self._bound[key]
+        self._bound_by_identity[id(form)] = (form, compiled)
+        return compiled
+
+
+def _read(form: Mapping[str, Any]) -> ActionPlot:
+    try:
+        return ActionPlot.model_validate(form)
+    except ValidationError as error:
+        raise InputError(f"the value to be bound is no plot: {error}") from error

@@ -1,0 +1,40 @@
+"""The engine's window on a knowledge base: one version plus what the macrostep told."""
+
+from __future__ import annotations
+
+from dsc.dynamic.library import Library
+from dsc.dynamic.selection import choose, scalars
+from dsc.engine.situation import Bindings, Decision
+from dsc.model.states import DynamicState
+from knowledge_base.facts import Delta, Value
+from knowledge_base.language.effect import Effect
+from knowledge_base.language.evaluation import apply_effect, evaluate_term, holds
+from knowledge_base.language.expression import Expression, Term
+from knowledge_base.store import KnowledgeBase
+
+
+class KnowledgeSituation:
+    """A `Situation` for one macrostep; the knowledge base itself is not touched."""
+
+    def __init__(self, knowledge: KnowledgeBase, library: Library) -> None:
+        self._version = knowledge.version
+        self._world = knowledge.overlay()
+        self._library = library
+
+    def holds(self, expression: Expression, bindings: Bindings) -> bool:
+        """See `Situation`."""
+        return holds(expression, self._world, scalars(bindings))
+
+    def value(self, term: Term, bindings: Bindings) -> Value:
+        """See `Situation`."""
+        return evaluate_term(term, self._world, scalars(bindings))
+
+    def tell(self, effect: Effect, bindings: Bindings) -> Delta:
+        """See `Situation`."""
+        delta = apply_effect(effect, self._world, scalars(bindings))
+        self._world.apply(delta)
+        return delta
+
+    def choose(self, state: DynamicState, holder: str, bindings: Bindings) -> Decision:
+        """See `Situation`."""
+        return choose(state, holder, bindings, self._world, self._library, self._version)

@@ -1,0 +1,1 @@
+"""How a plot runs: a pure step from one state of the machine to the next, actions handed out as data."""

@@ -1,0 +1,331 @@
+"""One macrostep at work: microsteps, entering and leaving, internal events, until the chart rests (SCXML 3.13)."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from dsc.engine.actions import delay_of, evaluate, fill_parameters, output_of
+from dsc.engine.compiler import Chart, CompiledPlot, Edge
+from dsc.engine.configuration import MachineState
+from dsc.engine.frames import Frame, freeze, thaw
+from dsc.engine.selection import Enabled, everything, is_addressed, select
+from dsc.engine.situation import Decision, Situation
+from dsc.engine.steps import Cancel, DecisionMade, Microstep, Output, StartTimer, Step, Taken
+from dsc.errors import RunawayError
+from dsc.events import DONE, ERROR, NO_CANDIDATE, Event
+from dsc.model.actions import Assign, Emit, ExternalAction, Tell, Trigger
+from dsc.model.states import DynamicState, FinalState, State, SubmachineState
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Delta
+
+MAX_MICROSTEPS = 1000
+"""A macrostep that takes more is going round in circles."""
+MAX_NESTING = 40
+"""Plots inside plots; deeper than that, a plot contains itself without end."""
+
+
+class Execution:
+    """Works on thawed frames; `finish` freezes them into the next state."""
+
+    def __init__(self, chart: Chart, situation: Situation, state: MachineState | None = None) -> None:
+        state = state or MachineState()
+        self._chart = chart
+        self._situation = situation
+        self._serials = state.serials
+        self._root = thaw(state.root, chart) if state.root else None
+        self._finished = state.finished
+        self._internal: deque[Event] = deque()
+        self._event: Event | None = None
+        self._microsteps: list[Microstep] = []
+        self._decisions: list[DecisionMade] = []
+        self._output: list[Output] = []
+        self._emitted: list[Event] = []
+        self._errors: list[str] = []
+        self._broken_guards: set[tuple[int, int]] = set()
+        self._knowledge = Delta()
+        self._exited: list[str] = []
+        self._entered: list[str] = []
+
+    # -- the macrostep -----------------------------------------------------------------------------------
+
+    def start(self, plot: str, arguments: Mapping[str, Any]) -> None:
+        """Enter the outermost plot."""
+        compiled = self._chart.compiled(plot)
+        self._root = self._new_frame(compiled, arguments, None, -1)
+        self._enter_children(self._root, 0)
+        self._record(None, ())
+        self._rest()
+
+    def react(self, event: Event | None) -> bool:
+        """Take the event, then run to completion; returns whether a transition took the event."""
+        assert self._root is not None  # noqa: S101  # `step` answers for a finished machine
+        handled = False
+        if event is not None and is_addressed(self._root, event):
+            handled = self._microstep(event)
+        self._rest()
+        return handled
+
+    def finish(self, event: Event | None, *, handled: bool) -> Step:
+        """The step as a value."""
+        if self._finished and self._root is not None:
+            self._exit(everything(self._root))
+            self._record(None, ())
+            self._root = None
+            self._errors += [_reason(event) for event in self._internal if event.name == ERROR]
+        root = freeze(self._root) if self._root else None
+        return Step(
+            state=MachineState(root, self._serials, self._finished),
+            event=event,
+            handled=handled,
+            microsteps=tuple(self._microsteps),
+            decisions=tuple(self._decisions),
+            knowledge=self._knowledge,
+            output=tuple(self._output),
+            emitted=tuple(self._emitted),
+            errors=tuple(self._errors),
+        )
+
+    def _rest(self) -> None:
+        while not self._finished:
+            if self._microstep(None):
+                continue
+            if not self._internal:
+                return
+            event = self._internal.popleft()
+            if not self._microstep(event) and event.name == ERROR:
+                self._errors.append(_reason(event))
+
+    def _microstep(self, event: Event | None) -> bool:
+        assert self._root is not None  # noqa: S101
+        self._event = event or self._event
+        enabled = select(self._root, event, self._guard)
+        if not enabled:
+            return False
+        if len(self._microsteps) >= MAX_MICROSTEPS:
+            trail = [path for micro in self._microsteps[-6:] for path in micro.entered]
+            raise RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
+        taken = tuple(self._taken(one) for one in enabled)
+        self._exit(set().union(*(one.left() for one in enabled)))
+        for one in enabled:
+            self._perform(one.frame, one.edge.effect)
+        for one in enabled:
+            if one.edge.target is not None:
+                self._enter_along(one.frame, one.frame.compiled.way(one.domain, one.edge.target))
+        self._record(event, taken)
+        return True
+
+    def _guard(self, frame: Frame, edge: Edge) -> bool:
+        if edge.guard is None:
+            return True
+        try:
+            return self._situation.holds(edge.guard, self._bindings(frame, self._event))
+        except InputError as error:
+            # Once in a macrostep: a guard without trigger is looked at again after every microstep.
+            if (frame.serial, id(edge)) not in self._broken_guards:
+                self._broken_guards.add((frame.serial, id(edge)))
+                self._fail(frame, f"guard of '{edge.trigger}' in {frame.path(edge.source)}: {error}")
+            return False
+
+    def _bindings(self, frame: Frame, event: Event | None) -> dict[str, Any]:
+        return {**frame.variables, **event.bindings()} if event else frame.variables
+
+    def _taken(self, one: Enabled) -> Taken:
+        target = None if one.edge.target is None else one.frame.path(one.edge.target)
+        return Taken(one.frame.path(one.edge.source), one.edge.trigger, target, one.edge.rule)
+
+    def _record(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
+        self._microsteps.append(Microstep(event, taken, tuple(self._exited), tuple(self._entered)))
+        self._exited, self._entered = [], []
+
+    # -- leaving -----------------------------------------------------------------------------------------
+
+    def _exit(self, left: Iterable[tuple[Frame, int]]) -> None:
+        """Inner before outer, later before earlier: the reverse of document order, through all plots."""
+        for frame, index in sorted(left, key=lambda at: at[0].position(at[1]), reverse=True):
+            node = frame.node(index)
+            if node.state is not None:
+                self._exited.append(frame.path(index))
+            if node.timeouts or any(isinstance(action, Trigger) for action in node.entry):
+                self._output.append(Cancel(frame.active[index]))
+            self._external(frame, index, node.exit)
+            frame.children.pop(index, None)
+            del frame.active[index]
+
+    # -- entering ----------------------------------------------------------------------------------------
+
+    def _enter_along(self, frame: Frame, way: list[int]) -> None:
+        """Enter the states of the way down to a target, the other regions on it, and the target's inside."""
+        index, *rest = way
+        self._enter_one(frame, index)
+        if not rest:
+            self._enter_content(frame, index)
+            return
+        node = frame.node(index)
+        for child in node.children if node.orthogonal else rest[:1]:
+            if child == rest[0]:
+                self._enter_along(frame, rest)
+            else:
+                self._enter(frame, child)
+
+    def _enter(self, frame: Frame, index: int) -> None:
+        self._enter_one(frame, index)
+        self._enter_content(frame, index)
+
+    def _enter_one(self, frame: Frame, index: int) -> None:
+        node = frame.node(index)
+        frame.active[index] = self._next_serial()
+        if node.state is not None:
+            self._entered.append(frame.path(index))
+        self._external(frame, index, node.entry)
+        for number, (seconds, _) in enumerate(node.timeouts):
+            try:
+                delay = delay_of(self._value(frame, seconds))
+            except InputError as error:
+                self._fail(frame, f"{frame.path(index)}: {error}")
+            else:
+                self._output.append(StartTimer(frame.active[index], number, delay))
+
+    def _enter_content(self, frame: Frame, index: int) -> None:
+        state = frame.node(index).state
+        if isinstance(state, FinalState):
+            if state.emit is not None:
+                self._perform(frame, (Emit(emit=state.emit, arguments=state.arguments),))
+            self._complete_around(frame, index)
+        elif frame.node(index).children:
+            self._enter_children(frame, index)
+        elif isinstance(state, SubmachineState):
+            self._bind_submachine(frame, index, state)
+        elif isinstance(state, DynamicState):
+            self._bind_dynamic(frame, index, state)
+        elif isinstance(state, State):
+            self._done(frame, index)
+
+    def _enter_children(self, frame: Frame, index: int) -> None:
+        node = frame.node(index)
+        for child in node.children if node.orthogonal else (node.initial,):
+            self._enter(frame, child)
+
+    def _bind_submachine(self, frame: Frame, index: int, state: SubmachineState) -> None:
+        try:
+            arguments = {k: self._value(frame, v) for k, v in state.arguments.items()}
+            if state.use.startswith("?"):
+                compiled = self._chart.bind(frame.variables[state.use[1:]])
+            else:
+                compiled = self._chart.compiled(state.use)
+            inner = self._new_frame(compiled, arguments, frame, index)
+        except InputError as error:
+            self._fail(frame, f"{frame.path(index)}: {error}")
+            return
+        self._enter_children(inner, 0)
+
+    def _bind_dynamic(self, frame: Frame, index: int, state: DynamicState) -> None:
+        bindings = self._bindings(frame, self._event)
+        try:
+            decision = self._situation.choose(state, frame.compiled.plot.name, bindings)
+            self._decisions.append(DecisionMade(frame.path(index), decision))
+            self._bind_decision(frame, index, decision)
+        except InputError as error:
+            self._fail(frame, f"{frame.path(index)}: {error}")
+
+    def _bind_decision(self, frame: Frame, index: int, decision: Decision) -> None:
+        if decision.satisfied:
+            self._done(frame, index)
+        elif decision.chosen is None:
+            self._internal.append(Event(NO_CANDIDATE, to=frame.active[index]))
+        else:
+            compiled = self._chart.compiled(decision.chosen)
+            inner = self._new_frame(compiled, decision.arguments, frame, index)
+            self._enter_children(inner, 0)
+
+    def _new_frame(
+        self, compiled: CompiledPlot, arguments: Mapping[str, Any], parent: Frame | None, host: int
+    ) -> Frame:
+        variables = fill_parameters(compiled.plot, arguments, self._situation)
+        frame = Frame(self._next_serial(), compiled, variables, parent, host)
+        if parent is not None:
+            if parent.depth >= MAX_NESTING:
+                raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [parent.path(host)])
+            parent.children[host] = frame
+        return frame
+
+    # -- completion --------------------------------------------------------------------------------------
+
+    def _complete_around(self, frame: Frame, final: int) -> None:
+        around = frame.node(final).parent
+        if around == 0:
+            self._plot_finished(frame)
+        elif frame.node(around).state is not None:
+            self._done(frame, around)
+        else:
+            orthogonal = frame.node(around).parent
+            if all(self._region_finished(frame, region) for region in frame.node(orthogonal).children):
+                self._done(frame, orthogonal)
+
+    def _region_finished(self, frame: Frame, region: int) -> bool:
+        return any(child in frame.active and frame.node(child).final for child in frame.node(region).children)
+
+    def _plot_finished(self, frame: Frame) -> None:
+        if frame.parent is None:
+            self._finished = True
+        else:
+            self._done(frame.parent, frame.host)
+
+    def _done(self, frame: Frame, index: int) -> None:
+        if DONE in frame.node(index).edges:
+            self._internal.append(Event(DONE, to=frame.active[index], exact=True))
+
+    # -- actions -----------------------------------------------------------------------------------------
+
+    def _external(self, frame: Frame, index: int, actions: tuple[ExternalAction, ...]) -> None:
+        activation = frame.active[index]
+        for number, action in enumerate(actions):
+            try:
+                output = output_of(action, activation, number, lambda term: self._value(frame, term))
+            except InputError as error:
+                self._fail(frame, f"{frame.path(index)}: {error}")
+            else:
+                self._output.append(output)
+
+    def _perform(self, frame: Frame, actions: Iterable[Assign | Tell | Emit]) -> None:
+        for action in actions:
+            try:
+                self._internal_action(frame, action)
+            except InputError as error:
+                self._fail(frame, f"{frame.compiled.plot.name}: {error}")
+
+    def _internal_action(self, frame: Frame, action: Assign | Tell | Emit) -> None:
+        if isinstance(action, Assign):
+            values = {name: self._value(frame, term) for name, term in action.assign.items()}
+            frame.variables.update(values)
+        elif isinstance(action, Tell):
+            told = self._situation.tell(action.tell, self._bindings(frame, self._event))
+            self._knowledge = self._knowledge.then(told)
+        else:
+            attributes = {name: self._value(frame, term) for name, term in action.arguments.items()}
+            self._emit(frame, action.emit, attributes)
+
+    def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
+        if name not in frame.compiled.plot.emits:
+            self._internal.append(Event(name, attributes, frame=frame.serial))
+        elif frame.parent is None:
+            self._emitted.append(Event(name, attributes))
+        elif frame.host in frame.parent.active:
+            self._internal.append(Event(name, attributes, to=frame.parent.active[frame.host]))
+        # Else the host was left by another transition of this microstep: nobody waits for an outcome any more.
+
+    def _value(self, frame: Frame, term: Any) -> Any:
+        return evaluate(term, self._bindings(frame, self._event), self._situation)
+
+    def _fail(self, frame: Frame, reason: str) -> None:
+        self._internal.append(Event(ERROR, {"reason": reason}, frame=frame.serial))
+
+    def _next_serial(self) -> int:
+        self._serials += 1
+        return self._serials
+
+
+def _reason(error: Event) -> str:
+    # A chart may fire `error` itself, and say nothing.
+    return str(error.attributes.get("reason", "the chart fired 'error' without a reason"))

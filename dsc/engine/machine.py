@@ -1,0 +1,66 @@
+"""The step function and its thin holder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from dsc.engine.compiler import Chart
+from dsc.engine.configuration import MachineState
+from dsc.engine.execution import Execution
+from dsc.engine.situation import Situation
+from dsc.engine.steps import Step
+from dsc.events import Event
+
+
+def start(chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situation) -> Step:
+    """Enter the plot and run to completion.
+
+    Raises:
+        InputError: the plot is unknown, or a parameter is missing or unknown.
+        RunawayError: the chart does not come to rest.
+    """
+    execution = Execution(chart, situation)
+    execution.start(plot, arguments)
+    return execution.finish(None, handled=True)
+
+
+def step(chart: Chart, state: MachineState, event: Event | None, situation: Situation) -> Step:
+    """React to one event and run to completion: a pure function of its arguments.
+
+    With `event=None` only transitions without trigger are looked at: the world may have changed.
+
+    Raises:
+        RunawayError: the chart does not come to rest.
+    """
+    if state.root is None:
+        return Step(state, event, handled=False)
+    execution = Execution(chart, situation, state)
+    handled = execution.react(event)
+    return execution.finish(event, handled=handled)
+
+
+@dataclass(slots=True)
+class Machine:
+    """Holds the state of one running chart; everything else is in `step`.
+
+    Attributes:
+        chart: where plots are found.
+        state: the state after the last step.
+    """
+
+    chart: Chart
+    state: MachineState = field(default_factory=MachineState)
+
+    def start(self, plot: str, arguments: Mapping[str, Any], situation: Situation) -> Step:
+        """See `start`."""
+        done = start(self.chart, plot, arguments, situation)
+        self.state = done.state
+        return done
+
+    def send(self, event: Event | None, situation: Situation) -> Step:
+        """See `step`."""
+        done = step(self.chart, self.state, event, situation)
+        self.state = done.state
+        return done

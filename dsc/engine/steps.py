@@ -1,0 +1,134 @@
+"""What a step is and what it hands out: values only, so that tests, trace and replay read one record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from dsc.engine.configuration import MachineState
+from dsc.engine.situation import Decision
+from dsc.events import Event
+from knowledge_base.facts import Delta
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Start a skill for an activation; `action_id` names this execution for ever."""
+
+    action_id: str
+    activation: int
+    component: str
+    skill: str
+    arguments: Mapping[str, Any]
+    names: Mapping[str, str] = field(default_factory=dict)
+    within: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Cancel:
+    """The state was left: skills it started that still run have to stop, and its timers with them."""
+
+    activation: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetParameter:
+    """Set a component's parameter."""
+
+    component: str
+    parameter: str
+    value: Any
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchMode:
+    """Put a component into a mode."""
+
+    component: str
+    mode: str
+
+
+@dataclass(frozen=True, slots=True)
+class StartTimer:
+    """Send the activation its timeout number `index` after `seconds`; dropped if it was left by then."""
+
+    activation: int
+    index: int
+    seconds: float
+
+
+Output = Start | Cancel | SetParameter | SwitchMode | StartTimer
+"""What leaves the machine, in order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A transition that was taken: its source and target as paths, its trigger, and the rule it comes from."""
+
+    source: str
+    trigger: str
+    target: str | None
+    rule: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Microstep:
+    """Transitions taken together. States are named by their path from the root, e.g. `clear/execute/step_2`."""
+
+    event: Event | None
+    taken: tuple[Taken, ...]
+    exited: tuple[str, ...]
+    entered: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionMade:
+    """A dynamic state, by path, with its decision record."""
+
+    state: str
+    decision: Decision
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One macrostep: run to completion of one event.
+
+    Attributes:
+        state: the machine's next state.
+        event: what it reacted to; `None` for the start.
+        handled: whether any transition took the event itself.
+        microsteps: what happened, in order.
+        decisions: what dynamic states chose.
+        knowledge: what the chart told the knowledge base.
+        output: external actions and timers, in order.
+        emitted: outcome events of the outermost plot.
+        errors: actions or guards that could not be evaluated and that no transition on `error` took.
+    """
+
+    state: MachineState
+    event: Event | None
+    handled: bool
+    microsteps: tuple[Microstep, ...] = ()
+    decisions: tuple[DecisionMade, ...] = ()
+    knowledge: Delta = field(default_factory=Delta)
+    output: tuple[Output, ...] = ()
+    emitted: tuple[Event, ...] = ()
+    errors: tuple[str, ...] = ()
+
+    @property
+    def moved(self) -> bool:
+        """Whether anything happened at all."""
+        return bool(self.microsteps)
+
+    def entered(self, state: str) -> bool:
+        """Whether a state of that name or path was entered."""
+        return any(_is(path, state) for micro in self.microsteps for path in micro.entered)
+
+    def exited(self, state: str) -> bool:
+        """Whether a state of that name or path was left."""
+        return any(_is(path, state) for micro in self.microsteps for path in micro.exited)
+
+
+def _is(path: str, state: str) -> bool:
+    return path == state or path.endswith("/" + state)

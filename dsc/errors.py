@@ -1,0 +1,47 @@
+"""What can be wrong with a plot, and what can go wrong while one runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from knowledge_base.errors import InputError, Place
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing wrong with a plot: where, which rule of the profile, and what to do."""
+
+    error: InputError
+    rule: str
+    fix: str = ""
+
+    @property
+    def place(self) -> Place | None:
+        """Where it stands."""
+        return self.error.place
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return f"{self.error}" + (f" ({self.fix})" if self.fix else "")
+
+
+class PlotError(InputError):
+    """A plot that cannot be used; carries all findings, and prints them one a line."""
+
+    def __init__(self, findings: Sequence[Finding]) -> None:
+        first = findings[0].error
+        super().__init__(first.message, place=first.place, found=first.found, valid=first.valid)
+        self.findings = tuple(findings)
+
+    def __str__(self) -> str:
+        """All findings, one a line."""
+        return "\n".join(map(str, self.findings))
+
+
+class RunawayError(Exception):
+    """A macrostep does not come to rest; carries the states it keeps entering."""
+
+    def __init__(self, problem: str, trail: Sequence[str]) -> None:
+        super().__init__(f"{problem}: {' -> '.join(trail)}")
+        self.trail = tuple(trail)

@@ -1,0 +1,54 @@
+"""Events as values, with the scope in which they are visible (S0.6, S2.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+DONE = "done"
+"""Completion of a state's content (S0.11)."""
+AFTER = "after"
+"""A timeout of a state; `index` says which."""
+NO_CANDIDATE = "no_candidate"
+"""A dynamic state without goal found no candidate that fits (S0.4)."""
+NO_PLAN = "no_plan"
+"""A dynamic state's goal cannot be planned for."""
+GAVE_UP = "gave_up"
+"""A dynamic state's goal was given up: a rule said so, or the budget was spent."""
+TIMED_OUT = "timed_out"
+"""A skill did not end within its time and was cancelled."""
+SKILL_ERROR = "skill_error"
+"""A skill raised instead of ending with one of its outcomes."""
+ERROR = "error"
+"""An action or guard could not be evaluated."""
+
+RESERVED = frozenset({DONE, AFTER, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR})
+"""Events the executive fires itself. Nobody else declares any of them, except that plots and skills that plan may end
+with `no_plan` and `gave_up`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened.
+
+    Attributes:
+        name: what transitions are labelled with.
+        attributes: data, read in charts as `?event.attribute`.
+        to: the activation (serial number of one entry into one state) it is for; the state and the states
+            around it in the same plot see it, nobody else. An event for a state that was left is dropped.
+        exact: with `to`: that state alone may take it.
+        frame: the plot instance inside which it is visible; with neither, everybody sees it.
+        index: which of the state's timeouts.
+    """
+
+    name: str
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    to: int | None = None
+    exact: bool = False
+    frame: int | None = None
+    index: int | None = None
+
+    def bindings(self) -> dict[str, Any]:
+        """Its attributes under the names charts use, `event.attribute`."""
+        return {f"event.{name}": value for name, value in self.attributes.items()}

@@ -1,0 +1,133 @@
+"""Conditions, terms and effects as fields of a model: written as text in the one language, kept parsed.
+
+A field accepts text or an already parsed value and is written back as text, so that a plot read from YAML,
+built in Python and dumped to JSON is the same plot.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Discriminator, PlainSerializer, PlainValidator, WithJsonSchema
+
+from knowledge_base.errors import InputError
+from knowledge_base.language.effect import AllOf, Effect
+from knowledge_base.language.expression import Constant, Expression, Term
+from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
+from knowledge_base.language.printer import to_text
+
+_SYMBOL = re.compile(r"[a-z0-9_][a-z0-9_\-#~.]*", re.IGNORECASE)
+
+
+class Frozen(BaseModel):
+    """Base of all model values: immutable, no unknown keys, both spellings of an aliased field."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=True, arbitrary_types_allowed=True, allow_inf_nan=False
+    )
+
+
+UNKNOWN_FORM = "unknown_form"
+"""Type of the validation error for data with none of a union's telling keys."""
+MISNAMED = "misnamed"
+"""Type of the validation error for a wrong name; its context has the `path` of the name in the form."""
+
+
+def by_key(*keys: str) -> Discriminator:
+    """A discriminator for unions whose members each have one telling key."""
+    return Discriminator(
+        kind_by_key(*keys),
+        custom_error_type=UNKNOWN_FORM,
+        custom_error_message=f"one of the keys {', '.join(keys)} is needed here",
+        custom_error_context={"keys": " ".join(keys)},
+    )
+
+
+def kind_by_key(*keys: str) -> Callable[[Any], str | None]:
+    """The first of the keys that the data have."""
+
+    def kind(value: Any) -> str | None:
+        present = value if isinstance(value, Mapping) else getattr(type(value), "model_fields", ())
+        return next((key for key in keys if key in present), None)
+
+    return kind
+
+
+def _condition(value: Any) -> Expression:
+    if isinstance(value, Expression):
+        return value
+    if not isinstance(value, str):
+        raise ValueError(f"a condition was expected, as text such as (on ?o table); found {value!r}")
+    try:
+        return parse_condition(value)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+
+
+def _term(value: Any) -> Term:
+    if isinstance(value, Term):
+        return value
+    if isinstance(value, bool | int | float):
+        if not math.isfinite(value):
+            raise ValueError(f"a finite number was expected; found {value!r}")
+        return Constant(value)
+    if not isinstance(value, str):
+        raise ValueError(f"a value was expected: a constant, ?variable or (+ ?n 1); found {value!r}")
+    if not value.startswith(("?", "(")):
+        return Constant(value, quoted=not _SYMBOL.fullmatch(value))
+    try:
+        return parse_term(value)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+
+
+def _effect(value: Any) -> Effect:
+    if isinstance(value, Effect):
+        return value
+    if isinstance(value, list | tuple):
+        return AllOf(tuple(_effect(part) for part in value))
+    if not isinstance(value, str):
+        raise ValueError(f"an effect was expected, as text such as (not (on ?o table)); found {value!r}")
+    try:
+        return parse_effect(value)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+
+
+def _term_out(term: Term) -> Any:
+    return term.value if isinstance(term, Constant) else to_text(term)
+
+
+ConditionField = Annotated[
+    Expression,
+    PlainValidator(_condition),
+    PlainSerializer(to_text),
+    WithJsonSchema({"type": "string", "description": "a condition, e.g. (and (on ?o table) (cup ?o))"}),
+]
+"""A condition that chart variables, parameters and event attributes bind completely."""
+
+TermField = Annotated[
+    Term,
+    PlainValidator(_term),
+    PlainSerializer(_term_out),
+    WithJsonSchema({
+        "type": ["string", "number", "boolean"],
+        "description": "a constant, a variable such as ?item or ?event.level, or arithmetic such as (+ ?n 1)",
+    }),
+]
+"""A value: a constant, a variable, or arithmetic over them."""
+
+EffectField = Annotated[
+    Effect,
+    PlainValidator(_effect),
+    PlainSerializer(to_text),
+    WithJsonSchema({
+        "type": ["string", "array"],
+        "items": {"type": "string"},
+        "description": "a PDDL effect, e.g. (and (unreachable ?item) (not (graspable ?item)))",
+    }),
+]
+"""A change of the knowledge base in the form of a PDDL effect."""

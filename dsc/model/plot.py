@@ -1,0 +1,230 @@
+"""The action plot: a state chart with an interface, reused as a black box (S0.1)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+from pydantic import Field, PrivateAttr, model_validator
+from pydantic_core import PydanticCustomError
+
+from dsc.model.language import MISNAMED, ConditionField, EffectField, Frozen, TermField
+from dsc.model.states import (
+    AnyState,
+    CompositeState,
+    DynamicState,
+    OrthogonalState,
+    Region,
+    SubmachineState,
+)
+from knowledge_base.errors import Place
+
+Path = tuple[str | int, ...]
+"""Where in a plot's form something stands, e.g. `("states", "look", "on", "recognised")`."""
+
+
+_STATE_NAME = re.compile(r"[^/#][^/]*")
+# Names of states stand in paths, between slashes; what begins with # is a region's place in a stored state.
+
+
+class Parameter(Frozen):
+    """A one-way parameter: a type of the knowledge base's schema or `number`, `text`, `symbol`, and a default."""
+
+    type: str
+    default: TermField | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_form(cls, value: Any) -> Any:
+        return {"type": value} if isinstance(value, str) else value
+
+
+class Variable(Frozen):
+    """A variable of the plot's scope; gone when the plot is left (S0.7)."""
+
+    type: str
+    initial: TermField | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_form(cls, value: Any) -> Any:
+        return {"type": value} if isinstance(value, str) else value
+
+
+class Response(Frozen):
+    """What a rule does about an outcome event.
+
+    Attributes:
+        tell: change the knowledge base first.
+        use, arguments: then run this plot as a recovery; whatever it ends with, `then` follows.
+        then: `retry` the step (its candidates are chosen anew), `continue` as if the step were done,
+            `replan`, `give_up`, or the name of a state of the same plot.
+        limit: how often this rule may answer for one state while its plot is active.
+    """
+
+    tell: EffectField | None = None
+    use: str | None = None
+    arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
+    then: str = "retry"
+    limit: int | None = Field(default=None, ge=1)
+
+
+class Rule(Frozen):
+    """A contingency rule: the plot that holds a state answers that state's outcome event (S1.4).
+
+    Attributes:
+        on: the outcome event.
+        when: condition over the event's attributes and the knowledge base.
+        of: only for these states; empty means any.
+        do: the response.
+    """
+
+    on: str
+    when: ConditionField | None = None
+    of: tuple[str, ...] = ()
+    do: Response
+
+    @property
+    def label(self) -> str:
+        """What people call it: the event and the response, e.g. `grasp_failed: reposition, retry`."""
+        return f"{self.on}: " + ", ".join(part for part in (self.do.use, self.do.then) if part)
+
+
+class ActionPlot(Frozen):
+    """An action plot.
+
+    Attributes:
+        name: its name in the library (`plot`).
+        parameters: values handed in.
+        variables: its own variables.
+        receives: events from outside (an operator, a user interface) that it listens to, with their attributes.
+        emits: outcome events with their attributes and types; whoever holds the plot must wire them all.
+        when: as a candidate, the condition under which it fits (bottom-up, S0.4).
+        implements: the planning action it carries out; its parameters are named as that action's.
+        effects: whether the action's effects must be `observed` before the next step, or are `assumed`.
+        confirm: seconds to wait for them to be observed.
+        states: the top-level states by name; names are unique in the whole plot.
+        initial: the state to enter first; the first one if left out.
+        rules: contingency rules, in order of priority.
+        generated: whether it was made from a plan.
+    """
+
+    name: str = Field(alias="plot", pattern=r"^[a-zA-Z_][\w\-#.]*$")
+    about: str | None = None
+    parameters: dict[str, Parameter] = Field(default_factory=dict)
+    variables: dict[str, Variable] = Field(default_factory=dict)
+    receives: dict[str, dict[str, str] | None] = Field(default_factory=dict)
+    emits: dict[str, dict[str, str] | None] = Field(default_factory=dict)
+    when: ConditionField | None = None
+    implements: str | None = None
+    effects: Literal["observed", "assumed"] = "observed"
+    confirm: float = Field(default=5.0, gt=0)
+    initial: str | None = None
+    states: dict[str, AnyState] = Field(min_length=1)
+    rules: tuple[Rule, ...] = ()
+    generated: bool = False
+    _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
+
+    def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
+        """The same plot that remembers where its parts stand in the text it was read from."""
+        self._places = places
+        return self
+
+    def place(self, path: Path) -> Place | None:
+        """Where the part at `path`, or the closest part around it that is known, was written."""
+        known: Path = ()
+        for element in path:
+            if (*known, element) in self._places:
+                known = (*known, element)
+            elif not isinstance(element, int):  # a position is left out where the short form is used
+                break
+        return self._places.get(known)
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> ActionPlot:
+        seen: set[str] = set()
+        for name, _, path in self.walk():
+            if _STATE_NAME.fullmatch(name) is None:
+                wrong = "'{name}' is no name for a state: it has a slash, begins with # or is empty"
+                raise PydanticCustomError(MISNAMED, wrong, {"name": name, "path": path})
+            if name in seen:
+                twice = "two states are named '{name}'; names are unique in a plot"
+                raise PydanticCustomError(MISNAMED, twice, {"name": name, "path": path})
+            seen.add(name)
+        return self
+
+    def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
+        """All states in document order, with their names and paths."""
+        yield from _walk(self.states, ("states",))
+
+    def scopes(self) -> Iterator[Mapping[str, AnyState]]:
+        """The states that stand side by side: of the plot, of each composite and region; transitions stay in one."""
+        yield self.states
+        for _, state, _ in self.walk():
+            if isinstance(state, CompositeState):
+                yield state.states
+            elif isinstance(state, OrthogonalState):
+                for region in state.regions.values():
+                    yield region.states
+
+    def state(self, name: str) -> AnyState:
+        """The state of that name anywhere in the plot.
+
+        Raises:
+            KeyError: there is none.
+        """
+        return next(state for found, state, _ in self.walk() if found == name)
+
+    def uses(self) -> frozenset[str]:
+        """Names of the plots it refers to."""
+        named: set[str] = {rule.do.use for rule in self.rules if rule.do.use}
+        for _, state, _ in self.walk():
+            if isinstance(state, SubmachineState) and not state.use.startswith("?"):
+                named.add(state.use)
+            if isinstance(state, DynamicState):
+                named.update(state.dynamic)
+        return frozenset(named)
+
+    def to_form(self) -> dict[str, Any]:
+        """The plot as plain data, in the form in which people write it; `ActionPlot.model_validate` reads it."""
+        form: dict[str, Any] = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+        return form
+
+    @property
+    def digest(self) -> str:
+        """A hash of its content, of which the order of states is a part: equal plots have equal digests."""
+        return hashlib.sha256(self._text().encode()).hexdigest()[:12]
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both say the same, wherever they were written."""
+        return self is other or (isinstance(other, ActionPlot) and self._text() == other._text())
+
+    def __hash__(self) -> int:
+        return hash(self._text())
+
+    def _text(self) -> str:
+        return json.dumps(self.to_form())
+
+
+def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, AnyState, Path]]:
+    for name, state in states.items():
+        here = (*path, name)
+        yield name, state, here
+        if isinstance(state, CompositeState):
+            yield from _walk(state.states, (*here, "states"))
+        elif isinstance(state, OrthogonalState):
+            for region_name, region in state.regions.items():
+                yield from _walk(region.states, (*here, "regions", region_name, "states"))
+
+
+Scope = ActionPlot | CompositeState | Region
+"""Whatever holds states and has an initial one."""
+
+
+def initial_of(scope: Scope) -> str:
+    """The name of the state to enter first."""
+    return scope.initial or next(iter(scope.states))
+

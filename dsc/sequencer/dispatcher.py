@@ -1,0 +1,223 @@
+"""Carries actions to components and their answers back as messages; the only part that touches skills.
+
+What is started for an activation is cancelled with it (S0.15). Configuration reaches a component before a
+skill that is started after it. Arguments and answers are encoded, so that nothing is shared by accident.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dsc.engine.steps import Cancel, Output, SetParameter, Start, StartTimer, SwitchMode
+from dsc.events import SKILL_ERROR, TIMED_OUT
+from dsc.skills import Clock, Component, Outcome, SkillCall
+from knowledge_base.errors import UnknownNameError
+
+DEFAULT_WITHIN = 300.0
+"""Seconds a skill may take if the trigger does not say: every wait has a bound."""
+CLOSING = 30.0
+"""Seconds for components to take what they were last told, and for cancelled skills to stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class SkillMessage:
+    """A component's answer for an activation; `final` if the skill has ended with it."""
+
+    start: Start
+    outcome: Outcome
+    final: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TimerMessage:
+    """A timeout is due."""
+
+    activation: int
+    index: int
+
+
+class Dispatcher:
+    """Starts, configures and cancels; `post` receives the answers, in the order in which they come."""
+
+    def __init__(
+        self,
+        components: Iterable[Component],
+        clock: Clock,
+        post: Callable[[SkillMessage | TimerMessage], None],
+    ) -> None:
+        self._components = {component.name: component for component in components}
+        self._clock = clock
+        self._post = post
+        self._running: dict[str, tuple[Start, asyncio.Task[None]]] = {}
+        self._configuring: dict[str, asyncio.Task[None]] = {}
+        self._ending: set[asyncio.Task[None]] = set()
+        self._timers: dict[tuple[int, int], asyncio.TimerHandle] = {}
+
+    def deploy(self, component: Component) -> None:
+        """Add a component; it replaces one of the same name."""
+        self._components[component.name] = component
+
+    @property
+    def busy(self) -> frozenset[str]:
+        """Names of the components that carry out a skill, or whose answer has not been taken yet."""
+        return frozenset(start.component for start, _ in self._running.values())
+
+    @property
+    def waiting(self) -> bool:
+        """Whether any answer or timeout is still to come."""
+        return bool(self._running) or bool(self._timers)
+
+    def dispatch(self, output: Output) -> None:
+        """Carry out one output of the machine.
+
+        Raises:
+            UnknownNameError: no component of that name is deployed.
+        """
+        if isinstance(output, Start):
+            self._start(output)
+        elif isinstance(output, Cancel):
+            self._cancel(output.activation)
+        elif isinstance(output, StartTimer):
+            self._start_timer(output)
+        elif isinstance(output, SetParameter):
+            component = self.component(output.component)
+            self._configure(component, lambda: component.configure(output.parameter, _encoded(output.value)))
+        else:
+            self._switch(output)
+
+    def component(self, name: str) -> Component:
+        """The component of that name; raises `UnknownNameError`."""
+        if name not in self._components:
+            raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
+        return self._components[name]
+
+    def settle(self, start: Start) -> None:
+        """The final answer of a skill has been taken; until then its component counts as busy."""
+        self._running.pop(start.action_id, None)
+
+    async def close(self) -> None:
+        """Cancel skills and timers, and wait until they have stopped and components are told what they were sent."""
+        for activation in {start.activation for start, _ in self._running.values()}:
+            self._cancel(activation)
+        for handle in self._timers.values():
+            handle.cancel()
+        self._timers.clear()
+        tasks = [*self._ending, *self._configuring.values()]
+        if tasks:
+            stopped, late = await asyncio.wait(tasks, timeout=CLOSING)
+            for task in late:
+                task.cancel()
+            for task in stopped:
+                _failure(task)  # nobody is left to hear of it
+
+    def _switch(self, output: SwitchMode) -> None:
+        component = self.component(output.component)
+        self._configure(component, lambda: component.switch(output.mode))
+
+    def _start(self, start: Start) -> None:
+        component = self.component(start.component)
+        task = asyncio.get_running_loop().create_task(self._execute(component, start))
+        self._running[start.action_id] = (start, task)
+
+    async def _execute(self, component: Component, start: Start) -> None:
+        outcome = await self._outcome(component, start)
+        self._post(SkillMessage(start, outcome, final=True))
+
+    async def _outcome(self, component: Component, start: Start) -> Outcome:
+        def report(outcome: Outcome) -> None:
+            if start.action_id in self._running:
+                self._post(SkillMessage(start, _declared(component, start, outcome), final=False))
+
+        call = SkillCall(start.action_id, self._clock, report)
+        within = start.within or DEFAULT_WITHIN
+        bound = asyncio.timeout(within)
+        try:
+            async with bound:
+                await self._configured(component)
+                outcome = await component.execute(start.skill, call, _encoded(start.arguments))
+            return _declared(component, start, outcome)
+        except asyncio.CancelledError:
+            if _cancelled_from_outside():
+                raise
+            return _error(start, "CancelledError: it cancelled itself")
+        except Exception as error:  # noqa: BLE001  # whatever a skill does wrong must not end the run
+            if bound.expired():
+                return Outcome(TIMED_OUT, {"skill": f"{start.component}.{start.skill}", "seconds": within})
+            return _error(start, f"{type(error).__name__}: {error}")
+
+    async def _configured(self, component: Component) -> None:
+        """Wait until the component has taken what it was told; raises what it raised, once."""
+        pending = self._configuring.get(component.name)
+        if pending is None:
+            return
+        await asyncio.wait([pending])  # unlike `await pending`, this does not cancel it when a skill is cancelled
+        if self._configuring.get(component.name) is pending:
+            del self._configuring[component.name]
+        failure = _failure(pending)
+        if failure is not None:
+            raise failure
+
+    def _cancel(self, activation: int) -> None:
+        for action_id, (start, task) in list(self._running.items()):
+            if start.activation == activation:
+                del self._running[action_id]
+                self._ending.add(task)
+                task.add_done_callback(self._ending.discard)
+                task.cancel()
+        for key in [key for key in self._timers if key[0] == activation]:
+            self._timers.pop(key).cancel()
+
+    def _start_timer(self, timer: StartTimer) -> None:
+        message = TimerMessage(timer.activation, timer.index)
+        handle = asyncio.get_running_loop().call_later(timer.seconds, self._timer_due, message)
+        self._timers[timer.activation, timer.index] = handle
+
+    def _timer_due(self, message: TimerMessage) -> None:
+        del self._timers[message.activation, message.index]
+        self._post(message)
+
+    def _configure(self, component: Component, change: Callable[[], Awaitable[None]]) -> None:
+        before = self._configuring.get(component.name)
+
+        async def in_order() -> None:
+            if before is not None:
+                await asyncio.wait([before])
+            await change()
+            failure = None if before is None else _failure(before)
+            if failure is not None:  # still to be told to the next skill
+                raise failure
+
+        task = asyncio.get_running_loop().create_task(in_order())
+        self._configuring[component.name] = task
+
+
+def _failure(task: asyncio.Task[None]) -> BaseException | None:
+    """What a task that is over raised, if anything."""
+    return None if task.cancelled() else task.exception()
+
+
+def _cancelled_from_outside() -> bool:
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0
+
+
+def _encoded(value: Any) -> Any:
+    return json.loads(json.dumps(value))
+
+
+def _declared(component: Component, start: Start, outcome: object) -> Outcome:
+    """The outcome, encoded; an error if the skill's signature does not declare it."""
+    if not isinstance(outcome, Outcome):
+        return _error(start, f"it ended with {outcome!r}, which is no outcome")
+    outcomes: Mapping[str, Any] = component.skills()[start.skill].outcomes
+    if outcome.event not in outcomes:
+        return _error(start, f"it ended with '{outcome.event}', which it does not declare")
+    return Outcome(outcome.event, _encoded(dict(outcome.attributes)), outcome.observed)
+
+
+def _error(start: Start, reason: str) -> Outcome:
+    return Outcome(SKILL_ERROR, {"skill": f"{start.component}.{start.skill}", "reason": reason})

@@ -1,0 +1,199 @@
+"""The sequencer: takes events one by one, lets the machine run to completion, commits, then dispatches."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.dynamic.situation import KnowledgeSituation
+from dsc.engine.machine import Machine
+from dsc.engine.steps import Start, Step
+from dsc.errors import RunawayError
+from dsc.events import AFTER, RESERVED, Event
+from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.dispatcher import Dispatcher, SkillMessage, TimerMessage
+from dsc.sequencer.tracing import StepTracer
+from dsc.skills import Component
+from dsc.trace import Trace
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Delta
+from knowledge_base.store import KnowledgeBase
+
+CHART = "chart"
+"""Author of what a plot tells the knowledge base."""
+
+
+@dataclass(frozen=True, slots=True)
+class KnowledgeMessage:
+    """Somebody who is no skill of this run changes the knowledge."""
+
+    delta: Delta
+    author: str
+
+
+@dataclass(frozen=True, slots=True)
+class RunEnd:
+    """How a run ended.
+
+    Attributes:
+        finished: the plot reached its final state.
+        emitted: outcome events of the plot, in order.
+        problem: why it ended without reaching it; `None` if it did.
+    """
+
+    finished: bool
+    emitted: tuple[Event, ...] = ()
+    problem: str | None = None
+
+
+Message = SkillMessage | TimerMessage | KnowledgeMessage | Event
+
+
+@dataclass(slots=True)
+class _Progress:
+    emitted: list[Event] = field(default_factory=list)
+    problem: str | None = None
+
+
+class Sequencer:
+    """Runs one plot to its end.
+
+    Args:
+        library: all plots that may be used.
+        knowledge: the world model; changed only by the plot's `tell`s and by what components observe.
+        components: the skills, by the names the plots use.
+        clock: run time; must be made inside the loop that runs the sequencer.
+        trace: hears everything; a fresh one if left out.
+        open_ended: whether events may still come from outside when nothing is going on; if not, such a
+            run ends with a problem instead of waiting for ever.
+    """
+
+    def __init__(
+        self,
+        library: Library,
+        knowledge: KnowledgeBase,
+        components: Iterable[Component],
+        clock: LoopClock,
+        trace: Trace | None = None,
+        *,
+        open_ended: bool = False,
+    ) -> None:
+        self.library = library
+        self.knowledge = knowledge
+        self.machine = Machine(library)
+        self.trace = trace or Trace(clock.now)
+        self._tracer = StepTracer(self.trace, library)
+        self._inbox: asyncio.Queue[Message] = asyncio.Queue()
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait)
+        self._open_ended = open_ended
+        self._caused_by: dict[str, int] = {}
+
+    def post(self, event: Event) -> None:
+        """Hand in an event from outside, e.g. an operator's `stop`; from the loop's own thread."""
+        self._inbox.put_nowait(event)
+
+    def change(self, delta: Delta, author: str) -> None:
+        """Hand in a change of knowledge that somebody else made; from the loop's own thread."""
+        self._inbox.put_nowait(KnowledgeMessage(delta, author))
+
+    async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
+        """Run the plot until it ends, or until nothing can happen any more.
+
+        Raises:
+            InputError: the plot is unknown, or a parameter is missing or unknown.
+        """
+        progress = _Progress()
+        try:
+            self._start(plot, arguments or {}, progress)
+            while not self.machine.state.finished and progress.problem is None:
+                if self._idle():
+                    progress.problem = "nothing is going on and nothing can happen any more"
+                    break
+                self._take(await self._inbox.get(), progress)
+        finally:
+            await self.dispatcher.close()
+        self.trace.record("end", finished=self.machine.state.finished, problem=progress.problem)
+        return RunEnd(self.machine.state.finished, tuple(progress.emitted), progress.problem)
+
+    def _start(self, plot: str, arguments: Mapping[str, Any], progress: _Progress) -> None:
+        try:
+            step = self.machine.start(plot, arguments, self._situation())
+        except RunawayError as error:
+            progress.problem = str(error)
+            return
+        try:
+            self._commit(step, progress)
+        except InputError as error:
+            progress.problem = str(error)
+
+    def _idle(self) -> bool:
+        return not self._open_ended and self._inbox.empty() and not self.dispatcher.waiting
+
+    def _situation(self) -> KnowledgeSituation:
+        return KnowledgeSituation(self.knowledge, self.library)
+
+    def _take(self, message: Message, progress: _Progress) -> None:
+        try:
+            event = self._received(message)
+            step = self.machine.send(event, self._situation())
+            if isinstance(message, SkillMessage) and message.final:
+                self.dispatcher.settle(message.start)
+            self._commit(step, progress)
+            if event is not None and not step.handled:
+                self._unhandled(message, event, progress)
+        except (RunawayError, InputError) as error:
+            progress.problem = str(error)
+
+    def _received(self, message: Message) -> Event | None:
+        """Apply what the message observed; the event the machine shall see, if any."""
+        if isinstance(message, KnowledgeMessage):
+            self.trace.cause = None
+            self._apply(message.delta, message.author)
+            return None
+        if isinstance(message, Event):
+            self.trace.cause = None
+            self.trace.cause = self._tracer.event(message, "outside")
+            return message
+        if isinstance(message, TimerMessage):
+            self.trace.cause = None
+            event = Event(AFTER, to=message.activation, exact=True, index=message.index)
+            self.trace.cause = self._tracer.event(event, "timer")
+            return event
+        start, outcome = message.start, message.outcome
+        name = start.names.get(outcome.event, outcome.event)
+        event = Event(name, outcome.attributes, to=start.activation)
+        self.trace.cause = self._caused_by.get(start.action_id)
+        self.trace.cause = self._tracer.event(event, f"{start.component}.{start.skill}", outcome.event)
+        self._apply(outcome.observed, start.component)
+        return event
+
+    def _apply(self, delta: Delta, author: str) -> None:
+        if delta:
+            change = self.knowledge.apply(delta, author)
+            self._tracer.knowledge(change)
+
+    def _commit(self, step: Step, progress: _Progress) -> None:
+        """First what the chart told becomes knowledge, then actions leave."""
+        self._tracer.step(step)
+        self._tracer.decisions(step)
+        self._apply(step.knowledge, CHART)
+        for output in step.output:
+            seq = self._tracer.output(output)
+            if isinstance(output, Start) and seq is not None:
+                self._caused_by[output.action_id] = seq
+            self.dispatcher.dispatch(output)
+        progress.emitted.extend(step.emitted)
+        if step.errors:
+            progress.problem = "; ".join(step.errors)
+
+    def _unhandled(self, message: Message, event: Event, progress: _Progress) -> None:
+        """An answer that its own, still active state does not take would leave that state waiting for ever."""
+        if not isinstance(message, SkillMessage) or not message.final or event.to is None:
+            return
+        if self.machine.state.has_activation(event.to):
+            skill = f"{message.start.component}.{message.start.skill}"
+            why = event.attributes.get("reason") if event.name in RESERVED else None
+            progress.problem = f"nobody handles '{event.name}' of {skill}" + (f": {why}" if why else "")

@@ -1,0 +1,118 @@
+"""Steps, decisions, changes and actions as records of the trace."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.engine.steps import Cancel, Output, SetParameter, Start, StartTimer, Step, SwitchMode
+from dsc.events import Event
+from dsc.trace import Trace
+from knowledge_base.facts import Change
+
+
+class StepTracer:
+    """Writes what the sequencer does into a trace."""
+
+    def __init__(self, trace: Trace, library: Library) -> None:
+        self._trace = trace
+        self._library = library
+        self._known_plots: set[str] = set()
+        self._known_frames: set[int] = set()
+
+    def event(self, event: Event, source: str, original: str | None = None) -> int:
+        """An event that came in; `original` is the skill's own name for it where the chart uses another."""
+        data: dict[str, Any] = {"name": event.name, "source": source, "attributes": dict(event.attributes)}
+        if original not in (None, event.name):
+            data["original"] = original
+        return self._trace.record("event", **data)
+
+    def step(self, step: Step) -> int | None:
+        """A macrostep in which something happened: new plots before it, the rules that answered after it."""
+        if not step.moved:
+            return None
+        self._plots(step)
+        seq = self._trace.record(
+            "step",
+            microsteps=[
+                {
+                    "event": micro.event.name if micro.event else None,
+                    "taken": [
+                        {"from": taken.source, "on": taken.trigger, "to": taken.target} for taken in micro.taken
+                    ],
+                    "exited": list(micro.exited),
+                    "entered": list(micro.entered),
+                }
+                for micro in step.microsteps
+            ],
+        )
+        self._trace.cause = seq
+        for taken in (taken for micro in step.microsteps for taken in micro.taken if taken.rule):
+            self._trace.record("rule", rule=taken.rule, state=taken.source)
+        return seq
+
+    def decisions(self, step: Step) -> None:
+        """What dynamic states chose in this macrostep, and why."""
+        for made in step.decisions:
+            decision = made.decision
+            self._trace.record(
+                "decision",
+                state=made.state,
+                chosen=decision.chosen,
+                satisfied=decision.satisfied,
+                arguments=dict(decision.arguments),
+                version=decision.version,
+                candidates=[
+                    {"plot": v.plot, "fits": v.fits, "reason": v.reason, "condition": dict(v.explanation)}
+                    for v in decision.verdicts
+                ],
+            )
+
+    def knowledge(self, change: Change) -> None:
+        """A committed change of the knowledge base, if it changed anything."""
+        delta = change.delta
+        if delta:
+            self._trace.record(
+                "knowledge",
+                version=change.version,
+                author=change.author,
+                nodes=dict(delta.nodes),
+                removed=[str(f) for f in delta.removed],
+                added=[str(f) for f in delta.added],
+                values={str(f): value for f, value in delta.values.items()},
+                **({"removed_nodes": list(delta.removed_nodes)} if delta.removed_nodes else {}),
+            )
+
+    def output(self, output: Output) -> int | None:
+        """An action that leaves; timers do not."""
+        if isinstance(output, Start):
+            return self._trace.record(
+                "action",
+                action="start",
+                id=output.action_id,
+                skill=f"{output.component}.{output.skill}",
+                arguments=dict(output.arguments),
+            )
+        if isinstance(output, SetParameter):
+            port = f"{output.component}.{output.parameter}"
+            return self._trace.record("action", action="set", port=port, value=output.value)
+        if isinstance(output, SwitchMode):
+            return self._trace.record("action", action="switch", component=output.component, mode=output.mode)
+        assert isinstance(output, Cancel | StartTimer)  # noqa: S101
+        return None
+
+    def _plots(self, step: Step) -> None:
+        stack = [step.state.root] if step.state.root else []
+        while stack:
+            frame = stack.pop()
+            stack.extend(frame.children.values())
+            if frame.serial in self._known_frames:
+                continue
+            self._known_frames.add(frame.serial)
+            compiled = (
+                self._library.compiled(frame.plot) if frame.form is None else self._library.bind(frame.form)
+            )
+            digest = compiled.plot.digest
+            if digest not in self._known_plots:
+                self._known_plots.add(digest)
+                self._trace.record("plot", name=frame.plot, hash=digest, plot=compiled.plot.to_form())

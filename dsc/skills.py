@@ -1,0 +1,176 @@
+"""What a robot can do, seen from the sequencer: components with typed skills, states and parameters.
+
+A component is configured (`configure`), switched between modes (`switch`) and triggered (a skill); it
+answers with outcome events and with what it observed, and it judges nothing (S0.7, S0.8, S1.1). A skill is
+one decorated coroutine:
+
+    class Gripper(Component):
+        @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}})
+        async def grasp(self, call: SkillCall, item: str) -> Outcome:
+            await call.clock.sleep(2.0)
+            return Outcome("grasped", observed=Delta(added=(fact("holding", item),)))
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.facts import Delta
+
+
+class Clock(Protocol):
+    """Time as skills and the sequencer see it: simulated or real, always injected."""
+
+    def now(self) -> float:
+        """Seconds of run time."""
+        ...
+
+    async def sleep(self, seconds: float) -> None:
+        """Let `seconds` of run time pass."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a skill ended: its outcome event, the event's attributes, and what was observed meanwhile.
+
+    `observed` is applied to the knowledge base, with the component as author, before the event is handled.
+    """
+
+    event: str
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    observed: Delta = field(default_factory=Delta)
+
+
+@dataclass(frozen=True, slots=True)
+class SkillCall:
+    """One execution of a skill.
+
+    Attributes:
+        action_id: names this execution; stable across restarts, never used for another one.
+        clock: the only time a skill may use.
+        report: hands over an intermediate event while the skill goes on (e.g. progress, a perception).
+    """
+
+    action_id: str
+    clock: Clock
+    report: Callable[[Outcome], None]
+
+
+SkillBody = Callable[..., Awaitable[Outcome]]
+_Body = TypeVar("_Body", bound=SkillBody)
+
+
+@dataclass(frozen=True, slots=True)
+class SkillSignature:
+    """A skill's interface: parameter names with types (`None`: anything) and outcome events with attributes."""
+
+    component: str
+    name: str
+    parameters: Mapping[str, str | None]
+    optional: frozenset[str]
+    outcomes: Mapping[str, Mapping[str, str | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Declared:
+    types: Mapping[str, str]
+    outcomes: Mapping[str, Mapping[str, str | None]]
+
+
+_DECLARED = "__dsc_skill__"
+
+
+def skill(
+    outcomes: Mapping[str, Mapping[str, str | None]], types: Mapping[str, str] | None = None
+) -> Callable[[_Body], _Body]:
+    """Declare a component's coroutine method as a skill.
+
+    Args:
+        outcomes: every event it may end with or report, with the event's attributes and their types.
+        types: types of its parameters by name; a parameter left out takes any value.
+    """
+
+    def declare(body: _Body) -> _Body:
+        setattr(body, _DECLARED, _Declared(dict(types or {}), {k: dict(v) for k, v in outcomes.items()}))
+        return body
+
+    return declare
+
+
+class Component:
+    """Base of all components; `name` is how charts address it and may be chosen at deployment."""
+
+    name: str = ""
+
+    def __init__(self, name: str | None = None) -> None:
+        self.name = name or self.name or type(self).__name__.lower()
+        self.mode = "neutral"
+        self.parameters: dict[str, Any] = {}
+
+    def skills(self) -> dict[str, SkillSignature]:
+        """The signatures of all decorated methods, by skill name."""
+        return signatures(type(self), self.name)
+
+    def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Awaitable[Outcome]:
+        """Start the named skill; the sequencer's dispatcher awaits and may cancel it.
+
+        Raises:
+            UnknownNameError: the component has no such skill.
+            InputError: an argument is missing or unknown.
+        """
+        signatures = self.skills()
+        signature = signatures.get(skill_name)
+        if signature is None:
+            raise UnknownNameError(
+                f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
+            )
+        check_arguments(signature, arguments)
+        body: SkillBody = getattr(self, skill_name)
+        return body(call, **arguments)
+
+    async def configure(self, parameter: str, value: object) -> None:
+        """The *param* port: set a named parameter; override to react."""
+        self.parameters[parameter] = value
+
+    async def switch(self, mode: str) -> None:
+        """The *state* port: enter a mode (`neutral` is at rest); override to react."""
+        self.mode = mode
+
+
+def signatures(kind: type[Component], name: str) -> dict[str, SkillSignature]:
+    """The signatures of a component class's decorated methods, for a component of that name."""
+    found = {}
+    for attribute, body in inspect.getmembers(kind, inspect.isfunction):
+        declared: _Declared | None = getattr(body, _DECLARED, None)
+        if declared is not None:
+            found[attribute] = _signature(name, attribute, body, declared)
+    return found
+
+
+def check_arguments(signature: SkillSignature, arguments: Mapping[str, Any]) -> None:
+    """Raise `InputError` for an argument that is missing or that the skill does not take."""
+    name = f"{signature.component}.{signature.name}"
+    for given in arguments:
+        if given not in signature.parameters:
+            raise UnknownNameError(
+                f"skill '{name}' has no parameter '{given}'", found=given, valid=signature.parameters
+            )
+    for wanted in signature.parameters:
+        if wanted not in arguments and wanted not in signature.optional:
+            raise InputError(f"skill '{name}' needs its parameter '{wanted}'")
+
+
+def _signature(component: str, name: str, body: SkillBody, declared: _Declared) -> SkillSignature:
+    own = list(inspect.signature(body).parameters.values())[2:]  # after self and call
+    return SkillSignature(
+        component=component,
+        name=name,
+        parameters={p.name: declared.types.get(p.name) for p in own},
+        optional=frozenset(p.name for p in own if p.default is not inspect.Parameter.empty),
+        outcomes=declared.outcomes,
+    )

@@ -1,0 +1,1 @@
+"""Text and pictures of plots: YAML in and out, drawings."""

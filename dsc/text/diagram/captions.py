@@ -1,0 +1,165 @@
+"""What is written at edges and in states: triggers, guards and actions in short and in full."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from dsc.events import AFTER
+from dsc.model.actions import Assign, Configure, Emit, ExternalAction, Switch, Tell, Trigger
+from dsc.model.states import State, TimedTransition, Transition
+from dsc.text.diagram.layout import TextStyle
+from dsc.text.diagram.measure import pack
+from knowledge_base.language.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
+from knowledge_base.language.printer import to_text
+
+WIDTH = 190.0
+"""Of one line at an edge."""
+ALWAYS = "always"
+COUNTER_PREFIX = "tries_"
+"""Of the variables in which expanded rules count how often they answered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Caption:
+    """One or more triggers with the same guard and actions: short lines, and all of it in one."""
+
+    lines: tuple[str, ...]
+    full: str
+    rule: bool
+
+    @property
+    def style(self) -> TextStyle:
+        """How it is written."""
+        return TextStyle.RULE if self.rule else TextStyle.LABEL
+
+
+@dataclass(frozen=True, slots=True)
+class Labelled:
+    """A transition, its trigger in words, and whether another one with the same trigger is tried before."""
+
+    trigger: str
+    transition: Transition
+    otherwise: bool
+
+
+def labelled(state: State) -> list[Labelled]:
+    """A state's transitions in the order in which they are tried."""
+    seen: set[str] = set()
+    result = []
+    for event, transition in state.transitions():
+        result.append(Labelled(_trigger(event, transition), transition, event in seen and event != AFTER))
+        seen.add(event)
+    return result
+
+
+def _trigger(event: str, transition: Transition) -> str:
+    if isinstance(transition, TimedTransition):
+        match transition.seconds:
+            case Constant(int() | float() as seconds):
+                return f"after {seconds:g} s"
+            case other:
+                return f"after {to_text(other)} s"
+    return "" if event == ALWAYS else event
+
+
+def captions(transitions: Iterable[Labelled], *, terse: bool = False) -> list[Caption]:
+    """The captions of one edge; triggers that share all the rest share a caption.
+
+    If `terse`, assignments and `[else]` are only in the full text, as suits plots made by machines.
+    """
+    groups: dict[tuple[object, ...], list[Labelled]] = {}
+    for one in transitions:
+        groups.setdefault(_rest(one, terse=terse), []).append(one)
+    return [caption for group in groups.values() if (caption := _caption(group, terse=terse)).full]
+
+
+def _rest(one: Labelled, *, terse: bool) -> tuple[object, ...]:
+    """What a caption says besides the trigger."""
+    return _guard(one, terse=terse), one.transition.rule, _brief(one.transition, terse=terse)
+
+
+def _guard(one: Labelled, *, terse: bool) -> str:
+    guard = one.transition.guard
+    if guard is not None and guard != TRUE:
+        return f"[{to_text(guard)}]"
+    return "[else]" if one.otherwise and not (terse and one.trigger) else ""
+
+
+def _brief(transition: Transition, *, terse: bool) -> tuple[str, ...]:
+    shown = [action for action in transition.effect if not (terse and isinstance(action, Assign))]
+    return tuple(action_text(action, brief=True) for action in shown)
+
+
+def _caption(group: list[Labelled], *, terse: bool) -> Caption:
+    first = group[0]
+    rule = first.transition.rule
+    if rule is not None:
+        words = [*rule.split(" "), _rule_guard(first.transition.guard)]
+    else:
+        triggers = list(dict.fromkeys(one.trigger for one in group if one.trigger))
+        actions = _brief(first.transition, terse=terse)
+        words = [*_enumerated(triggers), _guard(first, terse=terse), *_enumerated(actions, ";", "/ ")]
+    lines = pack([word for word in words if word], TextStyle.LABEL, WIDTH)
+    return Caption(tuple(lines), "\n".join(filter(None, map(full_text, group))), rule is not None)
+
+
+def full_text(one: Labelled, *, trigger: bool = True) -> str:
+    """A transition with nothing left out; `trigger` can be."""
+    effects = "; ".join(action_text(action) for action in one.transition.effect)
+    rule = one.transition.rule
+    parts = [
+        one.trigger if trigger else "",
+        _guard(one, terse=False),
+        f"/ {effects}" if effects else "",
+        f"(rule: {rule})" if rule else "",
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def _enumerated(words: Sequence[str], separator: str = ",", before: str = "") -> list[str]:
+    if not words:
+        return []
+    return (before + f"{separator}\n".join(words)).split("\n")
+
+
+def _rule_guard(guard: Expression | None) -> str:
+    """A rule's guard with its count of tries in words."""
+    parts = guard.parts if isinstance(guard, And) else () if guard is None else (guard,)
+    words: list[str] = []
+    for part in parts:
+        match part:
+            case Comparison("<", Variable(name), Constant(limit)) if name.startswith(COUNTER_PREFIX):
+                words.insert(0, f"at most {limit} times")
+            case _:
+                words.append(to_text(part))
+    return f"[{', '.join(words)}]" if words else ""
+
+
+def action_text(action: Assign | Tell | Emit | ExternalAction, *, brief: bool = False) -> str:
+    """An action in the notation of state charts: `^event`, `name := value`, `component.skill(…)`.
+
+    If `brief`, the attributes of fired events are left out.
+    """
+    match action:
+        case Emit(emit=event, arguments=arguments):
+            return f"^{event}" + (_values(arguments) if arguments and not brief else "")
+        case Assign(assign=values):
+            return ", ".join(f"{name} := {to_text(value)}" for name, value in values.items())
+        case Tell(tell=effect):
+            return f"tell {to_text(effect)}"
+        case Trigger(trigger=skill, arguments=arguments, within=within):
+            return f"{skill}{_values(arguments)}" + (f" within {within:g} s" if within is not None else "")
+        case Configure(set=parameter, to=value):
+            return f"{parameter} := {to_text(value)}"
+        case Switch(switch=component, to=mode):
+            return f"{component} → {mode}"
+
+
+def _values(arguments: Mapping[str, Term]) -> str:
+    return "(" + ", ".join(to_text(value) for value in arguments.values()) + ")"
+
+
+def content_text(use: str, arguments: Mapping[str, Term]) -> str:
+    """A used plot with its arguments."""
+    return use + (_values(arguments) if arguments else "")

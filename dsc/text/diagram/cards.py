@@ -1,0 +1,149 @@
+"""One state as a box: its name and, below, what it does; sizes follow from the texts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from dsc.dynamic.library import Library
+from dsc.model.plot import ActionPlot
+from dsc.model.states import DynamicState, FinalState, State, SubmachineState
+from dsc.text.diagram.captions import action_text, captions, content_text, labelled
+from dsc.text.diagram.layout import Box, BoxKind, Text, TextStyle
+from dsc.text.diagram.measure import LINE_HEIGHT, shorten, text_width
+from knowledge_base.language.expression import Term
+from knowledge_base.language.printer import to_text
+
+DETAIL_WIDTH = 260.0
+SIDE = 12.0
+"""Free space left and right of texts."""
+NAME_HEIGHT = 30.0
+MARK = 24.0
+"""Room beside the name for the mark of submachine and dynamic states."""
+LEAST_WIDTH = 76.0
+FINAL_SIZE = 20.0
+DOT_SIZE = 14.0
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A line of text in a box, and what it says in full."""
+
+    text: str
+    style: TextStyle = TextStyle.DETAIL
+    full: str = ""
+
+
+def dot() -> Box:
+    """The initial pseudo-state."""
+    return Box(BoxKind.INITIAL, "", 0, 0, DOT_SIZE, DOT_SIZE)
+
+
+def card(
+    kind: BoxKind, name: str, rows: Sequence[Row], *, about: str = "", rule: bool = False, mark: bool = False
+) -> Box:
+    """A box with a name and rows of text."""
+    title_room = text_width(name, TextStyle.NAME) + 2 * SIDE + 2 * MARK * mark
+    width = max(LEAST_WIDTH, title_room, *(text_width(row.text, row.style) + 2 * SIDE for row in rows))
+    texts = [Text(width / 2, 20.0, name, TextStyle.NAME, centred=True)]
+    texts += [
+        Text(SIDE, NAME_HEIGHT + 2 + LINE_HEIGHT * number, row.text, row.style)
+        for number, row in enumerate(rows, start=1)
+    ]
+    height = NAME_HEIGHT + (LINE_HEIGHT * len(rows) + 9 if rows else 2)
+    title = "\n".join(filter(None, [name, about, *(row.full for row in rows)]))
+    lines = (NAME_HEIGHT,) if rows else ()
+    return Box(kind, name, 0, 0, width, height, tuple(texts), lines, title, rule)
+
+
+def final_card(name: str, state: FinalState) -> Box:
+    """A final state: the bullseye, its name and the outcome it fires below."""
+    rows = [(name, TextStyle.NAME)]
+    if state.emit is not None:
+        rows.append((f"^{state.emit}", TextStyle.DETAIL))
+    width = max(FINAL_SIZE, *(text_width(*row) for row in rows))
+    texts = tuple(
+        Text(width / 2, FINAL_SIZE + LINE_HEIGHT * number, *row, centred=True)
+        for number, row in enumerate(rows, start=1)
+    )
+    fired = f"^{content_text(state.emit, state.arguments)}" if state.emit is not None else ""
+    title = "\n".join(filter(None, [name, state.about, fired]))
+    eye = Box(BoxKind.BULLSEYE, "", (width - FINAL_SIZE) / 2, 0, FINAL_SIZE, FINAL_SIZE)
+    height = FINAL_SIZE + 4 + LINE_HEIGHT * len(rows)
+    return Box(BoxKind.FINAL, name, 0, 0, width, height, texts, title=title, boxes=(eye,))
+
+
+def name_beside(final: Box) -> Box:
+    """A final state with its texts right of the bullseye, for edges that come from the left."""
+    height = max(FINAL_SIZE, LINE_HEIGHT * len(final.texts))
+    top = (height - LINE_HEIGHT * len(final.texts)) / 2
+    texts = tuple(
+        replace(text, x=FINAL_SIZE + 7, y=top + 12 + LINE_HEIGHT * number, centred=False)
+        for number, text in enumerate(final.texts)
+    )
+    eye = replace(final.boxes[0], x=0.0, y=(height - FINAL_SIZE) / 2)
+    width = FINAL_SIZE + 7 + max(text_width(text.text, text.style) for text in texts)
+    return replace(final, width=width, height=height, texts=texts, boxes=(eye,))
+
+
+def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, told: bool) -> Box:
+    """A state without states of its own: simple, submachine or dynamic.
+
+    Args:
+        name: its name.
+        state: the state.
+        library: to say more about the plots it uses.
+        rule: whether a rule put it there.
+        told: whether to write down what it is about; otherwise only the tooltip says it.
+    """
+    rows = [_row(state.about, TextStyle.ABOUT)] if told and state.about and not rule else []
+    kind, about = BoxKind.SIMPLE, [state.about or ""]
+    if isinstance(state, SubmachineState):
+        kind = BoxKind.SUBMACHINE
+        rows.append(_row(content_text(state.use, state.arguments)))
+        about.append(_about(state.use, library))
+    elif isinstance(state, DynamicState):
+        kind = BoxKind.DYNAMIC
+        rows += _choices(state, library)
+    rows += action_rows(state)
+    mark = kind is not BoxKind.SIMPLE
+    return card(kind, name, rows, about="\n".join(filter(None, about)), rule=rule, mark=mark)
+
+
+def action_rows(state: State) -> list[Row]:
+    """What a state does on entry, on exit, and on events that do not leave it."""
+    rows = [_row(f"entry / {action_text(action)}") for action in state.entry]
+    rows += [_row(f"exit / {action_text(action)}") for action in state.exit]
+    for caption in captions(one for one in labelled(state) if one.transition.target is None):
+        rows += [Row(line, caption.style, caption.full) for line in caption.lines[:1]]
+        rows += [Row(line, caption.style) for line in caption.lines[1:]]
+    return rows
+
+
+def _choices(state: DynamicState, library: Library | None) -> list[Row]:
+    rows = []
+    for name in state.dynamic:
+        plot = _known(name, library)
+        condition = f" [{to_text(plot.when)}]" if plot is not None and plot.when is not None else ""
+        rows.append(_row(f"◇ {content_text(name, _taken(state, plot))}{condition}"))
+    if state.goal is not None:
+        rows.append(_row(f"plan for {to_text(state.goal)}"))
+    return rows
+
+
+def _taken(state: DynamicState, plot: ActionPlot | None) -> dict[str, Term]:
+    """The arguments that a candidate takes; all if it is not known."""
+    return {k: v for k, v in state.arguments.items() if plot is None or k in plot.parameters}
+
+
+def _known(name: str, library: Library | None) -> ActionPlot | None:
+    return library.plot(name) if library is not None and name in library else None
+
+
+def _about(name: str, library: Library | None) -> str:
+    plot = _known(name, library)
+    return plot.about or "" if plot is not None else ""
+
+
+def _row(text: str, style: TextStyle = TextStyle.DETAIL) -> Row:
+    return Row(shorten(text, style, DETAIL_WIDTH), style, text)

@@ -1,0 +1,88 @@
+"""Plot files: the author's YAML form read into `ActionPlot`s and written back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.model.plot import ActionPlot
+from dsc.text.form import read_model
+from dsc.text.yaml import dump, load_document, read_file
+from knowledge_base.errors import InputError, Place
+
+
+def parse_plot(text: str, source: str | None = None) -> ActionPlot:
+    """Read a plot from YAML text.
+
+    Raises:
+        InputError: it is not a plot; the message has the place and the nearest valid key.
+    """
+    document = load_document(text, source)
+    return read_model(ActionPlot, document).written_at(document.places)
+
+
+def load_plot(path: Path | str) -> ActionPlot:
+    """Read a plot file; see `parse_plot`."""
+    return parse_plot(read_file(path), str(path))
+
+
+def load_library(folder: Path | str) -> Library:
+    """All plots (`*.yaml`) of a folder, by file name.
+
+    Raises:
+        InputError: the folder is missing, a file is no plot, or two plots have one name.
+    """
+    files = sorted(Path(folder).glob("*.yaml"))
+    if not files:
+        raise InputError(f"there are no plots (*.yaml) in '{folder}'", place=Place(str(folder)))
+    return Library(load_plot(file) for file in files)
+
+
+def plot_to_yaml(plot: ActionPlot) -> str:
+    """The plot as YAML in the short form in which people write it; reading it gives the same plot."""
+    return dump(_short(plot.to_form()))
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of plot files, for editors."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "action plot",
+        **ActionPlot.model_json_schema(by_alias=True),
+    }
+
+
+_ORDER = (
+    "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "receives",
+    "emits", "seconds", "to", "when", "of", "trigger", "set", "switch", "use", "dynamic", "assign", "tell",
+    "emit", "with", "as", "within", "goal", "budget", "do", "then", "limit", "rule", "entry", "initial",
+    "final", "states", "regions", "on", "after", "always", "exit", "rules",
+)
+_SINGLE = frozenset({"entry", "exit", "after", "always", "event"})
+_NAMES = {
+    "on": "event", "states": "state", "regions": "region", "parameters": "declaration", "variables": "declaration",
+    "emits": "attributes", "receives": "attributes", "with": "value", "as": "value", "assign": "value",
+}  # fmt: skip
+"""Mappings whose keys are people's names, which keep their order, and what stands under such a name."""
+
+
+def _short(node: Any, role: str = "plot") -> Any:
+    """Lists of one and mappings that only say `to` or `type` in their short spelling, keys in reading order."""
+    if isinstance(node, list):
+        short = [_short(one, "transition" if role in {"event", "always"} else "element") for one in node]
+        return short[0] if len(short) == 1 and role in _SINGLE else short
+    if not isinstance(node, dict) or role == "attributes":
+        return node
+    if role in _NAMES:
+        return {name: _short(one, _NAMES[role]) for name, one in node.items()}
+    if role in {"event", "transition"} and set(node) == {"to"}:
+        return node["to"]
+    if role == "declaration" and set(node) == {"type"}:
+        return node["type"]
+    keys = list(node) if "do" in node else sorted(node, key=_rank)
+    return {key: _short(node[key], key) for key in keys}
+
+
+def _rank(key: str) -> int:
+    return _ORDER.index(key) if key in _ORDER else 0

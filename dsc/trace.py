@@ -1,0 +1,80 @@
+"""The record of a run: one format for files, tests, listeners and the viewer (JSON lines).
+
+Every record is `{seq, t, type, cause, …}`: `t` in seconds of run time, `cause` the seq that led to it. No wall
+time, process id or random id is in it, so that equal runs give equal bytes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import IO, Any
+
+FORMAT = "dsc-trace"
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One thing that happened.
+
+    Attributes:
+        seq: its number, from 1.
+        t: seconds of run time.
+        type: `plot`, `event`, `step`, `rule`, `decision`, `knowledge`, `action`, `end`, or one that an upper room uses
+            (`plan.found`, `scene`, …).
+        cause: seq of the record that led to it; `None` for the first.
+        data: what there is to say, plain data.
+    """
+
+    seq: int
+    t: float
+    type: str
+    cause: int | None
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_line(self) -> str:
+        """One line of JSON, keys in a fixed order."""
+        head = {"seq": self.seq, "t": round(self.t, 6), "type": self.type, "cause": self.cause}
+        return json.dumps({**head, **self.data}, ensure_ascii=False)
+
+
+Listener = Callable[[Record], None]
+"""Is told every record as it happens; must not block."""
+
+
+class Trace:
+    """Numbers records and hands them to listeners; keeps none itself."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._listeners: list[Listener] = []
+        self._seq = 0
+        self.cause: int | None = None
+
+    def listen(self, listener: Listener) -> None:
+        """Tell `listener` every record from now on."""
+        self._listeners.append(listener)
+
+    def record(self, type_: str, /, **data: Any) -> int:
+        """Add a record, caused by the current `cause`; returns its seq."""
+        self._seq += 1
+        made = Record(self._seq, self._now(), type_, self.cause, data)
+        for listener in self._listeners:
+            listener(made)
+        return self._seq
+
+
+def header(**data: Any) -> str:
+    """The first line of a trace file: format, version, and what determines the run (seed, hashes)."""
+    return json.dumps({"format": FORMAT, "version": VERSION, **data}, ensure_ascii=False)
+
+
+def write_to(stream: IO[str]) -> Listener:
+    """A listener that writes each record as a line."""
+
+    def write(record: Record) -> None:
+        stream.write(record.to_line() + "\n")
+
+    return write

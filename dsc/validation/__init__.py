@@ -1,0 +1,5 @@
+"""What must be true of plots before they run; every finding has file, line, rule and remedy."""
+
+from dsc.validation.library import raise_findings, validate_library, validate_plot
+
+__all__ = ["raise_findings", "validate_library", "validate_plot"]

@@ -1,0 +1,53 @@
+"""The validator: all checks over a plot, or over all plots of a library."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dsc.dynamic.library import Library
+from dsc.errors import Finding, PlotError
+from dsc.model.plot import ActionPlot
+from dsc.skills import SkillSignature
+from dsc.validation.data import check_data
+from dsc.validation.structure import check_structure
+from dsc.validation.wiring import check_wiring
+from knowledge_base.schema import Schema
+
+
+def validate_library(
+    library: Library, schema: Schema | None, skills: Iterable[SkillSignature] | None
+) -> list[Finding]:
+    """All findings about all plots; see `validate_plot`."""
+    known = None if skills is None else list(skills)
+    return [finding for plot in library for finding in validate_plot(plot, library, schema, known)]
+
+
+def validate_plot(
+    plot: ActionPlot,
+    library: Library,
+    schema: Schema | None = None,
+    skills: Iterable[SkillSignature] | None = None,
+) -> list[Finding]:
+    """What is wrong with a plot; empty if nothing is.
+
+    Args:
+        plot: the plot.
+        library: where the plots it uses are found.
+        schema: to check conditions and types against; without it, they are not checked.
+        skills: the skills that are deployed; without them, triggers are not checked.
+    """
+    signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
+    findings = list(check_structure(plot, library))
+    if findings:  # what follows would only repeat them in other words
+        return findings
+    findings = list(check_wiring(plot, library, signatures))
+    findings += check_data(plot, library, schema, signatures)
+    return findings
+
+
+
+
+def raise_findings(findings: list[Finding]) -> None:
+    """Raise them as one `PlotError`, if there are any."""
+    if findings:
+        raise PlotError(findings)

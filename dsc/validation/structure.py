@@ -1,0 +1,119 @@
+"""Names and shape: targets exist and cross no border, used plots exist, nothing is a dead end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from dsc.dynamic.library import Library
+from dsc.errors import Finding
+from dsc.model.plot import ActionPlot, Path
+from dsc.model.states import (
+    AnyState,
+    CompositeState,
+    DynamicState,
+    OrthogonalState,
+    Region,
+    State,
+    SubmachineState,
+)
+from knowledge_base.errors import SchemaError, UnknownNameError
+
+RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
+"""What a rule may do besides going to a named state."""
+
+
+def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
+    """Findings about the plot's own states, before anything is said about what they do."""
+    yield from _scope(plot, plot, ())
+    names = {name for name, _, _ in plot.walk()}
+    for name, state, path in plot.walk():
+        if isinstance(state, CompositeState):
+            yield from _scope(plot, state, path)
+        if isinstance(state, OrthogonalState):
+            for key, region in state.regions.items():
+                yield from _scope(plot, region, (*path, "regions", key))
+        yield from _uses(plot, state, path, library)
+        yield from _dead_end(plot, name, state, path)
+    yield from _rules(plot, names, library)
+
+
+def _scope(
+    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path
+) -> Iterator[Finding]:
+    if scope.initial is not None and scope.initial not in scope.states:
+        error = UnknownNameError(
+            f"there is no state '{scope.initial}' to begin with",
+            place=plot.place((*path, "initial")), found=scope.initial, valid=scope.states,
+        )  # fmt: skip
+        yield Finding(error, "initial")
+    for name, state in scope.states.items():
+        if isinstance(state, State):
+            yield from _targets(plot, state, (*path, "states", name), scope.states)
+
+
+def _targets(plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState]) -> Iterator[Finding]:
+    everywhere = {name for name, _, _ in plot.walk()}
+    for inside, _, transition in state.placed_transitions():
+        target = transition.target
+        if target is None or target in siblings:
+            continue
+        place = plot.place((*path, *inside, "to"))
+        if target in everywhere:
+            error = SchemaError(f"the transition to '{target}' crosses a border", place=place, found=target)
+            yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
+        else:
+            missing = UnknownNameError(
+                f"there is no state '{target}'", place=place, found=target, valid=siblings
+            )
+            yield Finding(missing, "target")
+
+
+def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> Iterator[Finding]:
+    if isinstance(state, SubmachineState) and state.use.startswith("?"):
+        if state.use[1:] not in plot.variables and state.use[1:] not in plot.parameters:
+            yield _unknown(plot, (*path, "use"), state.use, {f"?{name}" for name in plot.variables})
+    elif isinstance(state, SubmachineState) and state.use not in library:
+        yield _unknown(plot, (*path, "use"), state.use, {other.name for other in library})
+    elif isinstance(state, DynamicState):
+        for number, name in enumerate(state.dynamic):
+            if name not in library:
+                yield _unknown(plot, (*path, "dynamic", number), name, {other.name for other in library})
+
+
+def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str]) -> Finding:
+    error = UnknownNameError(f"there is no plot '{name}'", place=plot.place(path), found=name, valid=valid)
+    return Finding(error, "known plot")
+
+
+def around(plot: ActionPlot, path: Path) -> Iterator[State]:
+    """The composite and orthogonal states around the one at `path`."""
+    for _, state, other in plot.walk():
+        if isinstance(state, State) and other != path and path[: len(other)] == other:
+            yield state
+
+
+def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path) -> Iterator[Finding]:
+    if not isinstance(state, State) or any(True for _ in state.transitions()):
+        return
+    if not any(any(True for _ in other.transitions()) for other in around(plot, path)):
+        error = SchemaError(f"no transition leaves the state '{name}'", place=plot.place(path))
+        yield Finding(error, "no dead end", "wire what it ends with, or make it `final: true`")
+
+
+def _rules(plot: ActionPlot, names: set[str], library: Library) -> Iterator[Finding]:
+    for number, rule in enumerate(plot.rules):
+        path: Path = ("rules", number)
+        if rule.do.use is not None and rule.do.use not in library:
+            yield _unknown(plot, (*path, "do", "use"), rule.do.use, {other.name for other in library})
+        if rule.do.then not in RESPONSES | names:
+            error = UnknownNameError(
+                f"a rule cannot '{rule.do.then}'", place=plot.place((*path, "do", "then")),
+                found=rule.do.then, valid=RESPONSES | names,
+            )  # fmt: skip
+            yield Finding(error, "rule response")
+        for name in rule.of:
+            if name not in names:
+                missing = UnknownNameError(
+                    f"there is no state '{name}'", place=plot.place((*path, "of")), found=name, valid=names
+                )
+                yield Finding(missing, "rule")

@@ -1,0 +1,326 @@
+"""Plots as values: kinds by key, short forms, both spellings, the form they are written in, their digest."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from charts import plot
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from dsc.model.actions import Configure, Emit, Switch, Trigger
+from dsc.model.plot import ActionPlot, Rule, initial_of
+from dsc.model.states import (
+    CompositeState,
+    DynamicState,
+    FinalState,
+    OrthogonalState,
+    State,
+    SubmachineState,
+    Transition,
+)
+from dsc.text.plots import parse_plot, plot_to_yaml
+from knowledge_base.language.expression import TRUE, Arithmetic, Atom, Constant, Variable
+
+EVERYTHING = plot("""
+    plot: everything
+    about: "one of each kind: a # in it"
+    parameters: {item: item, to: {type: place, default: table}}
+    variables: {n: {type: number, initial: 0}, found: item}
+    receives: {stop: , moved: {who: item}}
+    emits: {failed: {reason: text}, lost: }
+    when: (and (on ?item table) (not (gone ?item)))
+    implements: pick-up
+    effects: assumed
+    confirm: 2.5
+    initial: second
+    states:
+      first:
+        entry:
+          - {set: arm.approach, to: side}
+          - {trigger: arm.pick, with: {item: ?item, speed: 0.5}, as: {picked: taken}, within: 3}
+        exit: {switch: arm, to: neutral}
+        on:
+          taken: second
+          failed: {emit: failed, with: {reason: ?event.reason}, to: over}
+          retry:
+            - {to: first, when: (< ?n 3), assign: {n: (+ ?n 1)}, tell: (and (tried ?item) (not (fresh ?item)))}
+            - over
+          here: {do: [{assign: {n: 1}}, {tell: (p)}, {emit: local, with: {a: 1}}]}
+        after: [{seconds: 5, to: over}, {seconds: (* 2 ?n), to: second}]
+        always: [{to: second, when: (done)}]
+      second: {use: other, with: {a: ?item, text: "two words"}, on: {done: third}}
+      third:
+        dynamic: [one, two]
+        with: {item: ?item}
+        goal: (forall (?i - item) (tidy ?i))
+        budget: {replans: 1, seconds: 2}
+        on: {done: box, no_plan: over, gave_up: over}
+      box: {states: {in_a: {on: {e: in_b}}, in_b: {final: true}}, initial: in_a, on: {done: both}}
+      both:
+        regions:
+          left: {states: {l: {}}, initial: l}
+          right: {states: {r: {}}}
+        on: {stop: over}
+      over: {final: true, emit: lost}
+    rules:
+      - {on: failed, when: (< (failures ?event.item) 4), of: [second], do: {use: other, with: {a: 1}, then: retry, limit: 2}}
+      - {on: failed, do: {tell: (p), then: over}}
+""")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("form", "kind"),
+    [
+        ({}, State),
+        (None, State),
+        ({"on": {"e": "s"}}, State),
+        ({"states": {"a": {}}}, CompositeState),
+        ({"regions": {"a": {"states": {"b": {}}}}}, OrthogonalState),
+        ({"use": "p"}, SubmachineState),
+        ({"dynamic": ["p"]}, DynamicState),
+        ({"goal": "(p)"}, DynamicState),
+        ({"final": True}, FinalState),
+    ],
+)
+def test_the_kind_of_a_state_follows_from_its_telling_key(form, kind):
+    made = ActionPlot.model_validate({"plot": "p", "states": {"s": form}})
+    assert type(made.states["s"]) is kind
+
+
+def test_a_state_may_be_given_as_a_value_too():
+    inner = SubmachineState(use="p", on={"done": "over"})
+    made = ActionPlot(name="p", states={"s": inner, "over": FinalState(final=True)})
+    assert made == plot("{plot: p, states: {s: {use: p, on: {done: over}}, over: {final: true}}}")
+
+
+def test_short_forms_mean_the_long_ones():
+    short = plot("""
+        plot: p
+        parameters: {a: item}
+        variables: {b: number}
+        states:
+          s: {entry: {switch: arm, to: up}, on: {e: t}, after: {seconds: 1, to: t}, always: t}
+          t:
+    """)
+    long = plot("""
+        plot: p
+        parameters: {a: {type: item}}
+        variables: {b: {type: number}}
+        states:
+          s:
+            entry: [{switch: arm, to: up}]
+            on: {e: [{to: t}]}
+            after: [{seconds: 1, to: t}]
+            always: [{to: t}]
+          t: {}
+    """)
+    assert short == long
+    assert short.digest == long.digest
+
+
+def test_python_takes_both_spellings_and_they_are_the_same():
+    yaml = {"to": "s", "when": "(p)", "emit": "e", "with": {"a": 1}}
+    python = {"target": "s", "guard": "(p)", "emit": "e", "arguments": {"a": 1}}
+    assert Transition.model_validate(yaml) == Transition.model_validate(python)
+    assert Transition(**python).model_dump(mode="json", by_alias=True, exclude_defaults=True) == yaml
+    assert Trigger(trigger="a.b", names={"x": "y"}) == Trigger.model_validate({"trigger": "a.b", "as": {"x": "y"}})
+
+
+def test_parsed_values_are_as_good_as_text():
+    condition = Atom("on", (Variable("x"), Constant("table")))
+    assert Transition(guard=condition) == Transition(guard="(on ?x table)")
+    assert Emit(emit="e", arguments={"a": Constant(3)}) == Emit(emit="e", arguments={"a": 3})
+    assert Transition(guard=TRUE).model_dump(mode="json", exclude_defaults=True) == {"guard": "(and)"}
+
+
+def test_a_list_of_effects_is_all_of_them():
+    both = Transition.model_validate({"tell": ["(p)", "(not (q))"]})
+    assert both == Transition.model_validate({"tell": "(and (p) (not (q)))"})
+
+
+@pytest.mark.parametrize(
+    ("written", "term"),
+    [
+        ("table", Constant("table")),
+        ("two words", Constant("two words", quoted=True)),
+        (3, Constant(3)),
+        (0.5, Constant(0.5)),
+        (True, Constant(True)),
+        ("?item", Variable("item")),
+        ("?event.item", Variable("event.item")),
+        ("(+ ?n 1)", Arithmetic("+", (Variable("n"), Constant(1)))),
+    ],
+)
+def test_terms_are_constants_variables_or_arithmetic(written, term):
+    action = Configure(set="arm.x", to=written)
+    assert action.to == term
+    assert action.model_dump(mode="json")["to"] == written
+
+
+def test_values_are_frozen():
+    with pytest.raises(ValidationError):
+        EVERYTHING.name = "other"
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        {"plot": "p", "states": {"s": {}}, "colour": "red"},
+        {"plot": "p", "states": {"s": {"onn": {}}}},
+        {"plot": "p", "states": {"s": {"use": "q", "dynamic": ["q"]}}},
+        {"plot": "p", "states": {"s": {"states": {"t": {}}, "regions": {}}}},
+        {"plot": "p", "states": {"s": {"final": True, "on": {"e": "s"}}}},
+        {"plot": "p", "states": {"s": {"on": {"e": {"go": "s"}}}}},
+        {"plot": "p", "states": {"s": {"entry": {"trigger": "a.b", "switch": "a"}}}},
+        {"plot": "p", "states": {"s": {}}, "rules": [{"on": "e", "do": {"then": "retry", "times": 3}}]},
+    ],
+)
+def test_unknown_keys_are_refused(form):
+    with pytest.raises(ValidationError):
+        ActionPlot.model_validate(form)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        {"states": {"s": {}}},
+        {"plot": "p"},
+        {"plot": "p", "states": {}},
+        {"plot": "no name", "states": {"s": {}}},
+        {"plot": "p", "confirm": 0, "states": {"s": {}}},
+        {"plot": "p", "effects": "hoped", "states": {"s": {}}},
+        {"plot": "p", "states": {"s": {"entry": {"trigger": "pick"}}}},
+        {"plot": "p", "states": {"s": {"entry": {"trigger": "a.b", "within": 0}}}},
+        {"plot": "p", "states": {"s": {"regions": {}}}},
+        {"plot": "p", "states": {"s": {"goal": "(p)", "budget": {"replans": -1}}}},
+        {"plot": "p", "states": {"s": {}}, "rules": [{"on": "e", "do": {"limit": 0}}]},
+        {"plot": "p", "states": {"s": {"states": {"s": {}}}}},
+        {"plot": "p", "states": {"a/b": {}}},
+        {"plot": "p", "states": {"#1": {}}},
+        {"plot": "p", "states": {"": {}}},
+        # Values where the language stands: neither text nor a parsed value.
+        {"plot": "p", "when": 5, "states": {"s": {}}},
+        {"plot": "p", "when": ["(p)"], "states": {"s": {}}},
+        {"plot": "p", "when": Variable("x"), "states": {"s": {}}},
+        {"plot": "p", "states": {"s": {"use": "q", "with": {"a": [1]}}}},
+        {"plot": "p", "states": {"s": {"use": "q", "with": {"a": {"b": 1}}}}},
+        {"plot": "p", "states": {"s": {"use": "q", "with": {"a": None}}}},
+        {"plot": "p", "states": {"s": {"on": {"e": {"tell": 5}}}}},
+        {"plot": "p", "states": {"s": {"on": {"e": {"tell": ["(p)", 5]}}}}},
+    ],
+)
+def test_what_is_no_plot_is_refused(form):
+    with pytest.raises(ValidationError):
+        ActionPlot.model_validate(form)
+
+
+def test_the_form_reads_back_as_the_same_plot():
+    form = EVERYTHING.to_form()
+    again = ActionPlot.model_validate(json.loads(json.dumps(form)))
+    assert again == EVERYTHING
+    assert again.to_form() == form
+    assert again.digest == EVERYTHING.digest
+
+
+def test_where_a_plot_was_written_is_no_part_of_it():
+    one, other = plot("{plot: p, states: {s: {}}}", "a.yaml"), plot("plot: p\nstates:\n  s: {}", "b.yaml")
+    assert one == other
+    assert hash(one) == hash(other)
+
+
+def test_the_yaml_of_a_plot_reads_back_as_the_same_plot():
+    text = plot_to_yaml(EVERYTHING)
+    assert parse_plot(text).to_form() == EVERYTHING.to_form()
+    assert plot_to_yaml(parse_plot(text)) == text
+
+
+def test_equal_plots_have_equal_digests_and_others_have_others():
+    same = plot("{plot: p, states: {a: {on: {e: b}}, b: {}}}")
+    assert same.digest == plot("plot: p\nstates:\n  a:\n    on:\n      e: {to: b}\n  b:\n").digest
+    assert same.digest != plot("{plot: p, states: {a: {on: {f: b}}, b: {}}}").digest
+
+
+def test_the_order_of_states_is_part_of_a_plot():
+    forward, backward = plot("{plot: p, states: {a: {}, b: {}}}"), plot("{plot: p, states: {b: {}, a: {}}}")
+    assert initial_of(forward) != initial_of(backward)
+    assert forward.digest != backward.digest
+    assert forward != backward
+
+
+def test_states_are_walked_in_document_order_with_their_paths():
+    names = [name for name, _, _ in EVERYTHING.walk()]
+    assert names == ["first", "second", "third", "box", "in_a", "in_b", "both", "l", "r", "over"]
+    paths = {name: path for name, _, path in EVERYTHING.walk()}
+    assert paths["in_b"] == ("states", "box", "states", "in_b")
+    assert paths["r"] == ("states", "both", "regions", "right", "states", "r")
+    assert EVERYTHING.uses() == {"other", "one", "two"}
+
+
+def test_the_actions_of_a_transition_are_done_before_its_own_shorthand():
+    transition = Transition.model_validate(
+        {"do": [{"emit": "a"}], "assign": {"n": 1}, "tell": "(p)", "emit": "b", "with": {"x": 1}}
+    )
+    assert [type(a).__name__ for a in transition.effect] == ["Emit", "Assign", "Tell", "Emit"]
+    assert transition.emitted == ("a", "b")
+
+
+def test_a_rule_says_what_it_does():
+    rule = Rule.model_validate({"on": "failed", "do": {"use": "reposition"}})
+    assert rule.label == "failed: reposition, retry"
+    assert Switch(switch="arm", to="up").to == "up"
+
+
+NAMES = st.sampled_from(["a", "b", "on", "to", "use", "event", "transition", "states", "with", "do", "after", "x_1"])
+SCALARS = st.one_of(
+    st.integers(-5, 5),
+    st.sampled_from(["red", "two words", "?x", "(+ ?x 1)", "true", "1", "null", "a: b", "# no", "Upper", " x "]),
+)
+TERMS = st.dictionaries(NAMES, SCALARS, max_size=2)
+TYPES = st.dictionaries(NAMES, st.sampled_from(["item", "number"]), max_size=3)
+TRANSITIONS = st.fixed_dictionaries(
+    {},
+    optional={
+        "to": NAMES, "when": st.sampled_from(["(p)", "(not (p ?x))"]), "assign": TERMS,
+        "tell": st.just("(p)"), "emit": NAMES, "with": TERMS,
+    },
+)  # fmt: skip
+SIMPLE = st.fixed_dictionaries(
+    {},
+    optional={
+        "about": st.text(st.characters(codec="utf-8", exclude_categories=["C"]), max_size=12),
+        "on": st.dictionaries(NAMES, st.one_of(NAMES, TRANSITIONS, st.lists(TRANSITIONS, max_size=2)), max_size=3),
+        "always": st.lists(TRANSITIONS, max_size=2),
+        "entry": st.lists(
+            st.one_of(
+                st.fixed_dictionaries({"switch": NAMES, "to": NAMES}),
+                st.fixed_dictionaries({"set": st.just("a.b"), "to": SCALARS}),
+                st.fixed_dictionaries({"trigger": st.just("a.b")}, optional={"with": TERMS}),
+            ),
+            max_size=2,
+        ),
+    },
+)
+
+
+@given(
+    form=st.fixed_dictionaries(
+        {"plot": st.just("p")},
+        optional={
+            "parameters": TYPES,
+            "emits": st.dictionaries(NAMES, st.one_of(st.none(), TYPES), max_size=3),
+            "states": st.just({}),
+        },
+    ),
+    states=st.dictionaries(NAMES, SIMPLE, min_size=1, max_size=3),
+    regions=st.lists(NAMES, max_size=2, unique=True),
+)
+def test_any_plot_survives_json_and_yaml(form, states, regions):
+    inner = {name: {"states": {f"in_{name}": {}}} for name in regions}
+    form = {**form, "states": {**states, **({"both": {"regions": inner}} if inner else {})}}
+    made = ActionPlot.model_validate(form)
+    assert ActionPlot.model_validate(json.loads(json.dumps(made.to_form()))) == made
+    again = parse_plot(plot_to_yaml(made))
+    assert again.digest == made.digest

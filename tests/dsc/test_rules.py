@@ -1,0 +1,417 @@
+"""Contingency rules: what each response does, in which order, how often, and that it can be seen."""
+
+from __future__ import annotations
+
+import pytest
+from charts import Run, modes, plot
+
+from dsc.dynamic.library import Library
+from dsc.dynamic.rules import DEFAULT_RETRIES
+from dsc.engine.situation import Decision
+from dsc.engine.steps import SetParameter
+from dsc.model.states import SubmachineState
+from dsc.text.plots import parse_plot, plot_to_yaml
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.facts import Fact, fact
+
+STEP = """
+    plot: step
+    parameters: {item: {type: item, default: cup1}}
+    emits: {failed: {item: item}, broken: {item: item}}
+    states:
+      work:
+        on:
+          ok: over
+          bad: {to: over, emit: failed, with: {item: ?item}}
+          worse: {to: over, emit: broken, with: {item: ?item}}
+      over: {final: true}
+"""
+RECOVER = """
+    plot: recover
+    parameters: {item: {type: item, default: none}}
+    emits: {stuck: }
+    states:
+      mend: {entry: {set: c.mends, to: ?item}, on: {ok: over, bad: {to: over, emit: stuck}}}
+      over: {final: true}
+"""
+HOLDER = """
+    plot: p
+    states:
+      do_it: {use: step, on: {done: fine, gave_up: given_up}}
+      fine:
+      given_up:
+      elsewhere:
+    rules:
+"""
+
+
+def run_of(rules, text=HOLDER, facts=()):
+    indented = "".join(f"      - {rule}\n" for rule in rules)
+    run = Run(plot(text + indented), plot(STEP), plot(RECOVER), facts=facts)
+    run.start()
+    return run
+
+
+def generated(rules=(), on="done: finished"):
+    indented = "".join(f"      - {rule}\n" for rule in rules)
+    made = plot(f"""
+    plot: plan
+    generated: true
+    variables: {{reason: {{type: text, initial: unknown}}}}
+    emits: {{replan: {{reason: text}}, gave_up: {{reason: text}}}}
+    states:
+      step_1: {{dynamic: [step], on: {{{on}}}}}
+      finished: {{final: true}}
+      replan: {{final: true, emit: replan, with: {{reason: ?reason}}}}
+      gave_up: {{final: true, emit: gave_up, with: {{reason: ?reason}}}}
+    rules:
+{indented or '      []'}
+    """)
+    host = plot("""
+        plot: p
+        variables: {why: text}
+        states:
+          h:
+            use: plan
+            on:
+              done: fine
+              replan: {to: again, assign: {why: ?event.reason}}
+              gave_up: {to: sad, assign: {why: ?event.reason}}
+          fine:
+          again:
+          sad:
+    """)
+    return host, made
+
+
+def run_generated(rules=(), choices=None, on="done: finished"):
+    run = Run(*generated(rules, on), plot(STEP), plot(RECOVER), choices=choices or {"step": Decision("step")})
+    run.start()
+    return run
+
+
+# -- responses ---------------------------------------------------------------------------------------------
+
+
+def test_retry_enters_the_state_anew():
+    run = run_of(["{on: failed, do: {then: retry}}"])
+    before = run.serial("do_it")
+    run.send("bad")
+    assert run.active == ["do_it", "do_it/work"]
+    assert run.serial("do_it") > before
+
+
+def test_retry_is_bounded_even_if_nobody_says_so():
+    run = run_of(["{on: failed, do: {then: retry}}", "{on: failed, do: {then: elsewhere}}"])
+    for _ in range(DEFAULT_RETRIES):
+        run.send("bad")
+        assert run.active == ["do_it", "do_it/work"]
+    run.send("bad")
+    assert run.active == ["elsewhere"]
+
+
+def test_a_limit_is_counted_for_each_rule_and_then_the_next_rule_answers():
+    run = run_of(["{on: failed, do: {then: retry, limit: 1}}", "{on: failed, do: {use: recover, then: retry, limit: 1}}",
+                  "{on: failed, do: {then: give_up}}"])  # fmt: skip
+    run.send("bad")
+    assert run.active == ["do_it", "do_it/work"]
+    run.send("bad")
+    assert run.machine.state.is_active("mend")
+    run.send("ok")
+    assert run.active == ["do_it", "do_it/work"]
+    run.send("bad")
+    assert run.active == ["given_up"]
+
+
+def test_a_limit_is_counted_for_each_state():
+    text = """
+    plot: p
+    states:
+      one: {use: step, on: {done: two}}
+      two: {use: step, on: {done: fine}}
+      fine:
+      elsewhere:
+    rules:
+"""
+    run = run_of(["{on: failed, do: {then: retry, limit: 1}}", "{on: failed, do: {then: elsewhere}}"], text)
+    run.send("bad")
+    run.send("ok")
+    assert run.active == ["two", "two/work"]
+    run.send("bad")
+    assert run.active == ["two", "two/work"]
+    run.send("bad")
+    assert run.active == ["elsewhere"]
+
+
+def test_a_limit_begins_anew_when_the_plot_is_entered_anew():
+    outer = plot("{plot: o, states: {h: {use: p, on: {again: h}}}}")
+    inner = plot(HOLDER + "      - {on: failed, do: {then: retry, limit: 1}}\n      - {on: failed, do: {then: elsewhere}}\n")
+    run = Run(outer, inner, plot(STEP))
+    run.start()
+    run.send("bad")
+    run.send("again")
+    run.send("bad")
+    assert run.machine.state.is_active("work")
+    run.send("bad")
+    assert run.machine.state.is_active("elsewhere")
+
+
+def test_states_whose_names_differ_by_little_have_counters_of_their_own():
+    text = """
+    plot: p
+    states:
+      do-it: {use: step, on: {done: do_it}}
+      do_it: {use: step, on: {done: Do_it}}
+      Do_it: {use: step, on: {done: fine}}
+      fine:
+      elsewhere:
+    rules:
+"""
+    run = run_of(["{on: failed, do: {then: retry, limit: 1}}", "{on: failed, do: {then: elsewhere}}"], text)
+    for name in ("do-it", "do_it", "Do_it"):
+        run.send("bad")
+        assert run.active == [name, f"{name}/work"]
+        run.send("ok")
+    assert run.active == ["fine"]
+
+
+def test_continue_goes_on_as_if_the_state_were_done():
+    run = run_of(["{on: failed, do: {then: continue}}"])
+    run.send("bad")
+    assert run.active == ["fine"]
+
+
+def test_continue_does_what_done_does_too():
+    text = """
+    plot: p
+    variables: {n: {type: number, initial: 0}}
+    states:
+      do_it: {use: step, on: {done: [{to: fine, when: (p), assign: {n: 1}}, {to: other, assign: {n: 2}, tell: (q)}]}}
+      fine:
+      other:
+    rules:
+"""
+    run = run_of(["{on: failed, do: {tell: (p), then: continue}}"], text, facts=[])
+    step = run.send("bad")
+    assert run.variables()["n"] == 2  # the guard of `done` is asked before the rule tells anything
+    assert step.knowledge.added == (Fact("p"), Fact("q"))
+    assert run_of(["{on: failed, do: {then: continue}}"], text, facts=[Fact("p")]).send("bad").entered("fine")
+
+
+def test_give_up_takes_what_the_state_wires_for_it():
+    run = run_of(["{on: failed, do: {then: give_up}}"])
+    run.send("bad")
+    assert run.active == ["given_up"]
+
+
+def test_a_rule_may_go_to_a_named_state():
+    run = run_of(["{on: failed, do: {then: elsewhere}}"])
+    run.send("bad")
+    assert run.active == ["elsewhere"]
+
+
+def test_replan_outside_of_a_plan_enters_the_dynamic_state_anew():
+    run = run_of(["{on: failed, do: {then: replan}}"])
+    before = run.serial("do_it")
+    run.send("bad")
+    assert run.serial("do_it") > before
+
+
+def test_a_rule_tells_the_knowledge_base_what_the_event_says():
+    run = run_of(["{on: failed, do: {tell: (unreachable ?event.item), then: continue}}"])
+    step = run.send("bad")
+    assert step.knowledge.added == (fact("unreachable", "cup1"),)
+
+
+def test_a_recovery_gets_its_arguments_from_the_event_and_then_the_response_follows():
+    run = run_of(["{on: failed, do: {use: recover, with: {item: ?event.item}, then: continue}}"])
+    step = run.send("bad")
+    assert SetParameter("c", "mends", "cup1") in step.output
+    run.send("ok")
+    assert run.active == ["fine"]
+
+
+def test_whatever_a_recovery_ends_with_the_response_follows():
+    run = run_of(["{on: failed, do: {use: recover, then: elsewhere}}"])
+    run.send("bad")
+    run.send("bad")
+    assert run.active == ["elsewhere"]
+
+
+# -- which rule answers ------------------------------------------------------------------------------------
+
+
+def test_rules_are_tried_in_order_with_their_conditions():
+    rules = ["{on: failed, when: (p ?event.item), do: {then: elsewhere}}", "{on: failed, do: {then: continue}}"]
+    run = run_of(rules)
+    run.send("bad")
+    assert run.active == ["fine"]
+    run = run_of(rules, facts=[fact("p", "cup1")])
+    run.send("bad")
+    assert run.active == ["elsewhere"]
+
+
+def test_rules_answer_their_own_event_alone():
+    run = run_of(["{on: broken, do: {then: elsewhere}}", "{on: failed, do: {then: continue}}"])
+    run.send("worse")
+    assert run.active == ["elsewhere"]
+
+
+def test_what_a_state_wires_itself_beats_every_rule():
+    text = HOLDER.replace("on: {done: fine,", "on: {failed: elsewhere, done: fine,")
+    run = run_of(["{on: failed, do: {then: retry}}"], text)
+    run.send("bad")
+    assert run.active == ["elsewhere"]
+
+
+def test_a_rule_answers_where_a_states_own_guards_do_not_hold():
+    text = HOLDER.replace("on: {done: fine,", "on: {failed: {to: elsewhere, when: (p)}, done: fine,")
+    run = run_of(["{on: failed, do: {then: continue}}"], text)
+    run.send("bad")
+    assert run.active == ["fine"]
+    run = run_of(["{on: failed, do: {then: continue}}"], text, facts=[Fact("p")])
+    run.send("bad")
+    assert run.active == ["elsewhere"]
+
+
+def test_a_rule_may_be_for_certain_states():
+    run = run_of(["{on: failed, of: [other], do: {then: elsewhere}}", "{on: failed, of: [do_it], do: {then: continue}}"])
+    run.send("bad")
+    assert run.active == ["fine"]
+
+
+def test_rules_answer_states_inside_composites_and_regions():
+    text = """
+    plot: p
+    states:
+      c: {states: {do_it: {use: step, on: {done: fine}}, fine: {on: {go: o}}}, on: {go: o}}
+      o: {regions: {r: {states: {do_too: {use: step, on: {done: good}}, good: }}}}
+    rules:
+"""
+    run = run_of(["{on: failed, do: {then: continue}}"], text)
+    run.send("bad")
+    assert run.active == ["c", "fine"]
+    run.send("go")
+    run.send("bad")
+    assert run.active == ["o", "good"]
+
+
+def test_the_transition_names_the_rule_it_comes_from():
+    run = run_of(["{on: failed, do: {use: recover, then: retry}}"])
+    step = run.send("bad")
+    rules = [taken.rule for micro in step.microsteps for taken in micro.taken if taken.rule]
+    assert rules == ["failed: recover, retry"]
+
+
+# -- plans -------------------------------------------------------------------------------------------------
+
+
+def test_in_a_plan_what_no_rule_answers_leads_to_replanning_with_the_reason():
+    run = run_generated()
+    run.send("bad")
+    assert run.active == ["again"]
+    assert run.variables()["why"] == "failed"
+
+
+def test_in_a_plan_no_candidate_leads_to_replanning():
+    run = run_generated(choices={"step": Decision(None)})
+    assert run.active == ["again"]
+    assert run.variables()["why"] == "no candidate fits"
+
+
+def test_in_a_plan_rules_come_before_replanning():
+    run = run_generated(["{on: failed, do: {use: recover, then: retry, limit: 1}}"])
+    run.send("bad")
+    run.send("ok")
+    assert run.active == ["h", "h/step_1", "h/step_1/work"]
+    run.send("bad")
+    assert run.active == ["again"]
+
+
+def test_a_rule_may_replan_or_give_up_a_plan():
+    run = run_generated(["{on: failed, do: {then: replan}}", "{on: broken, do: {then: give_up}}"])
+    run.send("bad")
+    assert run.active == ["again"]
+    run = run_generated(["{on: failed, do: {then: replan}}", "{on: broken, do: {then: give_up}}"])
+    run.send("worse")
+    assert run.active == ["sad"]
+    assert run.variables()["why"] == "broken"
+
+
+def test_a_rule_that_tells_and_replans_does_both():
+    run = run_generated(["{on: failed, do: {tell: (unreachable ?event.item), then: replan}}"])
+    assert run.send("bad").knowledge.added == (fact("unreachable", "cup1"),)
+    assert run.active == ["again"]
+
+
+def test_a_plan_without_failure_is_done():
+    run = run_generated()
+    run.send("ok")
+    assert run.active == ["fine"]
+
+
+# -- what can be seen --------------------------------------------------------------------------------------
+
+
+def test_recoveries_are_states_like_all_others():
+    holder = plot(HOLDER + "      - {on: failed, do: {use: recover, then: retry}}\n")
+    expanded = Library([holder, plot(STEP), plot(RECOVER)]).expanded(holder)
+    recoveries = {n: s for n, s in expanded.states.items() if n not in holder.states}
+    ((name, state),) = recoveries.items()
+    assert isinstance(state, SubmachineState)
+    assert state.use == "recover"
+    assert set(state.on) == {"done", "stuck"}
+    targets = [t.target for t in expanded.states["do_it"].on["failed"]]
+    assert targets == [name]
+    assert not expanded.rules
+
+
+def test_a_plot_without_rules_is_what_it_is():
+    holder = plot(HOLDER.replace("    rules:\n", ""))
+    assert Library([holder, plot(STEP)]).expanded(holder) is holder
+
+
+def test_what_a_rule_makes_can_be_written_and_read_like_any_plot():
+    holder = plot(HOLDER + "      - {on: failed, when: (p ?event.item), do: {use: recover, tell: (q), then: retry}}\n")
+    expanded = Library([holder, plot(STEP), plot(RECOVER)]).expanded(holder)
+    assert parse_plot(plot_to_yaml(expanded)) == expanded
+
+
+def test_a_recovery_takes_no_name_that_is_there_already():
+    text = """
+    plot: p
+    states:
+      do_it: {use: step, on: {done: fine}}
+      fine:
+      do_it_failed_0_recover: {entry: {switch: log, to: mine}}
+    rules:
+"""
+    run = run_of(["{on: failed, do: {use: recover, then: retry}}"], text)
+    step = run.send("bad")
+    assert run.machine.state.is_active("mend")
+    assert modes(step) == []
+
+
+# -- mistakes ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("then", "lacks"), [("give_up", "gave_up"), ("continue", "done")])
+def test_a_response_that_the_state_does_not_wire_is_refused_with_its_place(then, lacks):
+    text = "plot: p\nstates:\n  do_it: {use: step, on: {e: do_it}}\nrules:\n  - on: failed\n    do: {then: " + then + "}\n"
+    holder = plot(text, "p.yaml")
+    with pytest.raises(SchemaError, match=f"does not wire '{lacks}'") as caught:
+        Library([holder, plot(STEP)]).expanded(holder)
+    assert (caught.value.place.source, caught.value.place.line) == ("p.yaml", 6)
+
+
+def test_a_rule_with_an_unknown_plot_is_refused():
+    holder = plot(HOLDER + "      - {on: failed, do: {use: recovr}}\n")
+    with pytest.raises(UnknownNameError, match="did you mean 'recover'"):
+        Library([holder, plot(STEP), plot(RECOVER)]).expanded(holder)
+
+
+def test_a_rule_to_an_unknown_state_is_refused():
+    with pytest.raises(InputError, match="did you mean 'elsewhere'"):
+        run_of(["{on: failed, do: {then: elsewere}}"])
+
+

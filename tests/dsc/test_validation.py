@@ -1,0 +1,336 @@
+"""What must be true of plots before they run: one test for each rule, with its place and remedy."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from charts import plot
+
+from dsc.dynamic.library import Library
+from dsc.errors import PlotError
+from dsc.skills import Component, Outcome, skill
+from dsc.text.plots import load_library, parse_plot
+from dsc.validation import raise_findings, validate_library, validate_plot
+from knowledge_base.schema import Schema
+
+SCHEMA = Schema.parse("""
+    (define (domain kitchen)
+      (:types item place - object cup - item)
+      (:constants table - place)
+      (:predicates (on ?i - item ?p - place) (free))
+      (:functions (failures ?i - item)))
+""")
+
+
+class Arm(Component):
+    name = "arm"
+
+    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}}, types={"item": "item"})
+    async def grasp(self, call, item, speed=1):
+        return Outcome("grasped")
+
+    @skill(outcomes={"done": {}})
+    async def push(self, call):
+        return Outcome("done")
+
+
+SKILLS = list(Arm().skills().values())
+HELPERS = [
+    plot("""
+        plot: grasp
+        parameters: {item: item, speed: {type: number, default: 1}}
+        emits: {failed: {item: item}, lost: }
+        implements: pick-up
+        receives: {ok: , bad: , worse: }
+        states:
+          s: {on: {bad: {to: over, emit: failed, with: {item: ?item}}, worse: {to: over, emit: lost}, ok: over}}
+          over: {final: true}
+    """),
+    plot("{plot: wait, states: {s: {after: {seconds: 1, to: over}}, over: {final: true}}}"),
+    plot("{plot: talk, emits: {said: }, states: {s: {after: {seconds: 1, to: over}}, over: {final: true, emit: said}}}"),
+]  # fmt: skip
+
+
+def findings_of(text, schema=SCHEMA, skills=SKILLS):
+    made = parse_plot(text, "p.yaml")
+    return validate_plot(made, Library([made, *HELPERS]), schema, skills)
+
+
+S = "plot: p\nstates:\n"
+E = "  e: {final: true}\n"
+ITEM = "plot: p\nparameters: {item: item}\nstates:\n"
+GRASP = "    use: grasp\n    with: {item: ?item}\n"
+WIRED = "    on: {done: e, failed: e, lost: e}\n"
+WRONG = [
+    # -- structure
+    ("initial", "plot: p\ninitial: b\nstates: {a: {on: {done: a}}}\n", 2, "no state 'b' to begin with", ""),
+    ("initial", S + "  a:\n    on: {done: e}\n    states: {b: {on: {done: b}}}\n    initial: c\n" + E, 6, "'c' to begin", ""),
+    (
+        "initial",
+        S + "  a:\n    on: {done: e}\n    regions:\n      r:\n        states: {b: {on: {done: b}}}\n        initial: c\n" + E,
+        8, "'c' to begin", "",
+    ),
+    ("target", S + "  start:\n    on:\n      done: ende\n  end: {final: true}\n", 5, "did you mean 'end'", ""),
+    ("target", S + "  a:\n    after: {seconds: 1, to: b}\n" + E, 4, "no state 'b'", ""),
+    ("target", S + "  a:\n    always:\n      - {to: b}\n" + E, 5, "no state 'b'", ""),
+    (
+        "no border crossing",
+        S + "  a:\n    on: {done: e}\n    states:\n      b:\n        on: {done: e}\n" + E,
+        7, "the transition to 'e' crosses a border", "transitions stay in",
+    ),
+    ("known plot", S + "  a:\n    use: wiat\n    on: {done: e}\n" + E, 4, "did you mean 'wait'", ""),
+    ("known plot", S + "  a:\n    use: ?plan\n    on: {done: e}\n" + E, 4, "'?plan'", ""),
+    ("known plot", S + "  a:\n    dynamic: [wait, tlk]\n    on: {done: e, no_candidate: e}\n" + E, 4, "mean 'talk'", ""),
+    ("known plot", S + "  a: {on: {done: e}}\n" + E + "rules:\n  - on: x\n    do: {use: wiat}\n", 7, "mean 'wait'", ""),
+    ("no dead end", S + "  a:\n    entry: {switch: arm, to: up}\n" + E, 3, "no transition leaves the state 'a'", "final: true"),
+    ("rule response", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    do: {then: retri}\n", 11, "mean 'retry'", ""),
+    ("rule", ITEM + "  abc:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    of: [abd]\n    do: {}\n", 11, "mean 'abc'", ""),
+    # -- wiring
+    (
+        "rules",
+        ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E + "rules:\n  - on: lost\n    do: {then: give_up}\n",
+        11, "does not wire 'gave_up'", "",
+    ),
+    (
+        "every outcome is wired",
+        ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E,
+        7, "does not handle its outcome 'lost'", "add `lost: STATE` under `on`, or a rule",
+    ),
+    (
+        "every outcome is wired",
+        ITEM + "  a:\n" + GRASP + "    on:\n      done: e\n      failed: e\n      lost: {to: e, when: (free)}\n" + E,
+        10, "every transition has a guard", "without `when`",
+    ),
+    ("every outcome is wired", S + "  a:\n    dynamic: [wait]\n    on: {done: e}\n" + E, 5, "'no_candidate'", "no_candidate: STATE"),
+    ("every outcome is wired", S + "  a:\n    goal: (free)\n    on: {done: e, gave_up: e}\n" + E, 5, "'no_plan'", "no_plan: STATE"),
+    (
+        "every outcome is wired",
+        ITEM + "  a:\n    entry: {trigger: arm.grasp, with: {item: ?item}}\n    on: {grasped: e}\n" + E,
+        6, "'slipped'", "slipped: STATE",
+    ),
+    (
+        "known skill",
+        S + "  a:\n    entry:\n      - {trigger: arm.grsp}\n    on: {error: e}\n" + E,
+        5, "no component offers the skill 'arm.grsp'; did you mean 'arm.grasp'", "",
+    ),
+    (
+        "known outcome",
+        ITEM + "  a:\n    entry:\n      trigger: arm.grasp\n      with: {item: ?item}\n      as: {graspd: ok}\n"
+        "    on: {grasped: e, slipped: e}\n" + E,
+        8, "has no outcome 'graspd'; did you mean 'grasped'", "",
+    ),
+    ("completion is wired", S + "  a:\n    use: wait\n    on: {error: e}\n" + E, 5, "does not handle its completion", "done: STATE"),
+    (
+        "completion is wired",
+        S + "  a:\n    on: {error: e}\n    states: {b: {on: {done: c}}, c: {final: true}}\n" + E,
+        4, "completion", "done: STATE",
+    ),
+    (
+        "completion is wired",
+        S + "  a:\n    on: {error: e}\n    regions: {r: {states: {c: {final: true}}}}\n" + E,
+        4, "completion", "done: STATE",
+    ),
+    ("completion is wired", S + "  a:\n    dynamic: [wait]\n    on: {no_candidate: e}\n" + E, 5, "completion", "done: STATE"),
+    ("completion is wired", S + "  a:\n    goal: (free)\n    on: {no_plan: e, gave_up: e}\n" + E, 5, "completion", "done: STATE"),
+    (
+        "known event",
+        "plot: p\nreceives: {stop: }\nstates:\n  a:\n    on:\n      stpo: e\n" + E,
+        6, "nothing here fires the event 'stpo'; did you mean 'stop'", "declared under `receives`",
+    ),
+    (
+        "declared outcome",
+        "plot: p\nemits: {lost: }\nstates:\n  a:\n    on:\n      done: {to: e, emit: lots}\n" + E,
+        6, "does not declare the outcome 'lots', and no state listens to it; did you mean 'lost'", "under `emits`",
+    ),
+    (
+        "declared outcome",
+        "plot: p\nemits: {lost: }\nstates:\n  a: {on: {done: e}}\n  e:\n    final: true\n    emit: lots\n",
+        7, "does not declare the outcome 'lots'; did you mean 'lost'", "under `emits`",
+    ),
+    (
+        "outcome attributes",
+        "plot: p\nemits: {lost: {item: item}}\nstates:\n  a: {on: {done: e}}\n  e:\n    final: true\n    emit: lost\n",
+        7, "attribute 'item' of the outcome 'lost' is missing", "",
+    ),
+    (
+        "outcome attributes",
+        "plot: p\nemits: {lost: }\nstates:\n  a:\n    on:\n      done: {to: e, emit: lost, with: {why: x}}\n" + E,
+        6, "attribute 'why' of the outcome 'lost' is not declared", "",
+    ),
+    # -- names with a meaning
+    ("reserved event", "plot: p\nemits:\n  done:\nstates: {a: {on: {done: e}}, e: {final: true, emit: done}}\n", 3, "'done'", ""),
+    ("reserved event", "plot: p\nreceives:\n  after:\nstates: {a: {on: {done: e}}, e: {final: true}}\n", 3, "'after'", ""),
+    ("reserved event", S + "  a:\n    on:\n      done: {to: e, emit: error}\n      error: e\n" + E, 5, "'error'", ""),
+    (
+        "reserved event",
+        S + "  a:\n    entry: {trigger: arm.push}\n    on: {timed_out: e}\n" + E,
+        4, "'done' is fired by the executive itself", "another name",
+    ),
+    (
+        "done at once",
+        S + "  a:\n    entry: {trigger: arm.push, as: {done: pushed}}\n    on: {pushed: e, done: e}\n" + E,
+        5, "state 'a' has no content, so it is done at once and would cancel its skill", "the outcome of the skill",
+    ),
+    # -- data
+    ("known type", "plot: p\nparameters:\n  x: itme\nstates: {a: {on: {done: e}}, e: {final: true}}\n", 3, "mean 'item'", ""),
+    ("known type", "plot: p\nvariables:\n  x: nubmer\nstates: {a: {on: {done: e}}, e: {final: true}}\n", 3, "mean 'number'", ""),
+    (
+        "declared variable",
+        "plot: p\nvariables: {count: number}\nstates:\n  a:\n    on:\n      done: {to: e, assign: {cuont: 1}}\n" + E,
+        6, "there is no variable 'cuont'; did you mean 'count'", "",
+    ),
+    ("declared variable", ITEM + "  a:\n    use: grasp\n    with: {item: ?itm}\n" + WIRED + E, 6, "no variable '?itm' here; did you mean", ""),
+    ("declared variable", S + "  a:\n    after: {seconds: ?nope, to: e}\n" + E, 4, "no variable '?nope'", ""),
+    ("declared variable", S + "  a:\n    entry: {set: arm.x, to: ?nope}\n    on: {done: e}\n" + E, 4, "no variable '?nope'", ""),
+    (
+        "declared variable",
+        ITEM + "  a:\n" + GRASP + "    on:\n      done: e\n      lost: e\n      failed: {to: e, assign: {x: ?event.itm}}\n" + E
+        + "variables: {x: item}\n",
+        10, "no variable '?event.itm' here; did you mean 'event.item'", "",
+    ),
+    (
+        "declared variable",
+        ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E
+        + "rules:\n  - on: lost\n    do: {use: grasp, with: {item: ?item}, then: e}\n",
+        11, "no variable '?item' here", "",
+    ),
+    (
+        "skill arguments",
+        ITEM + "  a:\n    entry:\n      trigger: arm.grasp\n      with: {itm: ?item}\n    on: {grasped: e, slipped: e}\n" + E,
+        7, "has no parameter 'itm'; did you mean 'item'", "",
+    ),
+    (
+        "skill arguments",
+        S + "  a:\n    entry:\n      - {trigger: arm.grasp}\n    on: {grasped: e, slipped: e}\n" + E,
+        5, "needs its parameter 'item'", "",
+    ),
+    ("known parameter", ITEM + "  a:\n    use: grasp\n    with: {item: ?item, sped: 1}\n" + WIRED + E, 6, "mean 'speed'", ""),
+    ("parameters are given", S + "  a:\n    use: grasp\n    with: {speed: 2}\n" + WIRED + E, 5, "needs its parameter 'item'", "add `item"),
+    (
+        "parameters are given",
+        S + "  a:\n    dynamic: [grasp]\n    on: {done: e, failed: e, lost: e, no_candidate: e}\n" + E,
+        3, "'grasp' needs its parameter 'item'", "add `item",
+    ),
+    (
+        "parameters are given",
+        ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E + "rules:\n  - on: lost\n    do: {use: grasp, then: e}\n",
+        11, "'grasp' needs its parameter 'item'", "add `item",
+    ),
+    (
+        "candidates conform",
+        S + "  a:\n    dynamic: [wait]\n    with:\n      tme: 1\n    on: {done: e, no_candidate: e}\n" + E,
+        6, "no candidate has a parameter 'tme'", "",
+    ),
+    ("condition", "plot: p\nwhen: (fre)\nstates: {a: {on: {done: e}}, e: {final: true}}\n", 2, "mean 'free'", ""),
+    ("condition", ITEM + "  a:\n    on:\n      done: [{to: e, when: (on ?item)}, e]\n" + E, 6, "on", ""),
+    ("condition", ITEM + "  a:\n    on:\n      done: [{to: e, when: (on ?i table)}, e]\n" + E, 6, "?i", ""),
+    ("condition", S + "  a:\n    goal: (on table table)\n    on: {done: e, no_plan: e, gave_up: e}\n" + E, 4, "of type place", ""),
+    (
+        "condition",
+        ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    when: (on ?item table)\n    do: {}\n",
+        11, "?item", "",
+    ),
+    ("effect", ITEM + "  a:\n    on:\n      done: {to: e, tell: (onn ?item table)}\n" + E, 6, "mean 'on'", ""),
+    (
+        "effect",
+        ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    do: {tell: (on ?item table)}\n",
+        11, "?item", "",
+    ),
+    ("rule event", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lots\n    do: {then: e}\n", 10, "mean 'lost'", ""),
+    # -- rules are transitions too
+    (
+        "no border crossing",
+        ITEM + "  c:\n    on: {done: e}\n    states:\n      a: {use: grasp, with: {item: ?item}, on: {done: f, failed: f}}\n"
+        "      f: {final: true}\n" + E + "rules:\n  - on: lost\n    do: {then: e}\n",
+        12, "from 'a' to 'e' crosses a border", "`of`",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("rule", "text", "line", "message", "fix"), WRONG)
+def test_a_wrong_plot_gets_one_finding_with_place_rule_and_remedy(rule, text, line, message, fix):
+    findings = findings_of(text)
+    assert [str(finding) for finding in findings if finding.rule != rule] == []
+    (finding,) = findings
+    assert message in str(finding)
+    assert fix in finding.fix
+    assert finding.place is not None
+    assert (finding.place.source, finding.place.line) == ("p.yaml", line)
+    assert str(finding).startswith(f"p.yaml:{line}:")
+
+
+def test_every_rule_of_the_validator_is_tested():
+    sources = Path(__file__).parents[2] / "dsc" / "validation"
+    text = "".join(file.read_text() for file in sources.glob("*.py"))
+    rules = set(re.findall(r'Finding\([^"]*?, "([a-z ]+)"', text, re.DOTALL))
+    assert rules == {case[0] for case in WRONG}
+
+
+RIGHT = [
+    S + "  a: {on: {done: e}}\n" + E,
+    ITEM + "  a:\n" + GRASP + WIRED + E,
+    # a composite around handles outcomes
+    ITEM + "  c:\n    on: {failed: e, lost: e}\n    states: {a: {use: grasp, with: {item: ?item}, on: {done: a}}}\n" + E,
+    # rules handle outcomes
+    ITEM + "  a:\n" + GRASP + "    on: {done: e}\n" + E + "rules:\n  - {on: lost, do: {then: e}}\n  - {on: failed, do: {then: continue}}\n",
+    # a rule with a limit and a last one without
+    ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E
+    + "rules:\n  - {on: lost, do: {then: retry, limit: 2}}\n  - {on: lost, do: {then: e}}\n",
+    # a rule for the steps of plans alone
+    S + "  a:\n    goal: (free)\n    on: {done: e, no_plan: e, gave_up: e}\n" + E
+    + "rules:\n  - {on: failed, when: (= (failures ?event.item) 0), do: {then: retry}}\n",
+    # events from outside, from skills under another name, local ones
+    "plot: p\nreceives: {go: {where: place}}\nstates:\n  a:\n    on:\n      go: {to: b, when: (exists (?i - item) (on ?i ?event.where))}\n"
+    "  b: {entry: {trigger: arm.grasp, with: {item: cup}, as: {grasped: ok}}, on: {ok: e, slipped: {to: e, emit: mine}, mine: e}}\n"
+    .replace("item: cup", "item: ?i").replace("states:", "parameters: {i: item}\nstates:") + E,
+    # a plot that never ends silently needs no `done`
+    S + "  a: {use: talk, on: {said: e}}\n" + E,
+    # a plot in a variable may end with anything
+    "plot: p\nvariables: {plan: plot}\nstates:\n  a: {use: ?plan, on: {done: e, whatever: e}}\n" + E,
+    # outcomes of plans may be passed on
+    "plot: p\nemits: {no_plan: {reason: text}, gave_up: {reason: text}}\nstates:\n  a:\n    goal: (free)\n    on:\n      done: e\n"
+    "      no_plan: {to: e, emit: no_plan, with: {reason: ?event.reason}}\n"
+    "      gave_up: {to: e, emit: gave_up, with: {reason: ?event.reason}}\n" + E,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", RIGHT)
+def test_a_right_plot_gets_none(text):
+    assert [str(finding) for finding in findings_of(text)] == []
+
+
+def test_without_schema_and_skills_the_rest_is_still_checked():
+    text = "plot: p\nwhen: (whatever ?x)\nstates:\n  a: {entry: {trigger: any.thing}, on: {ok: ende}}\n" + E.replace("e:", "end:")
+    findings = findings_of(text, None, None)
+    assert [finding.rule for finding in findings] == ["target"]
+
+
+def test_findings_about_structure_come_first_and_alone():
+    text = ITEM + "  a:\n" + GRASP + "    on: {done: nowhere}\n" + E
+    assert {finding.rule for finding in findings_of(text)} == {"target"}
+
+
+def test_all_findings_of_a_library_are_raised_as_one_error_a_line_each():
+    one = parse_plot(S + "  a: {on: {done: b}}\n" + E, "one.yaml")
+    two = parse_plot("plot: q\nstates:\n  a: {on: {done: c, error: d}}\n" + E, "two.yaml")
+    findings = validate_library(Library([one, two, *HELPERS]), SCHEMA, SKILLS)
+    with pytest.raises(PlotError) as caught:
+        raise_findings(findings)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == len(caught.value.findings) == 3
+    assert [line.split(":")[0] for line in lines] == ["one.yaml", "two.yaml", "two.yaml"]
+    assert caught.value.place == findings[0].place
+    raise_findings([])
+
+
+def test_the_helpers_of_these_tests_are_right_themselves():
+    assert [str(f) for f in validate_library(Library(HELPERS), SCHEMA, None)] == []
+
+
+def test_the_shipped_plots_pass_without_skills():
+    root = Path(__file__).parents[2]
+    library = load_library(root / "domains" / "clean_up_table" / "plots")
+    schema = Schema.from_pddl(root / "domains" / "clean_up_table" / "domain.pddl")
+    assert [str(f) for f in validate_library(library, schema, None)] == []
