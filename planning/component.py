@@ -1,0 +1,182 @@
+"""Planning as a component: triggered like any skill, answers with events, watches the plan that is carried out."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from dsc.sequencer.sequencer import CHART
+from dsc.skills import Component, Outcome, SkillCall, skill
+from knowledge_base.errors import InputError
+from knowledge_base.language.evaluation import explain, holds
+from knowledge_base.language.parser import parse_condition
+from planning.explain import why_unsolvable
+from planning.plan import Plan, PlanFound, ProvenUnsolvable, TimedOut
+from planning.plot import plot_from_plan
+from planning.problem import pose
+from planning.validation import validate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dsc.dynamic.library import Library
+    from dsc.sequencer.clock import LoopClock
+    from dsc.trace import Trace
+    from knowledge_base.facts import Change
+    from knowledge_base.language.expression import Expression
+    from knowledge_base.store import KnowledgeBase
+    from planning.domain import PlanningDomain
+    from planning.planner import Planner
+
+MAX_ATTEMPTS = 3
+"""How often to plan anew because the world changed while the planner worked."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Running:
+    plan: Plan
+    goal: Expression
+
+
+class PlanningComponent(Component):
+    """The skills behind the plot `achieve`: `plan`, `judge`, `monitor`; its parameter `step` says how far it is.
+
+    Args:
+        domain: the planning domain.
+        library: plots that implement its actions, and the holders whose rules are inherited.
+        knowledge: read only.
+        planner: finds plans.
+        clock: holds simulated time while the planner works.
+        trace: hears `plan.asked`, `plan.found`, `plan.none`, `plan.broken`.
+        busy: names of the components that carry out a skill right now; what they observe is the running
+            step's own doing and is judged when the step ends (see the contract on monitoring).
+    """
+
+    name = "planner"
+
+    def __init__(
+        self,
+        domain: PlanningDomain,
+        library: Library,
+        knowledge: KnowledgeBase,
+        planner: Planner,
+        clock: LoopClock,
+        trace: Trace,
+        busy: Callable[[], frozenset[str]],
+    ) -> None:
+        super().__init__()
+        self._domain = domain
+        self._library = library
+        self._knowledge = knowledge
+        self._planner = planner
+        self._clock = clock
+        self._trace = trace
+        self._busy = busy
+        self._running: _Running | None = None
+        self._broken: asyncio.Future[Outcome] | None = None
+        self._plans = 0
+        self._step = 1
+
+    async def configure(self, parameter: str, value: Any) -> None:
+        """`step`: number of the plan's step that begins now; what earlier steps did is judged at this moment."""
+        await super().configure(parameter, value)
+        if parameter == "step":
+            self._step = int(value)
+            self._judge_plan("the steps before")
+
+    @skill(
+        outcomes={
+            "plan_found": {"plot": "plot", "steps": "number"},
+            "goal_holds": {},
+            "no_plan": {"reason": "text", "kind": "symbol"},
+        }
+    )
+    async def plan(self, call: SkillCall, goal: str, holder: str, seconds: float) -> Outcome:
+        """Find a plan for the goal and make a plot of it.
+
+        `no_plan` has the kind `unsolvable`, `timed_out` or `failed`.
+        """
+        wanted = parse_condition(goal)
+        if holds(wanted, self._knowledge):
+            return Outcome("goal_holds")
+        self._trace.record("plan.asked", goal=goal, version=self._knowledge.version)
+        try:
+            return await self._search(call, wanted, holder, seconds)
+        except InputError as error:
+            return self._none("failed", str(error))
+
+    @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}})
+    async def judge(self, call: SkillCall, goal: str) -> Outcome:  # noqa: ARG002
+        """Say whether the goal holds, and if not, which part of it is missing."""
+        why = explain(parse_condition(goal), self._knowledge)
+        return Outcome("goal_holds") if why.truth else Outcome("goal_open", {"reason": str(why.deciding)})
+
+    @skill(outcomes={"plan_invalid": {"reason": "text", "author": "symbol"}})
+    async def monitor(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+        """Watch the plan being carried out; ends when the rest of it no longer leads to the goal.
+
+        What somebody else changes is judged at once, what the running step changes when it has ended.
+        """
+        self._broken = asyncio.get_running_loop().create_future()
+
+        def judge_change(change: Change) -> None:
+            if change.author != CHART and change.author not in self._busy():
+                self._judge_plan(change.author)
+
+        unsubscribe = self._knowledge.subscribe(judge_change)
+        try:
+            return await self._broken
+        finally:
+            unsubscribe()
+            self._broken = None
+
+    async def _search(self, call: SkillCall, goal: Expression, holder: str, seconds: float) -> Outcome:
+        for _ in range(MAX_ATTEMPTS):
+            problem = pose(self._domain, self._knowledge.snapshot(), goal)
+            with self._clock.hold():
+                answer = await self._planner.solve(problem, seconds)
+            if isinstance(answer, ProvenUnsolvable):
+                missing = why_unsolvable(self._domain, self._knowledge, goal)
+                return self._none("unsolvable", "; ".join(missing) or answer.reason)
+            if isinstance(answer, TimedOut):
+                return self._none("timed_out", f"no plan within {answer.seconds:g} s")
+            if not isinstance(answer, PlanFound):
+                return self._none("failed", answer.message)
+            if self._clock.simulated:
+                await call.clock.sleep(answer.simulated_seconds)
+            verdict = validate(answer.plan, self._domain, self._knowledge, goal)
+            if verdict.valid:
+                return self._found(answer, goal, holder)
+        return self._none("failed", f"the world changes faster than plans are made: {verdict.why}")
+
+    def _found(self, answer: PlanFound, goal: Expression, holder: str) -> Outcome:
+        self._plans += 1
+        self._step = 1
+        self._running = _Running(answer.plan, goal)
+        rules = self._library.plot(holder).rules if holder in self._library else ()
+        name = f"plan_{self._plans}"
+        plot = plot_from_plan(answer.plan, self._domain, self._library, rules, name)
+        steps = [str(step) for step in answer.plan.steps]
+        self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine)
+        return Outcome("plan_found", {"plot": plot.to_form(), "steps": len(steps)})
+
+    def _none(self, kind: str, reason: str) -> Outcome:
+        self._trace.record("plan.none", kind=kind, reason=reason)
+        return Outcome("no_plan", {"reason": reason, "kind": kind})
+
+    def _judge_plan(self, author: str) -> None:
+        why = None if self._broken is None or self._broken.done() else self._why_broken()
+        if why is not None and self._broken is not None:
+            self._trace.record("plan.broken", reason=why, author=author, step=self._step)
+            self._broken.set_result(Outcome("plan_invalid", {"reason": why, "author": author}))
+
+    def _why_broken(self) -> str | None:
+        """Why what is left of the plan no longer leads to the goal; the step at work may be half done."""
+        if self._running is None:
+            return None
+        left = self._running.plan.steps[self._step - 1 :]
+        whole = validate(Plan(left), self._domain, self._knowledge, self._running.goal)
+        if whole.valid or validate(Plan(left[1:]), self._domain, self._knowledge, self._running.goal).valid:
+            return None
+        return whole.why

@@ -1,0 +1,1 @@
+"""Planning engines and the process they run in; the only place that meets unified-planning."""

@@ -1,0 +1,142 @@
+"""Everything wired together: a domain, plots, skills, knowledge and a planner, ready to run."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Self
+
+from dsc.dynamic.library import Library
+from dsc.dynamic.selection import ACHIEVE
+from dsc.model.plot import ActionPlot
+from dsc.model.states import Budget
+from dsc.sequencer.clock import LoopClock, run_real, run_simulated
+from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.skills import Component, signatures
+from dsc.text.plots import parse_plot
+from dsc.trace import Listener, Trace
+from dsc.validation import raise_findings, validate_library
+from knowledge_base.language.parser import parse_condition
+from knowledge_base.store import KnowledgeBase
+from planning.component import PlanningComponent
+from planning.domain import PlanningDomain
+from planning.implementations import check_implementations
+from planning.planner import Planner, PlannerProcess
+
+Prepare = Callable[[Sequencer], None]
+"""Called before a run starts, e.g. to post events or to keep the sequencer at hand."""
+
+
+class Executive:
+    """A robot program that can be run.
+
+    Args:
+        domain: the planning domain, or the PDDL file it is in; its schema is the knowledge base's.
+        plots: the plots; those with `implements` carry out the domain's planning actions.
+        components: the skills.
+        knowledge: the world model; an empty one of the domain's schema if left out.
+        planner: finds plans; pyperplan in a process of its own if left out.
+
+    Raises:
+        PlotError: a plot does not pass the validator; the error has all findings.
+        InputError: the domain file is wrong, or two plots have one name.
+    """
+
+    def __init__(
+        self,
+        domain: PlanningDomain | Path | str,
+        plots: Iterable[ActionPlot],
+        components: Iterable[Component],
+        knowledge: KnowledgeBase | None = None,
+        planner: Planner | None = None,
+    ) -> None:
+        self.domain = domain if isinstance(domain, PlanningDomain) else PlanningDomain.from_pddl(domain)
+        self.components = tuple(components)
+        self.knowledge = knowledge if knowledge is not None else KnowledgeBase(self.domain.schema)
+        self.library = Library(plots)
+        if ACHIEVE not in self.library:
+            self.library.add(achieve_plot())
+        self._own_planner: PlannerProcess | None = None
+        if planner is None:
+            planner = self._own_planner = PlannerProcess()
+        self._planner = planner
+        self._listeners: list[Listener] = []
+        skills = [s for c in self.components for s in c.skills().values()]
+        skills += signatures(PlanningComponent, PlanningComponent.name).values()
+        findings = validate_library(self.library, self.domain.schema, skills)
+        raise_findings([*findings, *check_implementations(self.library, self.domain)])
+
+    def listen(self, listener: Listener) -> None:
+        """Tell `listener` every record of every run from now on."""
+        self._listeners.append(listener)
+
+    def run(
+        self,
+        plot: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        simulated: bool = True,
+        prepare: Prepare | None = None,
+    ) -> RunEnd:
+        """Run a plot to its end.
+
+        Args:
+            plot: its name.
+            arguments: values for its parameters.
+            simulated: whether time jumps from event to event; if not, it passes as on the clock on the wall.
+            prepare: see `Prepare`.
+
+        Raises:
+            InputError: the plot is unknown, or a parameter is missing or unknown.
+        """
+        runner = run_simulated if simulated else run_real
+        return runner(self.execute(plot, arguments or {}, prepare))
+
+    def achieve(self, goal: str, *, simulated: bool = True) -> RunEnd:
+        """Plan for a goal, carry the plan out, and plan again when the world disagrees.
+
+        Raises:
+            InputError: the goal is no condition.
+        """
+        parse_condition(goal)
+        budget = Budget()
+        arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
+        return self.run(ACHIEVE, arguments, simulated=simulated)
+
+    async def execute(self, plot: str, arguments: Mapping[str, Any], prepare: Prepare | None = None) -> RunEnd:
+        """As `run`, inside a loop that is there already."""
+        clock = LoopClock()
+        trace = Trace(clock.now)
+        for listener in self._listeners:
+            trace.listen(listener)
+        components: list[Component] = list(self.components)
+        sequencer = Sequencer(self.library, self.knowledge, components, clock, trace)
+        planning = PlanningComponent(
+            self.domain, self.library, self.knowledge, self._planner, clock, trace,
+            busy=lambda: sequencer.dispatcher.busy,
+        )  # fmt: skip
+        sequencer.dispatcher.deploy(planning)
+        if prepare is not None:
+            prepare(sequencer)
+        return await sequencer.run(plot, arguments)
+
+    def close(self) -> None:
+        """End the planner's process, if there is one of its own."""
+        if self._own_planner is not None:
+            asyncio.run(self._own_planner.close())
+
+    def __enter__(self) -> Self:
+        """Itself; `close` at the end."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """`close`."""
+        self.close()
+
+
+def achieve_plot() -> ActionPlot:
+    """The plot that stands in where no designed candidate fits."""
+    resource = files("planning") / "plots" / "achieve.yaml"
+    return parse_plot(resource.read_text(encoding="utf-8"), str(resource))

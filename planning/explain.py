@@ -1,0 +1,159 @@
+"""Why there is no plan: which goal facts are out of reach, and what is missing for the nearest action."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact, Value
+from knowledge_base.language.effect import Add
+from knowledge_base.language.evaluation import World, explain
+from knowledge_base.language.expression import And, Expression, substitute
+from knowledge_base.language.printer import to_text
+from planning.conditions import Every, Grounder, Literal, Residual, Some
+from planning.grounding import Reached, Rule
+from planning.plan import PlanStep
+from planning.problem import as_fact, check_goal, grounded
+from planning.relevance import effect_leaves, reachable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from planning.domain import PlanningDomain
+
+_LONGEST_CHAIN = 6
+
+
+def why_unsolvable(domain: PlanningDomain, world: World, goal: Expression) -> tuple[str, ...]:
+    """One sentence for each goal fact that no action sequence can reach even if nothing became false.
+
+    Each follows the nearest action back to what is missing in the end. If every fact is reachable alone,
+    the one sentence says so: then it is the deletions that stand in the way.
+
+    Raises:
+        InputError: as for `planning.problem.pose`.
+    """
+    check_goal(goal, world)
+    problem = grounded(domain, world, goal)
+    if problem.wanted is False:
+        return (f"{explain(goal, world).deciding} and no planning action changes that",)
+    rules = tuple(Rule.of(action, problem.grounder) for action in problem.actions)
+    possible, _ = reachable(problem.init, problem.ways)
+    known = dict.fromkeys([*_present(rules, world), *sorted(possible, key=str)])
+    causes = _Causes(rules, problem.grounder, frozenset(known), Reached(known))
+    return tuple(dict.fromkeys(causes.of(problem.wanted))) or (
+        "each goal fact can be reached by itself, but not all of them together",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Nearest:
+    """A step that would add a fact, with what it lacks: facts, conditions, and how many are unchangeable."""
+
+    step: PlanStep
+    facts: tuple[Fact, ...]
+    conditions: tuple[str, ...]
+
+    fixed: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Causes:
+    rules: tuple[Rule, ...]
+    grounder: Grounder
+    reached: frozenset[Fact]
+    index: Reached
+
+    def of(self, wanted: Residual) -> Iterator[str]:
+        """A sentence for each literal that is out of reach."""
+        match wanted:
+            case Literal():
+                if as_fact(wanted) not in self.reached:
+                    yield self.chain(wanted.fact) if wanted.positive else _stays(wanted.fact)
+            case Every(parts):
+                for part in parts:
+                    yield from self.of(part)
+            case Some(parts):
+                causes = [tuple(self.of(part)) for part in parts]
+                if all(causes):
+                    yield from itertools.chain.from_iterable(causes)
+
+    def chain(self, fact: Fact) -> str:
+        """From the fact through the nearest actions to what cannot be had."""
+        said: list[str] = []
+        agenda, seen = [fact], {fact}
+        while agenda and len(said) < _LONGEST_CHAIN:
+            here = agenda.pop(0)
+            nearest = self.nearest(here)
+            if nearest is None:
+                said.append(f"{here} does not hold, and no planning action makes it true")
+                continue
+            said.append(f"{here} needs {nearest.step}, which needs {_listed(nearest)}")
+            fresh = [missing for missing in nearest.facts if missing not in seen]
+            seen.update(fresh)
+            agenda.extend(fresh)
+        return "; ".join(said)
+
+    def nearest(self, fact: Fact) -> _Nearest | None:
+        """The action that lacks least for adding the fact; the first of the domain among equals."""
+        found = [near for rule in self.rules for near in self.ways(rule, fact)]
+        return min(found, key=_distance, default=None)
+
+    def ways(self, rule: Rule, fact: Fact) -> Iterator[_Nearest]:
+        """For each effect of the action that can be the fact, the arguments that lack least."""
+        for leaf in effect_leaves(rule.action.effect):
+            if isinstance(leaf, Add) and leaf.atom.predicate == fact.predicate:
+                start = rule.unify(leaf.atom, fact, {})
+                closest = None if start is None else self.closest(rule, start)
+                if closest is not None:
+                    yield closest
+
+    def closest(self, rule: Rule, start: dict[str, Value]) -> _Nearest | None:
+        """Give up ever more of the positive preconditions until arguments are found for the others."""
+        for given_up in range(len(rule.atoms) + 1):
+            found = [
+                self.lacking(rule, full)
+                for kept in itertools.combinations(rule.atoms, len(rule.atoms) - given_up)
+                for bindings in itertools.islice(rule.join(self.index, kept, start), 1)
+                if (full := self.completed(rule, bindings)) is not None
+            ]
+            if found:
+                return min(found, key=_distance)
+        return None
+
+    def completed(self, rule: Rule, bindings: dict[str, Value]) -> dict[str, Value] | None:
+        """Parameters that nothing decides stand for the first object of their type."""
+        first = {name: next(iter(objects), None) for name, objects in rule.allowed.items()}
+        full = {name: bindings.get(name, value) for name, value in first.items()}
+        return {k: v for k, v in full.items() if v is not None} if None not in full.values() else None
+
+    def lacking(self, rule: Rule, bindings: dict[str, Value]) -> _Nearest:
+        step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in rule.action.parameters))
+        needed = [self.grounder.fact(atom, bindings) for atom in rule.atoms]
+        precondition = rule.action.precondition
+        others = precondition.parts if isinstance(precondition, And) else (precondition,)
+        unmet = [c for c in others if c not in rule.atoms and self.grounder.residual(c, bindings) is False]
+        missing = tuple(fact for fact in needed if fact not in self.reached)
+        fixed = len(unmet) + sum(fact.predicate not in self.grounder.changing for fact in missing)
+        return _Nearest(step, missing, tuple(to_text(substitute(c, bindings)) for c in unmet), fixed)
+
+
+def _present(rules: Iterable[Rule], world: World) -> Iterator[Fact]:
+    """The facts that hold now, of all predicates that the actions ask for."""
+    for predicate in dict.fromkeys(atom.predicate for rule in rules for atom in rule.atoms):
+        arity = len(world.schema.predicates[predicate].parameters)
+        for args in world.match(predicate, (None,) * arity):
+            yield Fact(predicate, tuple(args))
+
+
+def _distance(near: _Nearest) -> tuple[int, int]:
+    return len(near.facts) + len(near.conditions), near.fixed
+
+
+def _listed(nearest: _Nearest) -> str:
+    return " and ".join([*map(str, nearest.facts), *nearest.conditions]) or "more than can hold together"
+
+
+def _stays(fact: Fact) -> str:
+    return f"{fact} holds, and no planning action makes it false"

@@ -1,0 +1,42 @@
+"""Planning actions and the plots that carry them out fit together, checked before anything is planned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dsc.dynamic.library import Library
+from dsc.errors import Finding
+from knowledge_base.errors import SchemaError, UnknownNameError
+from planning.domain import PlanningDomain
+
+
+def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[Finding]:
+    """Findings: an unknown action, a parameter the action does not have, an action without any plot.
+
+    A domain none of whose actions is implemented is fine: it is then used without a planner.
+    """
+    implemented = set()
+    for plot in library:
+        if plot.implements is None:
+            continue
+        implemented.add(plot.implements)
+        action = domain.actions.get(plot.implements)
+        if action is None:
+            unknown = UnknownNameError(
+                f"the domain '{domain.name}' has no planning action '{plot.implements}'",
+                place=plot.place(("implements",)), found=plot.implements, valid=domain.actions,
+            )  # fmt: skip
+            yield Finding(unknown, "known planning action")
+            continue
+        names = [parameter.name for parameter in action.parameters]
+        for name, parameter in plot.parameters.items():
+            if name not in names and parameter.default is None:
+                missing = UnknownNameError(
+                    f"planning action '{action.name}' has no parameter '?{name}' to give to the plot",
+                    place=plot.place(("parameters", name)), found=name, valid=names,
+                )  # fmt: skip
+                yield Finding(missing, "parameters of the action")
+    for name, action in domain.actions.items():
+        if implemented and name not in implemented:
+            error = SchemaError(f"no plot implements the planning action '{name}'", place=action.place)
+            yield Finding(error, "every action has a plot", f"add a plot with `implements: {name}`")

@@ -1,0 +1,150 @@
+"""A planning problem as a value: ground STRIPS (typed PDDL after grounding), the form every engine takes.
+
+Everything is positive: where a condition needs `(not (p a))`, the fact `(not-p a)` is carried along instead
+(positive normal form); its predicate is written `not p`, with a blank, so that no declared name can clash.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from knowledge_base.facts import Fact
+from planning.plan import Plan, PlanStep
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+
+@dataclass(frozen=True, slots=True)
+class GroundAction:
+    """One way to take one plan step.
+
+    A step whose precondition is a disjunction, or that has conditional effects, has several of these.
+
+    Attributes:
+        step: what it is in the plan; `None` for bookkeeping of a disjunctive goal, which no plan shows.
+        precondition: facts that must hold before.
+        adds: facts that hold afterwards.
+        deletes: facts that hold no longer, none of them in `adds`.
+    """
+
+    step: PlanStep | None
+    precondition: tuple[Fact, ...]
+    adds: tuple[Fact, ...]
+    deletes: tuple[Fact, ...]
+
+    def applicable(self, state: Collection[Fact]) -> bool:
+        """Whether the precondition holds in `state`."""
+        return all(needed in state for needed in self.precondition)
+
+    def apply(self, state: Iterable[Fact]) -> frozenset[Fact]:
+        """The state after it."""
+        return (frozenset(state) - frozenset(self.deletes)) | frozenset(self.adds)
+
+    def facts(self) -> tuple[Fact, ...]:
+        """Every fact it mentions."""
+        return (*self.precondition, *self.adds, *self.deletes)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What an engine is asked; made by `planning.problem.pose`.
+
+    Attributes:
+        domain: the planning domain's name.
+        objects: the objects it is about, name -> type.
+        init: the facts that hold now, as far as they matter.
+        goal: the facts that shall hold; none left means the goal already holds.
+        actions: the ground actions that can contribute.
+        unreachable: goal facts, as text, that no sequence of actions can make true even if nothing ever
+            became false; if there are any, the problem is proven unsolvable without asking an engine.
+        whole: the problem without the slice of interchangeable objects, for when the slice has no plan;
+            `None` if nothing was sliced off.
+    """
+
+    domain: str
+    objects: Mapping[str, str]
+    init: tuple[Fact, ...]
+    goal: tuple[Fact, ...]
+    actions: tuple[GroundAction, ...]
+    unreachable: tuple[str, ...] = ()
+    whole: Problem | None = None
+
+    @property
+    def simulated_seconds(self) -> float:
+        """A planning duration for simulated time, from the problem's size alone (never from a clock).
+
+        0.1 s to pose it, 1 ms for each ground action and 20 ms for each goal fact: the order of magnitude
+        that the embedded engine needs.
+        """
+        return round(0.1 + 0.001 * len(self.actions) + 0.02 * len(self.goal), 3)
+
+    def plan(self, chosen: Sequence[int]) -> Plan | str:
+        """The plan that executes the actions with these indices, or why that is no solution."""
+        state = frozenset(self.init)
+        for index in chosen:
+            if not 0 <= index < len(self.actions):
+                return f"there is no action number {index}"
+            action = self.actions[index]
+            if not action.applicable(state):
+                missing = next(needed for needed in action.precondition if needed not in state)
+                return f"{action.step} is not applicable, {missing} does not hold"
+            state = action.apply(state)
+        missing_goals = [wanted for wanted in self.goal if wanted not in state]
+        if missing_goals:
+            return f"goal fact {missing_goals[0]} does not hold at the end"
+        steps = (self.actions[index].step for index in chosen)
+        return Plan(tuple(step for step in steps if step is not None))
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON data, exactly reversible; facts are listed once and referred to by number."""
+        number: dict[Fact, int] = {}
+
+        def refer(facts: Iterable[Fact]) -> list[int]:
+            return [number.setdefault(one, len(number)) for one in facts]
+
+        rest = {
+            "domain": self.domain,
+            "objects": dict(self.objects),
+            "init": refer(self.init),
+            "goal": refer(self.goal),
+            "actions": [
+                [
+                    None if a.step is None else [a.step.action, *a.step.args],
+                    refer(a.precondition),
+                    refer(a.adds),
+                    refer(a.deletes),
+                ]
+                for a in self.actions
+            ],
+            "unreachable": list(self.unreachable),
+            "whole": None if self.whole is None else self.whole.to_json(),
+        }
+        return {"facts": [[f.predicate, *f.args] for f in number], **rest}
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> Problem:
+        """The problem that `to_json` wrote."""
+        facts = [Fact(predicate, tuple(args)) for predicate, *args in data["facts"]]
+
+        def read(numbers: Iterable[int]) -> tuple[Fact, ...]:
+            return tuple(facts[n] for n in numbers)
+
+        return Problem(
+            domain=data["domain"],
+            objects=dict(data["objects"]),
+            init=read(data["init"]),
+            goal=read(data["goal"]),
+            actions=tuple(
+                GroundAction(
+                    None if step is None else PlanStep(step[0], tuple(step[1:])),
+                    read(pre),
+                    read(add),
+                    read(gone),
+                )
+                for step, pre, add, gone in data["actions"]
+            ),
+            unreachable=tuple(data["unreachable"]),
+            whole=None if data["whole"] is None else Problem.from_json(data["whole"]),
+        )

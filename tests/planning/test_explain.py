@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import pytest
+
+from knowledge_base.errors import UnknownNameError
+from knowledge_base.facts import Delta, fact
+from knowledge_base.language.parser import parse_condition
+from planning.explain import why_unsolvable
+
+ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
+
+
+def without(world, *facts):
+    world.apply(Delta(removed=facts), author="test")
+    return world
+
+
+@pytest.mark.parametrize(
+    ("lost", "chain"),
+    [
+        (
+            fact("graspable", "cup1"),
+            ["(tidy cup1) needs", "(pick-up cup1 table), which needs (graspable cup1)"],
+        ),
+        (fact("passable", "bin"), ["(tidy crisp1) needs (throw-away crisp1 bin)", "needs (passable bin)"]),
+        (fact("goes-to", "crisp1", "bin"), ["(tidy crisp1) needs", "no planning action makes it true"]),
+        (fact("lies-at", "can1", "table"), ["(tidy can1) needs", "(holding can1) needs", "(lies-at can1"]),
+    ],
+)
+def test_the_chain_ends_at_what_is_missing(clean_up, table, lost, chain):
+    [why] = why_unsolvable(clean_up, without(table(2, 1, ["one"]), lost), ALL_TIDY)
+    assert all(part in why for part in chain)
+
+
+def test_every_unreachable_goal_fact_has_a_sentence(clean_up, table):
+    world = without(table(3), fact("graspable", "cup1"), fact("graspable", "cup3"))
+    assert [why.split(" needs")[0] for why in why_unsolvable(clean_up, world, ALL_TIDY)] == [
+        "(tidy cup1)",
+        "(tidy cup3)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("goal", "why"),
+    [
+        ("(missing cup1)", "(missing cup1) does not hold, and no planning action makes it true"),
+        ("(not (seen cup1))", "(seen cup1) holds, and no planning action makes it false"),
+        ("(or (missing cup1) (holding cup1))", "not all of them together"),
+        ("(< 3 2)", "no planning action changes that"),
+    ],
+)
+def test_goals_that_no_action_affects(clean_up, table, goal, why):
+    assert why in why_unsolvable(clean_up, table(1), parse_condition(goal))[0]
+
+
+def test_a_condition_that_cannot_change_is_named(world_of):
+    from planning.domain import PlanningDomain
+
+    domain = PlanningDomain.parse("""(define (domain d) (:types lamp) (:predicates (on ?l - lamp))
+      (:functions (limit))
+      (:action press :parameters (?l - lamp) :precondition (< 3 (limit)) :effect (on ?l)))""")
+    [why] = why_unsolvable(domain, world_of(domain.schema, {"l1": "lamp"}), parse_condition("(on l1)"))
+    assert why == "(on l1) needs (press l1), which needs (< 3 (limit))"
+
+
+def test_a_typo_in_the_goal_is_an_error(clean_up, table):
+    with pytest.raises(UnknownNameError, match="'tidy'"):
+        why_unsolvable(clean_up, table(1), parse_condition("(tidi cup1)"))

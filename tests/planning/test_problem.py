@@ -1,0 +1,323 @@
+from __future__ import annotations
+
+import itertools
+import json
+from collections import deque
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.facts import Delta, fact
+from knowledge_base.language.evaluation import holds
+from knowledge_base.language.parser import parse_condition
+from knowledge_base.overlay import Overlay
+from knowledge_base.store import KnowledgeBase
+from planning.domain import PlanningDomain
+from planning.errors import UnsupportedActionError, UnsupportedGoalError
+from planning.plan import PlanStep
+from planning.problem import pose
+from planning.strips import Problem
+from planning.validation import validate
+
+ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
+
+SWITCHES = """(define (domain switches)
+  (:types lamp)
+  (:predicates (on ?l - lamp) (broken ?l - lamp) (touched ?l - lamp) (quiet))
+  (:functions (presses) (limit))
+  (:action press :parameters (?l - lamp)
+    :precondition (and (not (broken ?l)) (< (limit) 5))
+    :effect (and (touched ?l) (increase (presses) 1)
+                 (when (on ?l) (not (on ?l))) (when (not (on ?l)) (on ?l))))
+  (:action hush :parameters ()
+    :precondition (or (forall (?l - lamp) (not (on ?l))) (exists (?l - lamp) (broken ?l)))
+    :effect (quiet))
+  (:action count :parameters (?l - lamp)
+    :precondition (> (presses) 3)
+    :effect (broken ?l)))
+"""
+
+
+def breadth_first(problem):
+    """A shortest sequence of action numbers, or None; by the book, for small problems."""
+    start = frozenset(problem.init)
+    agenda, seen = deque([(start, ())]), {start}
+    while agenda:
+        state, taken = agenda.popleft()
+        if all(wanted in state for wanted in problem.goal):
+            return taken
+        for number, action in enumerate(problem.actions):
+            if action.applicable(state) and (after := action.apply(state)) not in seen:
+                seen.add(after)
+                agenda.append((after, (*taken, number)))
+    return None
+
+
+def solution(problem):
+    """A plan for the slice or else the whole, as a planner would find one."""
+    if problem.unreachable:
+        return None
+    chosen = breadth_first(problem)
+    if chosen is not None:
+        return problem.plan(chosen)
+    return None if problem.whole is None else solution(problem.whole)
+
+
+@pytest.fixture(scope="module")
+def switches():
+    return PlanningDomain.parse(SWITCHES.replace("(> (presses) 3)", "(on ?l)"))
+
+
+def lamps(domain, *facts, number=2, limit=0):
+    kb = KnowledgeBase(domain.schema)
+    nodes = {f"l{i + 1}": "lamp" for i in range(number)}
+    kb.apply(Delta(nodes=nodes, added=facts, values={fact("limit"): limit}), author="test")
+    return kb
+
+
+def plan_for(domain, world, goal):
+    problem = pose(domain, world, parse_condition(goal))
+    plan = solution(problem)
+    if plan is not None:
+        assert validate(plan, domain, world, parse_condition(goal)).valid
+    return plan
+
+
+# ---- the slice -------------------------------------------------------------------------------------------
+
+
+def test_surfaces_that_nothing_lies_on_are_left_out(clean_up, table):
+    problem = pose(clean_up, table(cups=2, robot_at="table"), ALL_TIDY)
+    assert {"shelf", "floor", "operator", "bin"}.isdisjoint(problem.objects)
+    assert {"shelf", "floor"} <= set(problem.whole.objects)
+
+
+def test_a_surface_that_something_lies_on_stays(clean_up, table):
+    world = table(cups=2)
+    world.apply(
+        Delta(removed=(fact("lies-at", "cup1", "table"),), added=(fact("lies-at", "cup1", "shelf"),)),
+        author="test",
+    )
+    problem = pose(clean_up, world, ALL_TIDY)
+    assert "shelf" in problem.objects
+    assert "floor" not in problem.objects
+
+
+def test_a_surface_in_the_goal_stays(clean_up, table):
+    problem = pose(clean_up, table(cups=1), parse_condition("(lies-at cup1 shelf)"))
+    assert "shelf" in problem.objects
+    assert len(breadth_first(problem)) == 4
+
+
+def test_what_the_goal_does_not_ask_about_is_left_out(clean_up, table):
+    problem = pose(clean_up, table(cups=3), parse_condition("(robot-at shelf)"))
+    assert {a.step.action for a in problem.actions} == {"drive"}
+    assert set(problem.objects) == {"operator", "shelf"}
+    assert problem.init == (fact("robot-at", "operator"),)
+
+
+def test_a_road_that_leads_only_through_an_empty_place_is_found(world_of):
+    domain = PlanningDomain.parse("""(define (domain roads) (:types place)
+      (:predicates (at ?p - place) (road ?a ?b - place))
+      (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
+        :effect (and (not (at ?a)) (at ?b))))""")
+    roads = [fact("road", *pair) for pair in ("ab", "bc", "cd")]
+    world = world_of(domain.schema, dict.fromkeys("abcdef", "place"), [fact("at", "a"), *roads])
+    plan = plan_for(domain, world, "(at d)")
+    assert [step.args for step in plan.steps] == [("a", "b"), ("b", "c"), ("c", "d")]
+
+
+def test_when_a_stand_in_is_not_enough_the_whole_problem_is_solved(world_of):
+    """Two pegs look alike, but a ring that covers another needs a place of its own."""
+    domain = PlanningDomain.parse("""(define (domain pegs) (:types peg ring)
+      (:predicates (at ?r - ring ?p - peg) (covers ?a ?b - ring) (done ?r - ring))
+      (:action move :parameters (?r - ring ?a ?b - peg) :precondition (at ?r ?a)
+        :effect (and (not (at ?r ?a)) (at ?r ?b)))
+      (:action copy :parameters (?r - ring ?a ?b - peg) :precondition (at ?r ?a) :effect (at ?r ?b))
+      (:action drop :parameters (?r - ring ?a ?b - peg) :precondition (and (at ?r ?a) (at ?r ?b))
+        :effect (and (not (at ?r ?a)) (done ?r))))""")
+    world = world_of(domain.schema, {"a": "peg", "b": "peg", "r": "ring"}, [fact("at", "r", "a")])
+    goal = "(and (done r) (at r a))"
+    problem = pose(domain, world, parse_condition(goal))
+    assert problem.whole is not None
+    assert breadth_first(problem) is None
+    assert len(plan_for(domain, world, goal).steps) >= 2
+
+
+def test_posing_leaves_the_world_alone(clean_up, table):
+    world = table(cups=3)
+    before = (world.version, list(world.facts()))
+    pose(clean_up, world, ALL_TIDY)
+    assert (world.version, list(world.facts())) == before
+
+
+def test_the_same_world_gives_the_same_problem(clean_up, table):
+    one = pose(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
+    assert one == pose(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
+
+
+def test_a_problem_is_json_and_back(clean_up, table):
+    problem = pose(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
+    assert problem.whole is not None
+    assert Problem.from_json(json.loads(json.dumps(problem.to_json()))) == problem
+
+
+def test_the_simulated_duration_grows_with_the_problem(clean_up, table):
+    small, large = (pose(clean_up, table(cups=n), ALL_TIDY).simulated_seconds for n in (2, 6))
+    assert 0 < small < large
+
+
+# ---- what conditions may say ------------------------------------------------------------------------------
+
+
+def test_a_goal_that_holds_needs_nothing(switches):
+    problem = pose(switches, lamps(switches, fact("on", "l1")), parse_condition("(on l1)"))
+    assert problem.goal == ()
+    assert problem.unreachable == ()
+
+
+@pytest.mark.parametrize(
+    ("goal", "steps"),
+    [
+        ("(not (on l1))", 1),
+        ("(forall (?l - lamp) (not (on ?l)))", 1),
+        ("(forall (?l - lamp) (on ?l))", 1),
+        ("(exists (?l - lamp) (touched ?l))", 1),
+        ("(and (touched l1) (on l1))", 2),
+        ("(or (touched l1) (broken l2))", 1),
+        ("(or (not (on l1)) (touched l2))", 1),
+        ("(and (or (touched l1) (touched l2)) (or (not (on l1)) (broken l2)))", 1),
+        ("(imply (touched l2) (on l1))", 0),
+        ("(imply (on l1) (and (on l2) (quiet)))", 1),
+        ("(and (quiet) (on l1))", 2),
+        ("(and (= l1 l1) (!= l1 l2) (lamp l1) (< (limit) 2) (on l2))", 1),
+        ("(forall (?l - lamp) (or (= ?l l1) (on ?l)))", 1),
+        ("(or (< 3 2) (on l2))", 1),
+        ("(and)", 0),
+    ],
+)
+def test_goals_of_every_form_are_reached(switches, goal, steps):
+    assert len(plan_for(switches, lamps(switches, fact("on", "l1")), goal).steps) == steps
+
+
+@pytest.mark.parametrize(
+    "goal", ["(or)", "(= l1 l2)", "(not (touched l3))", "(or (not (touched l3)) (not (broken l2)))"]
+)
+def test_goals_that_cannot_be_reached_say_so(switches, goal):
+    world = lamps(
+        switches, *(fact(*f) for f in (("on", "l1"), ("touched", "l3"), ("broken", "l2"))), number=3
+    )
+    assert pose(switches, world, parse_condition(goal)).unreachable == (goal,)
+
+
+def test_a_disjunct_that_is_undone_later_does_not_count(switches):
+    """(on l1) holds now, and pressing it makes it false: the goal needs the other one."""
+    world = lamps(switches, fact("on", "l1"), fact("broken", "l2"))
+    plan = plan_for(switches, world, "(and (touched l1) (or (on l1) (on l2)))")
+    assert plan.steps == (PlanStep("press", ("l1",)),) * 2
+
+
+def test_conditions_that_no_action_changes_are_decided_at_once(switches):
+    assert plan_for(switches, lamps(switches, limit=9), "(on l1)") is None
+
+
+def test_numbers_that_actions_change_are_no_goals(switches):
+    with pytest.raises(UnsupportedGoalError, match=r"\(> \(presses\) 3\)"):
+        pose(switches, lamps(switches), parse_condition("(> (presses) 3)"))
+
+
+def test_an_action_that_compares_such_a_number_is_named():
+    domain = PlanningDomain.parse(SWITCHES, "switches.pddl")
+    with pytest.raises(UnsupportedActionError, match="'count' compares") as caught:
+        pose(domain, lamps(domain), parse_condition("(broken l1)"))
+    assert caught.value.place.source == "switches.pddl"
+
+
+def test_an_action_that_does_not_matter_may_do_anything():
+    domain = PlanningDomain.parse(SWITCHES.replace("(not (broken ?l))", "(and)"))
+    assert len(plan_for(domain, lamps(domain), "(on l1)").steps) == 1
+
+
+def test_too_many_conditional_effects_are_told():
+    domain = PlanningDomain.parse("""(define (domain bags) (:types thing)
+      (:predicates (in ?t - thing) (moved ?t - thing))
+      (:action put :parameters (?t - thing) :effect (in ?t))
+      (:action carry :effect (forall (?t - thing) (when (in ?t) (moved ?t)))))""")
+    kb = KnowledgeBase(domain.schema)
+    kb.apply(Delta(nodes={f"t{i}": "thing" for i in range(9)}), author="test")
+    with pytest.raises(UnsupportedActionError, match="'carry' has 9 conditional effects"):
+        pose(domain, kb, parse_condition("(moved t1)"))
+
+
+def test_a_free_variable_is_an_error(clean_up, table):
+    with pytest.raises(InputError, match="exists"):
+        pose(clean_up, table(cups=1), parse_condition("(tidy ?i)"))
+
+
+@pytest.mark.parametrize(
+    ("goal", "nearest"), [("(tidi cup1)", "tidy"), ("(tidy cupp1)", "cup1"), ("(robot-at snk)", "sink")]
+)
+def test_an_unknown_name_in_a_goal_names_the_nearest(clean_up, table, goal, nearest):
+    with pytest.raises(UnknownNameError, match=f"'{nearest}'"):
+        pose(clean_up, table(cups=1), parse_condition(goal))
+
+
+# ---- exactness --------------------------------------------------------------------------------------------
+
+_ATOMS = ("(p ?x)", "(q ?x)", "(p a)", "(q b)", "(r)")
+_atom = st.sampled_from(_ATOMS)
+_literal = st.one_of(_atom, _atom.map("(not {})".format))
+_condition = st.recursive(
+    _literal,
+    lambda inner: st.builds("({} {} {})".format, st.sampled_from(["and", "or", "imply"]), inner, inner),
+    max_leaves=3,
+)
+_change = st.one_of(_literal, st.builds("(when {} {})".format, _literal, _literal))
+_action = st.tuples(_condition, st.lists(_change, min_size=1, max_size=3))
+_goal = _condition.map(lambda c: c.replace("?x", "c"))
+_GROUND = [fact(p, o) for p in "pq" for o in "abc"] + [fact("r")]
+
+
+def _random_domain(actions):
+    texts = [
+        f"(:action a{i} :parameters (?x - thing) :precondition {condition} :effect (and {' '.join(changes)}))"
+        for i, (condition, changes) in enumerate(actions)
+    ]
+    return PlanningDomain.parse(
+        "(define (domain d) (:types thing) (:constants a b c - thing)"
+        f" (:predicates (p ?t - thing) (q ?t - thing) (r)) {' '.join(texts)})"
+    )
+
+
+def _solvable(domain, world, goal):
+    """Search in the domain's own terms, without posing a problem."""
+    steps = [PlanStep(name, (arg,)) for name, arg in itertools.product(domain.actions, "abc")]
+    agenda, seen = [frozenset(world.facts())], set()
+    while agenda:
+        state = agenda.pop()
+        if state in seen:
+            continue
+        seen.add(state)
+        now = KnowledgeBase(domain.schema)
+        now.apply(Delta(added=tuple(state)), author="test")
+        if holds(goal, now):
+            return True
+        for step in steps:
+            if domain.applicable(step, now):
+                ahead = Overlay(now)
+                ahead.apply(domain.effects(step, now))
+                agenda.append(frozenset(f for f in _GROUND if ahead.holds(f.predicate, f.args)))
+    return False
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(_action, min_size=1, max_size=3), st.sets(st.sampled_from(_GROUND)), _goal)
+def test_a_posed_problem_has_a_plan_exactly_if_there_is_one(actions, present, goal_text):
+    domain, goal = _random_domain(actions), parse_condition(goal_text)
+    world = KnowledgeBase(domain.schema)
+    world.apply(Delta(added=tuple(sorted(present, key=str))), author="test")
+    plan = solution(pose(domain, world, goal))
+    assert (plan is not None) == _solvable(domain, world, goal)
+    assert plan is None or validate(plan, domain, world, goal).valid
