@@ -1,0 +1,1 @@
+"""Ready worlds: PDDL, plots, skills and a simulation each."""

@@ -1,0 +1,208 @@
+"""What stands on the table: cups, cans and crisp cans, what goes into what, and where each one is."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from domains.clean_up_table.places import PLACES, SURFACES
+from knowledge_base.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+CUP, CAN, CRISP_CAN = "cup", "can", "crisp-can"
+KINDS = (CUP, CAN, CRISP_CAN)
+"""Kinds of items; the names are the planning domain's types."""
+
+DESTINATION_OF = {CUP: "sink", CAN: "bin", CRISP_CAN: "bin"}
+SIZES = {"small": 1, "large": 2}
+"""How many cans a crisp can takes, by its size."""
+
+ROOMS = ("none", "one", "two")
+"""The planning domain's names for 0, 1 and 2 units of free room."""
+
+HAND = "hand"
+RESERVED = frozenset({*PLACES, *ROOMS, HAND})
+_NAME = re.compile(r"[a-z][a-z0-9_-]{0,59}")
+
+
+def check_name(name: str) -> None:
+    """Raise `InputError` unless `name` can name an item in PDDL and is not a place or a room."""
+    if not _NAME.fullmatch(name):
+        usual = re.sub(r"[^a-z0-9_-]+", "_", name.lower())
+        raise InputError(
+            f"'{name}' cannot name an item (lower-case letters, digits, '_', '-'; a letter first; up to 60)",
+            found=name,
+            valid=[usual] if _NAME.fullmatch(usual) else [],
+        )
+    if name in RESERVED:
+        raise InputError(f"'{name}' cannot name an item: it is taken", found=name)
+
+
+def check_behind(name: str, fronts: Mapping[str, str | None]) -> None:
+    """Raise `InputError` unless the item called `name` is behind nothing or behind an item that can hide it.
+
+    Args:
+        name: the item.
+        fronts: for every item's name the one it is behind, or `None`.
+    """
+    passed = {name}
+    front = fronts[name]
+    while front is not None:
+        if front not in fronts:
+            raise UnknownNameError(
+                f"'{name}' is behind '{front}', which does not exist", found=front, valid=fronts
+            )
+        if front in passed:
+            raise InputError(f"'{name}' is behind items that stand behind each other", found=front)
+        passed.add(front)
+        front = fronts[front]
+
+
+@dataclass(slots=True)
+class Item:
+    """One item and where it is.
+
+    Attributes:
+        name: unique; never a place.
+        kind: one of `KINDS`.
+        capacity: how many items it takes directly.
+        where: exactly one of: a surface, the carrier's name, `HAND`, or the destination it was thrown into.
+        behind: the item that hides it while both stand on the same surface.
+        on_table: whether it ever stood on the table, and so counts for the goal.
+        seen: whether the camera ever reported it.
+        closed: units of room given up by looking in (`check-room`); only a fall opens them again.
+    """
+
+    name: str
+    kind: str
+    capacity: int
+    where: str
+    behind: str | None = None
+    on_table: bool = False
+    seen: bool = False
+    closed: int = 0
+
+    @property
+    def destination(self) -> str:
+        """Where it has to be thrown."""
+        return DESTINATION_OF[self.kind]
+
+    @property
+    def disposed(self) -> bool:
+        """Whether it is where it has to be thrown."""
+        return self.where == self.destination
+
+    def fits(self, carrier: Item) -> bool:
+        """Whether it goes into such a carrier, room permitting."""
+        return self is not carrier and (self.kind, carrier.kind) in {(CUP, CUP), (CAN, CRISP_CAN)}
+
+
+def new_item(
+    kind: str, name: str, *, surface: str = "table", size: str = "small", behind: str | None = None
+) -> Item:
+    """An item standing on a surface; `size` matters for a crisp can only.
+
+    Raises:
+        UnknownNameError: no such kind, size or surface.
+        InputError: the name cannot name an item.
+    """
+    check_name(name)
+    for what, found, valid in (("kind", kind, KINDS), ("size", size, SIZES), ("surface", surface, SURFACES)):
+        if found not in valid:
+            raise UnknownNameError(f"there is no {what} '{found}'", found=found, valid=valid)
+    capacity = {CUP: 1, CAN: 0, CRISP_CAN: SIZES[size]}[kind]
+    return Item(name, kind, capacity, surface, behind, on_table=surface == "table")
+
+
+class Inventory:
+    """All items, in the order they came.
+
+    Raises:
+        InputError: two items of one name, or an item behind one that does not exist or is behind it.
+    """
+
+    def __init__(self, items: Iterable[Item] = ()) -> None:
+        self._items: dict[str, Item] = {}
+        for item in items:
+            self._put(item)
+        self._check_behind()
+
+    def __iter__(self) -> Iterator[Item]:
+        return iter(self._items.values())
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __getitem__(self, name: str) -> Item:
+        return self._items[name]
+
+    def get(self, name: str) -> Item | None:
+        """The item of that name, if there is one."""
+        return self._items.get(name)
+
+    def add(self, item: Item) -> None:
+        """Put a new item where it says it is; a name that is taken is an `InputError`."""
+        check_behind(item.name, {**{known.name: known.behind for known in self}, item.name: item.behind})
+        self._put(item)
+
+    def _put(self, item: Item) -> None:
+        if item.name in self._items:
+            raise InputError(f"there is already an item '{item.name}'", found=item.name)
+        self._items[item.name] = item
+
+    def _check_behind(self) -> None:
+        fronts = {item.name: item.behind for item in self}
+        for name in fronts:
+            check_behind(name, fronts)
+
+    def free_name(self, kind: str) -> str:
+        """The first of cup1, cup2, … (can1, …, crisp_can1, …) that nothing is called."""
+        stem, number = kind.replace("-", "_"), 1
+        while f"{stem}{number}" in self._items:
+            number += 1
+        return f"{stem}{number}"
+
+    @property
+    def held(self) -> Item | None:
+        """The item in the hand itself, without what is in it."""
+        return next((item for item in self if item.where == HAND), None)
+
+    def lying(self, surface: str) -> list[Item]:
+        """The items directly on a surface, hidden ones too."""
+        return [item for item in self if item.where == surface]
+
+    def contents(self, carrier: Item) -> list[Item]:
+        """The items directly inside a carrier."""
+        return [item for item in self if item.where == carrier.name]
+
+    def stack(self, item: Item) -> list[Item]:
+        """The item and everything in it, carriers before their contents."""
+        return [item, *(deep for inner in self.contents(item) for deep in self.stack(inner))]
+
+    def outermost(self, item: Item) -> Item:
+        """The carrier that an item is in, or is in the carrier of, …; the item itself when it is in none."""
+        carrier = self._items.get(item.where)
+        return item if carrier is None else self.outermost(carrier)
+
+    def free_room(self, carrier: Item) -> int:
+        """How many more items physically go directly into a carrier."""
+        return carrier.capacity - len(self.contents(carrier))
+
+    def room(self, carrier: Item) -> str:
+        """The room the robot still means to use, as the planning domain names it."""
+        return ROOMS[max(0, self.free_room(carrier) - carrier.closed)]
+
+    def hidden(self, item: Item) -> bool:
+        """Whether the item it is behind stands on the same surface."""
+        front = self._items.get(item.behind) if item.behind else None
+        return front is not None and item.where in SURFACES and front.where == item.where
+
+    def move(self, item: Item, where: str) -> None:
+        """Put an item, with everything in it, somewhere else."""
+        item.where = where
+        if self.outermost(item).where == "table":
+            for moved in self.stack(item):
+                moved.on_table = True

@@ -1,0 +1,174 @@
+"""The room the robot works in: its state, what else may happen there, and the truth about it.
+
+Pure data and rules: no clock, no asyncio. The robot's verbs are in `world`.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Self
+
+from domains.clean_up_table import truth
+from domains.clean_up_table.faults import ITEM_ADDED, ITEM_MOVED, Draw, Faults, FiredFault
+from domains.clean_up_table.items import CAN, CUP, Inventory, Item, new_item
+from domains.clean_up_table.places import OPERATOR, PLACES, SURFACES
+from domains.clean_up_table.results import Result
+from domains.clean_up_table.scene import scene
+from domains.simulation import choose
+from knowledge_base.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+_MOVES = {"table": "shelf", "shelf": "table"}
+
+
+class Room:
+    """Places, items, the robot's place, the faults so far and the actions done.
+
+    Attributes:
+        items: every item and where it is; `items.held` is in the robot's one hand.
+        faults: decides on faults and remembers them.
+        robot_at: the place the robot is at.
+        trips: how often something was thrown away.
+        said: what the robot said, in order.
+        done: the first result of every action executed, by action id.
+    """
+
+    def __init__(
+        self, items: Iterable[Item] = (), *, seed: int = 0, faults: float = 0.0, robot_at: str = OPERATOR
+    ) -> None:
+        if robot_at not in PLACES:
+            raise UnknownNameError(f"there is no place '{robot_at}'", found=robot_at, valid=PLACES)
+        # The room changes its items: copies keep two rooms made from one list apart.
+        self.items = Inventory(copy.copy(item) for item in items)
+        self.faults = Faults(seed, faults)
+        self.robot_at = robot_at
+        self.trips = 0
+        self.said: list[str] = []
+        self.done: dict[str, Result] = {}
+
+    # Somebody else
+
+    def add_item(
+        self,
+        kind: str,
+        name: str | None = None,
+        surface: str = "table",
+        *,
+        size: str = "small",
+        behind: str | None = None,
+    ) -> str:
+        """Somebody puts a new item on a surface; its name.
+
+        Args:
+            kind: `cup`, `can` or `crisp-can`.
+            name: a name of its own; the next free number of its kind when left out.
+            surface: where it stands.
+            size: `small` or `large`, for a crisp can.
+            behind: the item that hides it.
+
+        Raises:
+            InputError: an unknown kind, size, surface or front item, or a name that is taken.
+        """
+        name = name or self.items.free_name(kind)
+        self.items.add(new_item(kind, name, surface=surface, size=size, behind=behind))
+        return name
+
+    def move_item(self, name: str, surface: str) -> None:
+        """Somebody moves an item, with everything in it, to another surface.
+
+        Raises:
+            InputError: no such item or surface, or the item does not lie on a surface itself.
+        """
+        item = self.items.get(name)
+        if item is None:
+            known = [known.name for known in self.items]
+            raise UnknownNameError(f"there is no item '{name}'", found=name, valid=known)
+        if surface not in SURFACES:
+            raise UnknownNameError(f"there is no surface '{surface}'", found=surface, valid=SURFACES)
+        if item.where not in SURFACES:
+            raise InputError(f"only an item on a surface can be moved; '{name}' is at '{item.where}'")
+        self.items.move(item, surface)
+
+    def _interferences(self, keep: str | None) -> dict[str, bool]:
+        """What somebody else may do during a call, `keep` left alone; none of it is permanent."""
+        kinds = []
+        if self._movable(keep) and self.faults.left_for(ITEM_MOVED):
+            kinds.append(ITEM_MOVED)
+        if self.faults.left_for(ITEM_ADDED):
+            kinds.append(ITEM_ADDED)
+        return dict.fromkeys(kinds, False)
+
+    def _movable(self, keep: str | None) -> list[Item]:
+        return [item for item in self.items if item.seen and item.where in _MOVES and item.name != keep]
+
+    def _interfere(self, draw: Draw, action_id: str, keep: str | None) -> None:
+        seed = self.faults.seed
+        if draw.kind == ITEM_MOVED:
+            item = choose(seed, action_id, "item", self._movable(keep))
+            self.items.move(item, _MOVES[item.where])
+            self.faults.fire(draw, action_id, item.name)
+        else:
+            kind = choose(seed, action_id, "item", (CUP, CAN))
+            self.faults.fire(draw, action_id, self.add_item(kind))
+
+    # The truth
+
+    @property
+    def fired(self) -> list[FiredFault]:
+        """Every fault that happened, in order."""
+        return self.faults.fired
+
+    def touched(self) -> set[str]:
+        """The items that a permanent fault keeps from their destination.
+
+        These are the ones that can never be grasped or recognised, those with no path to their destination
+        (added later or not), those that stand hidden behind one of these, and those in a carrier that is
+        stuck in another one; none that was thrown away all the same, e.g. inside its carrier.
+        """
+        return {item.name for item in self.items if truth.blame(item, self.items, self.faults)}
+
+    def left(self) -> list[truth.Left]:
+        """Every item that ever stood on the table and is not in its destination, in the order they came."""
+        return truth.left(self.items, self.faults)
+
+    @property
+    def goal_reached(self) -> bool:
+        """Whether every item that ever stood on the table, seen or not, is where it has to be thrown."""
+        return not self.left()
+
+    def scene(self) -> list[dict[str, Any]]:
+        """The world drawn from above, see `scene.scene`."""
+        return scene(self.items, self.robot_at)
+
+    # As data
+
+    def state(self) -> dict[str, Any]:
+        """Everything, as JSON data; `from_state` makes the same world of it."""
+        return {
+            "robot_at": self.robot_at,
+            "items": [asdict(item) for item in self.items],
+            "trips": self.trips,
+            "said": list(self.said),
+            "faults": self.faults.to_json(),
+            "done": {action_id: result.to_json() for action_id, result in self.done.items()},
+        }
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Self:
+        """The inverse of `state`.
+
+        Raises:
+            InputError: this is not the state of a world.
+        """
+        try:
+            room = cls((Item(**item) for item in state["items"]), robot_at=state["robot_at"])
+            room.trips = state["trips"]
+            room.said = list(state["said"])
+            room.faults = Faults.from_json(state["faults"])
+            room.done = {name: Result.from_json(data) for name, data in state["done"].items()}
+        except (AttributeError, KeyError, TypeError, ValueError) as wrong:
+            raise InputError(f"this is not the state of a clean-up-table world: {wrong!r}") from wrong
+        return room

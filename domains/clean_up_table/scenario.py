@@ -1,0 +1,189 @@
+"""What stands on the table at the start, as a YAML file that a user writes.
+
+By number, named cup1, cup2, …, can1, …, crisp_can1, …:
+
+    table: {cups: 4, cans: 3, crisp_cans: [small, large]}
+
+or by name, alone or beside the numbered ones:
+
+    table:
+      items:
+        red_cup: cup
+        pringles: {kind: crisp_can, size: large}
+        coke: {kind: can, behind: pringles}      # not visible while pringles stands there too
+    seed: 7             # optional: of the faults; the command line wins
+    faults: 0.2         # optional: chance of a fault per skill call
+    robot_at: operator  # optional: table, shelf, floor, sink, bin or operator
+
+Kinds are `cup`, `can` and `crisp_can`; a crisp can is `small` (takes one can) unless it is `large` (two).
+A name is a PDDL name in lower case. At most 200 items.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from domains.clean_up_table.items import (
+    CAN,
+    CRISP_CAN,
+    CUP,
+    SIZES,
+    Inventory,
+    Item,
+    check_behind,
+    check_name,
+    new_item,
+)
+from domains.clean_up_table.places import OPERATOR, PLACES
+from domains.clean_up_table.world import World
+from dsc.text.form import read_model
+from dsc.text.yaml import load_document, read_file
+from knowledge_base.errors import InputError, Place, UnknownNameError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MAX_ITEMS = 200
+
+_KINDS = {"cup": CUP, "can": CAN, "crisp_can": CRISP_CAN}
+_DEFAULT_SIZE = "small"
+
+PlaceOf = Callable[[tuple[str | int, ...]], Place | None]
+Count = Annotated[int, Field(strict=True, ge=0, le=MAX_ITEMS)]
+
+
+class _Form(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class NamedItem(_Form):
+    """One item by name; `red_cup: cup` is short for `red_cup: {kind: cup}`."""
+
+    kind: str
+    size: str | None = None
+    behind: str | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short(cls, data: Any) -> Any:
+        return {"kind": data} if isinstance(data, str) else data
+
+
+class Table(_Form):
+    """What stands on the table."""
+
+    cups: Count = 0
+    cans: Count = 0
+    crisp_cans: tuple[str, ...] = ()
+    items: dict[str, NamedItem] = Field(default_factory=dict)
+
+
+class Scenario(_Form):
+    """The start of a run: what stands on the table, where the robot is, and what may go wrong."""
+
+    table: Table
+    seed: Annotated[int, Field(strict=True)] | None = None
+    faults: Annotated[float, Field(strict=True, ge=0.0, le=1.0)] | None = None
+    robot_at: str = OPERATOR
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a scenario file.
+
+        Raises:
+            InputError: anything wrong with it, with file, line, what was found and the nearest valid name.
+        """
+        return cls.parse(read_file(path), str(path))
+
+    @classmethod
+    def parse(cls, text: str, source: str | None = None) -> Self:
+        """Read a scenario's text; `source` names it in errors (`InputError`)."""
+        document = load_document(text, source)
+        scenario = read_model(cls, document)
+        scenario.check(document.place)
+        return scenario
+
+    @classmethod
+    def default(cls) -> Self:
+        """Four cups, three cans, a small and a large crisp can."""
+        return cls(table=Table(cups=4, cans=3, crisp_cans=("small", "large")))
+
+    def world(self, seed: int | None = None, faults: float | None = None) -> World:
+        """A new world as the scenario describes it.
+
+        Args:
+            seed: of the faults; the scenario's own, or 0, when left out.
+            faults: chance of a fault per skill call in [0, 1]; the scenario's own, or 0, when left out.
+
+        Raises:
+            InputError: the scenario was made in Python with a name or word that is not valid.
+        """
+        self.check()
+        seed = self.seed if seed is None else seed
+        faults = self.faults if faults is None else faults
+        return World(self._items(), seed=seed or 0, faults=faults or 0.0, robot_at=self.robot_at)
+
+    def check(self, place_of: PlaceOf = lambda _path: None) -> None:
+        """Raise `InputError` for a name or word that is not valid, located by `place_of` its path of keys."""
+        _check_word("place", self.robot_at, PLACES, place_of(("robot_at",)))
+        for position, size in enumerate(self.table.crisp_cans):
+            _check_word("size", size, SIZES, place_of(("table", "crisp_cans", position)))
+        for name, item in self.table.items.items():
+            _check_item(name, item, place_of)
+        if self._count() > MAX_ITEMS:
+            raise InputError(f"{self._count()} items are more than {MAX_ITEMS}", place=place_of(("table",)))
+        self._check_hiding(place_of)
+
+    def _count(self) -> int:
+        table = self.table
+        return table.cups + table.cans + len(table.crisp_cans) + len(table.items)
+
+    def _check_hiding(self, place_of: PlaceOf) -> None:
+        fronts = {item.name: item.behind for item in self._items()}
+        for name in self.table.items:
+            path = ("table", "items", name, "behind")
+            _located(place_of(path), check_behind, name, fronts)
+
+    def _items(self) -> list[Item]:
+        table = self.table
+        items = Inventory()
+        # Named items come first, but one may stand behind a numbered one: who is behind whom is set last.
+        for name, named in table.items.items():
+            items.add(new_item(_KINDS[named.kind], name, size=named.size or _DEFAULT_SIZE))
+        for kind, sizes in (
+            (CUP, [_DEFAULT_SIZE] * table.cups),
+            (CAN, [_DEFAULT_SIZE] * table.cans),
+            (CRISP_CAN, table.crisp_cans),
+        ):
+            for size in sizes:
+                items.add(new_item(kind, items.free_name(kind), size=size))
+        for name, named in table.items.items():
+            items[name].behind = named.behind
+        return list(items)
+
+
+def _check_item(name: str, item: NamedItem, place_of: PlaceOf) -> None:
+    path = ("table", "items", name)
+    _located(place_of(path), check_name, name)
+    _check_word("kind", item.kind, _KINDS, place_of((*path, "kind")))
+    if item.size is None:
+        return
+    _check_word("size", item.size, SIZES, place_of((*path, "size")))
+    if _KINDS[item.kind] != CRISP_CAN:
+        message = f"only a crisp_can has a size; '{name}' is a {item.kind}"
+        raise InputError(message, place=place_of((*path, "size")))
+
+
+def _check_word(what: str, word: str, valid: Iterable[str], place: Place | None) -> None:
+    if word not in valid:
+        raise UnknownNameError(f"there is no {what} '{word}'", place=place, found=word, valid=valid)
+
+
+def _located(place: Place | None, check: Callable[..., None], *args: Any) -> None:
+    try:
+        check(*args)
+    except InputError as error:
+        raise (error.located(place) if place else error) from None

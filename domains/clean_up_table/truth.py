@@ -1,0 +1,65 @@
+"""The truth that a run's claims are judged by: what is left, and which permanent fault is to blame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from domains.clean_up_table.faults import GRASP_FAILED, NO_INVERSE_KINEMATICS, Faults
+
+if TYPE_CHECKING:
+    from domains.clean_up_table.items import Inventory, Item
+
+_REASONS = {GRASP_FAILED: "every grasp of it fails", NO_INVERSE_KINEMATICS: "the arm cannot reach it"}
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """An item that stood on the table and was not thrown away where it belongs.
+
+    Attributes:
+        item: its name.
+        where: the surface it lies on, `hand`, or `in CARRIER`.
+        reason: the permanent fault that keeps it from its destination; `None` when none does.
+    """
+
+    item: str
+    where: str
+    reason: str | None
+
+
+def blame(item: Item, items: Inventory, faults: Faults) -> str | None:
+    """The permanent fault that keeps an item from its destination, in words; `None` when none does."""
+    if item.disposed:
+        return None
+    if item.name in faults.ungraspable:
+        return _REASONS[faults.ungraspable[item.name]]
+    if item.name in faults.unrecognisable:
+        return "it cannot be recognised"
+    if item.destination in faults.unreachable:
+        return f"no path leads to the {item.destination}"
+    if items.hidden(item) and item.behind and blame(items[item.behind], items, faults):
+        return f"it is hidden behind {item.behind}"
+    return _stuck(item, items, faults)
+
+
+def _stuck(item: Item, items: Inventory, faults: Faults) -> str | None:
+    """The arm takes items out of carriers on a surface only; a carrier stuck inside another keeps its own."""
+    carrier = items.get(item.where)
+    outer = items.get(carrier.where) if carrier else None
+    if carrier and outer and blame(carrier, items, faults) and blame(outer, items, faults):
+        return f"it is in {carrier.name}, which is stuck in {outer.name}"
+    return None
+
+
+def left(items: Inventory, faults: Faults) -> list[Left]:
+    """Every item that ever stood on the table and is not in its destination, in the order they came."""
+    return [
+        Left(item.name, _where(item, items), blame(item, items, faults))
+        for item in items
+        if item.on_table and not item.disposed
+    ]
+
+
+def _where(item: Item, items: Inventory) -> str:
+    return f"in {item.where}" if items.get(item.where) else item.where

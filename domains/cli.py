@@ -1,0 +1,115 @@
+"""The command `dsc`: each room brings its own commands, this one puts them together and runs ready worlds."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TextIO
+
+import typer
+
+from dsc.cli import app as plot_app
+from knowledge_base.cli import app as kb_app
+from planning.cli import plan_command
+
+if TYPE_CHECKING:
+    from domains.clean_up_table.deployment import CleanUpTable
+    from domains.clean_up_table.report import Report
+
+app = typer.Typer(
+    name="dsc",
+    help="Dynamic State Charts: state charts for what you can foresee, a planner for what you cannot.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+app.add_typer(plot_app, name="plot")
+app.add_typer(kb_app, name="kb")
+app.command("plan")(plan_command)
+
+WORLDS = ("clean-up-table",)
+
+
+@app.command()
+def run(
+    world: Annotated[str, typer.Argument(help="The ready world to run: clean-up-table.")],
+    scenario: Annotated[Path | None, typer.Option(help="What stands on the table (YAML).")] = None,
+    seed: Annotated[int | None, typer.Option(help="Which faults happen; same seed, same run.")] = None,
+    faults: Annotated[
+        float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")
+    ] = None,
+    real_time: Annotated[bool, typer.Option("--real-time", help="Let time pass as on the wall.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
+    trace: Annotated[Path | None, typer.Option(help="Write every record to this file (JSON lines).")] = None,
+) -> None:
+    """Run a ready world. Exit status: 0 goal reached, 1 something is left (the report says what and why)."""
+    from domains.clean_up_table.deployment import deploy
+    from domains.clean_up_table.scenario import Scenario
+    from knowledge_base.errors import UnknownNameError
+
+    if world not in WORLDS:
+        raise UnknownNameError(f"there is no world '{world}'", found=world, valid=WORLDS)
+    chosen = Scenario.load(scenario) if scenario is not None else Scenario.default()
+    deployed = deploy(chosen, seed, faults)
+    with deployed.executive:
+        report = _followed(deployed, simulated=not real_time, quiet=json, trace=trace)
+    _print(report, as_json=json)
+    raise typer.Exit(0 if report.goal_reached else 1)
+
+
+def _followed(deployed: CleanUpTable, *, simulated: bool, quiet: bool, trace: Path | None) -> Report:
+    """Run, showing progress unless `quiet`, and writing the trace."""
+    from contextlib import ExitStack
+
+    from rich.console import Console
+
+    from domains.progress import LiveProgress, PlainProgress
+    from dsc.trace import header, write_to
+
+    with ExitStack() as stack:
+        if trace is not None:
+            stream = stack.enter_context(_opened(trace))
+            stream.write(header(**deployed.header()) + "\n")
+            deployed.executive.listen(write_to(stream))
+        console = Console()
+        if not quiet and console.is_terminal:
+            left = deployed.world.left
+            live = LiveProgress(console, lambda: len(left()), deployed.tally)
+            deployed.executive.listen(stack.enter_context(live))
+        elif not quiet:
+            deployed.executive.listen(PlainProgress(typer.echo))
+        return deployed.run(simulated=simulated)
+
+
+def _opened(path: Path) -> TextIO:
+    from knowledge_base.errors import InputError
+
+    try:
+        return path.open("w", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write the trace to '{path}': {error.strerror}") from None
+
+
+def _print(report: Report, *, as_json: bool) -> None:
+    import json
+
+    if as_json:
+        typer.echo(json.dumps(report.to_json()))
+        return
+    typer.echo("")
+    for line in report.lines():
+        typer.echo(line)
+
+
+def main() -> None:
+    """The entry point: what people got wrong becomes one message and exit status 2, never a traceback."""
+    try:
+        app()
+    except Exception as error:
+        from knowledge_base.errors import InputError
+
+        if not isinstance(error, InputError):
+            raise
+        typer.echo(f"dsc: {error}", err=True)
+        sys.exit(2)

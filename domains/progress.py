@@ -1,0 +1,108 @@
+"""A run as people follow it: lines of text anywhere, and on a terminal a line that shows what is going on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, Self
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from domains.tally import Tally
+from dsc.trace import Record
+
+_SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+    "plan.found": lambda data: f"plan with {len(data['steps'])} steps ({data['engine']})",
+    "plan.none": lambda data: f"no plan, {data['kind']}: {data['reason']}",
+    "plan.broken": lambda data: f"the plan no longer holds: {data['reason']}",
+    "rule": lambda data: f"rule  {data['rule']}",
+}
+_STEP = re.compile(r"step_\d+")
+
+
+def _stages(name: str, state: dict[str, Any]) -> set[str]:
+    """The states in which something is done: those with a plot inside, here and in composites."""
+    inner = {found for key, one in state.get("states", {}).items() for found in _stages(key, one)}
+    return inner | ({name} if state.keys() & {"use", "dynamic", "goal"} else set())
+
+
+class PlainProgress:
+    """A listener that writes one line for each thing worth knowing."""
+
+    def __init__(self, write: Callable[[str], None]) -> None:
+        self._write = write
+        self._steps: dict[str, str] = {}
+        self._stages: set[str] = set()
+
+    def __call__(self, record: Record) -> None:
+        """Take one record."""
+        if record.type == "plot":
+            self._learn_steps(record.data["plot"])
+        for line in self.lines(record):
+            self._write(f"{record.t:8.1f} s  {line}")
+
+    def _learn_steps(self, plot: dict[str, Any]) -> None:
+        for name, state in plot["states"].items():
+            self._stages |= _stages(name, state)
+        if plot.get("generated"):
+            self._steps = {k: s["about"] for k, s in plot["states"].items() if _STEP.fullmatch(k)}
+
+    def lines(self, record: Record) -> list[str]:
+        """What a record has to say to people, if anything."""
+        if record.type in _SAYS:
+            return [_SAYS[record.type](record.data)]
+        if record.type == "end" and record.data["problem"]:
+            return [f"ended early: {record.data['problem']}"]
+        if record.type == "step":
+            return [line for micro in record.data["microsteps"] for line in self._microstep(micro)]
+        return []
+
+    def _microstep(self, micro: dict[str, Any]) -> list[str]:
+        lines = []
+        for path in micro["entered"]:
+            name = path.rsplit("/", 1)[-1]
+            if name in self._steps and path.endswith(f"execute/{name}"):
+                lines.append(f"step {name.removeprefix('step_'):>3}  {self._steps[name]}")
+            elif "/" not in path and name in self._stages:
+                lines.append(name.replace("_", " "))
+        return lines
+
+
+class LiveProgress(PlainProgress):
+    """The same lines on a terminal, over a status line: the time, what runs, what is left, plans and replans.
+
+    Args:
+        console: the terminal.
+        left: how much is still to be done.
+        tally: counts the run's plans; must hear each record before this listener does.
+    """
+
+    def __init__(self, console: Console, left: Callable[[], int], tally: Tally) -> None:
+        super().__init__(lambda line: console.print(line, highlight=False))
+        self._live: Live = Live(console=console, refresh_per_second=8, transient=True)
+        self._left = left
+        self._tally = tally
+        self._doing = ""
+
+    def __enter__(self) -> Self:
+        """Show the status line."""
+        self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Take it away."""
+        self._live.stop()
+
+    def __call__(self, record: Record) -> None:
+        """Take one record."""
+        super().__call__(record)
+        if record.type == "plan.asked":
+            self._doing = "planning"
+        elif record.type == "action" and record.data["action"] == "start":
+            skill = record.data["skill"]
+            arguments = ", ".join(str(value) for value in record.data["arguments"].values())
+            self._doing = self._doing if skill.startswith("planner.") else f"{skill}({arguments})"
+        counts = f"left {self._left()}  plans {self._tally.plans}  replans {self._tally.replans}"
+        self._live.update(Text.assemble((f"{record.t:8.1f} s  ", "bold"), self._doing, "  ", (counts, "dim")))

@@ -1,0 +1,51 @@
+"""Counts what happens in a run, from its records alone."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from dsc.dynamic.selection import ACHIEVE
+from dsc.trace import Record
+
+
+class Tally:
+    """A trace listener that counts.
+
+    Attributes:
+        outcomes: events that skills ended with.
+        recoveries: rules that answered, by their label.
+        candidates: plots that dynamic states chose; planning is not among them.
+        plans: plans that were found; `replans`: how often a plan under way was given up for a new one.
+        seconds: run time of the last record.
+    """
+
+    def __init__(self) -> None:
+        self.outcomes: Counter[str] = Counter()
+        self.recoveries: Counter[str] = Counter()
+        self.candidates: Counter[str] = Counter()
+        self.plans = 0
+        self.replans = 0
+        self.seconds = 0.0
+
+    def __call__(self, record: Record) -> None:
+        """Count one record."""
+        self.seconds = record.t
+        if record.type == "event" and "." in record.data["source"]:
+            self.outcomes[record.data["name"]] += 1
+        elif record.type == "decision" and record.data["chosen"] not in (None, ACHIEVE):
+            self.candidates[record.data["chosen"]] += 1
+        elif record.type == "rule":
+            self.recoveries[record.data["rule"]] += 1
+        elif record.type == "plan.found":
+            self.plans += 1
+        elif record.type == "step":
+            for micro in record.data["microsteps"]:
+                self._transitions(micro["taken"])
+
+    def _transitions(self, taken: list[Mapping[str, Any]]) -> None:
+        for one in taken:
+            leaves_plan = one["from"].endswith(("/execute", "/judge"))
+            if leaves_plan and (one["to"] or "").endswith("/plan"):
+                self.replans += 1

@@ -1,0 +1,95 @@
+"""The robot's components over a world, with all that they reported as a plain set of facts."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import TYPE_CHECKING
+
+from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
+from dsc.skills import Outcome, SkillCall
+from knowledge_base.facts import Delta, Fact, fact
+
+if TYPE_CHECKING:
+    from collections.abc import Coroutine
+
+    from domains.clean_up_table.world import World
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.time = 0.0
+
+    def now(self) -> float:
+        return self.time
+
+    async def sleep(self, seconds: float) -> None:
+        assert seconds > 0
+        self.time += seconds
+        await asyncio.sleep(0)
+
+
+class Robot:
+    """Components over a world, and the facts they reported; the belief is a plain set of facts."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.clock = Clock()
+        self.facts: set[Fact] = set()
+        self.values: dict[Fact, float] = {}
+        self.types: dict[str, str] = dict.fromkeys(("none", "one", "two"), "room")
+        self.components = [Base(world), Arm(world), Camera(world, self.lying), Voice(world)]
+        self.calls = 0
+        self.learn(initial_knowledge(world))
+
+    def learn(self, delta: Delta) -> None:
+        self.types |= delta.nodes
+        self.facts = changed(self.facts, delta)
+        self.values |= delta.values
+
+    def lying(self, surface: str) -> list[str]:
+        return sorted(f.args[0] for f in self.facts if f.predicate == "lies-at" and f.args[1] == surface)
+
+    def all(self, predicate: str, *last: str) -> list[str]:
+        found = (f.args for f in self.facts if f.predicate == predicate)
+        return sorted(args[0] for args in found if args[1:] == last)
+
+    def do(self, skill: str, **arguments: str) -> Outcome:
+        self.calls += 1
+        (component,) = [one for one in self.components if skill in one.skills()]
+        call = SkillCall(f"a{self.calls}", self.clock, lambda _outcome: None)
+        outcome = finish(component.execute(skill, call, arguments))
+        declared = component.skills()[skill].outcomes
+        assert set(outcome.attributes) == set(declared[outcome.event])
+        json.dumps(outcome.attributes)
+        self.learn(outcome.observed)
+        return outcome
+
+
+def finish(skill: Coroutine[None, None, Outcome]) -> Outcome:
+    """Run a skill that waits for nothing but the clock; much faster than an event loop of its own."""
+    while True:
+        try:
+            skill.send(None)
+        except StopIteration as done:
+            return done.value
+
+
+def changed(facts: set[Fact], delta: Delta) -> set[Fact]:
+    return (facts - set(delta.removed)) | set(delta.added)
+
+
+def believes_the_truth(robot: Robot) -> None:
+    """The robot's belief of what it handled or saw last is what is so, but for what nobody told it."""
+    world = robot.world
+    assert robot.all("robot-at") == [world.robot_at]
+    held = world.items.held
+    assert robot.all("holding") == ([held.name] if held else [])
+    assert (fact("hand-free") in robot.facts) == (held is None)
+    for item in world.items:
+        if item.name in robot.types and not item.disposed:
+            carriers = [f.args[1] for f in robot.facts if f.predicate == "inside" and f.args[0] == item.name]
+            assert carriers == ([item.where] if world.items.get(item.where) else [])
+            rooms = [f.args[1] for f in robot.facts if f.predicate == "free-room" and f.args[0] == item.name]
+            assert rooms == [world.items.room(item)]
+        assert (fact("disposed", item.name) in robot.facts) == item.disposed
