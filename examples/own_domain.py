@@ -1,0 +1,67 @@
+"""A domain of your own: two planning actions in PDDL, two skills in Python, a goal, and a plan that reaches it."""
+
+from dsc import Component, Outcome, SkillCall, primitive_plot, skill
+from knowledge_base import Delta, fact
+from planning import Executive, PlanningDomain
+
+WATERING = PlanningDomain.parse("""
+(define (domain watering)
+  (:requirements :strips :typing)
+  (:types room plant)
+  (:predicates (robot-in ?r - room) (stands-in ?p - plant ?r - room) (watered ?p - plant))
+  (:action go
+    :parameters (?from ?to - room)
+    :precondition (robot-in ?from)
+    :effect (and (not (robot-in ?from)) (robot-in ?to)))
+  (:action water
+    :parameters (?plant - plant ?room - room)
+    :precondition (and (robot-in ?room) (stands-in ?plant ?room))
+    :effect (watered ?plant)))
+""")
+
+
+class Gardener(Component):
+    name = "gardener"
+
+    @skill(outcomes={"arrived": {}}, types={"to": "room"})
+    async def go(self, call: SkillCall, to: str) -> Outcome:
+        await call.clock.sleep(20.0)  # simulated seconds: the run does not wait for them
+        print(f"{call.clock.now():5.1f} s  in the {to}")
+        return Outcome("arrived")
+
+    @skill(outcomes={"watered": {}}, types={"plant": "plant"})
+    async def water(self, call: SkillCall, plant: str) -> Outcome:
+        await call.clock.sleep(5.0)
+        print(f"{call.clock.now():5.1f} s  watered the {plant}")
+        # What a skill observes is told to the knowledge base together with its outcome.
+        return Outcome("watered", observed=Delta(added=(fact("watered", plant),)))
+
+
+def main() -> None:
+    gardener = Gardener()
+    skills = gardener.skills()
+    plots = [
+        # `go` observes nothing by itself, so its effects are assumed once it has arrived.
+        primitive_plot(skills["go"], done="arrived", implements="go", effects="assumed"),
+        primitive_plot(skills["water"], done="watered", implements="water"),
+    ]
+    with Executive(WATERING, plots, [gardener]) as robot:
+        with robot.knowledge.transaction(author="me") as world:
+            world.add_node("kitchen", "room")
+            world.add_node("balcony", "room")
+            world.tell("robot-in", "kitchen")
+            for plant, room in {"basil": "kitchen", "rose": "balcony"}.items():
+                world.add_node(plant, "plant")
+                world.tell("stands-in", plant, room)
+        end = robot.achieve("(forall (?p - plant) (watered ?p))")
+        print("finished:", end.finished, robot.knowledge.query("(watered ?p)"))
+
+
+if __name__ == "__main__":
+    main()
+
+# Expected output:
+#   5.1 s  watered the basil
+#  25.1 s  in the balcony
+#  30.1 s  watered the rose
+# finished: True [{'p': 'basil'}, {'p': 'rose'}]

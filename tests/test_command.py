@@ -1,0 +1,122 @@
+"""The command as people use it: reports, exit status, and one clear line for what they got wrong."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from domains.cli import main
+
+TABLE = Path(__file__).parent.parent / "domains" / "clean_up_table"
+
+
+@pytest.fixture
+def dsc(monkeypatch, capsys):
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["dsc", *map(str, words)])
+        with pytest.raises(SystemExit) as stopped:
+            main()
+        shown = capsys.readouterr()
+        return stopped.value.code or 0, shown.out, shown.err
+
+    return call
+
+
+def test_a_run_reports_as_json(dsc):
+    status, out, err = dsc("run", "clean-up-table", "--seed", 3, "--faults", 0.1, "--json")
+    report = json.loads(out)
+    assert (status, err) == (0, "")
+    assert report["goal_reached"] is True
+    assert {"left", "items", "trips", "plans", "replans", "skill_failures", "recoveries", "candidates_chosen",
+            "simulated_s", "wall_s"} <= set(report)  # fmt: skip
+
+
+def test_a_run_in_a_pipe_tells_its_progress_in_plain_lines(dsc):
+    status, out, _ = dsc("run", "clean-up-table")
+    assert status == 0
+    assert "step   1  (pick-up" in out
+    assert "The table is clear: 9 of 9 items away in 3 trips" in out
+    assert "\x1b" not in out
+
+
+def test_something_left_is_exit_status_1_and_is_named(dsc, tmp_path):
+    for seed in range(1, 40):
+        status, out, _ = dsc("run", "clean-up-table", "--seed", seed, "--faults", 0.2, "--json")
+        report = json.loads(out)
+        assert status == (0 if report["goal_reached"] else 1)
+        if status == 1:
+            assert all(one["reason"] and one["where"] for one in report["left"])
+            return
+    pytest.fail("no run with something left")
+
+
+def test_a_trace_is_written_while_the_run_goes_on(dsc, tmp_path):
+    file = tmp_path / "run.jsonl"
+    dsc("run", "clean-up-table", "--trace", file, "--json")
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    assert lines[0]["format"] == "dsc-trace"
+    assert lines[-1]["type"] == "end"
+
+
+def test_a_scenario_of_ones_own(dsc, tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("table:\n  cups: 2\n  items: {pringles: {kind: crisp_can, size: small}, coke: can}\n")
+    _, out, _ = dsc("run", "clean-up-table", "--scenario", file, "--json")
+    report = json.loads(out)
+    assert (report["items"], report["trips"], report["goal_reached"]) == (4, 2, True)
+
+
+PLOT = """plot: wrong
+states:
+  look:
+    use: {use}
+    with: {{surface: table}}
+    on: {{recognised: {target}, nothing_found: ended, {third}}}
+  ended: {{final: true}}
+"""
+
+
+def test_nothing_people_get_wrong_gives_a_traceback(dsc, tmp_path):
+    def file(name, text):
+        (tmp_path / name).write_text(text)
+        return tmp_path / name
+
+    recognise = (TABLE / "plots" / "recognise.yaml").read_text()
+    file("recognise.yaml", recognise)
+    good = {"use": "recognise", "target": "ended", "third": "not_possible: ended"}
+    problem = "(define (problem p) (:domain clean-up-table)\n (:objects red - {kind})\n (:init {fact})\n (:goal (tidy red)))"
+    cases = [
+        (["run", "clean-up-tabel"], "clean-up-table"),
+        (["run", "clean-up-table", "--scenario", tmp_path / "none.yaml"], "there is no file"),
+        (["run", "clean-up-table", "--scenario", file("a.yaml", "table:\n  cupz: 4\n")], "a.yaml:2:3: unknown key 'cupz'; did you mean 'cups'?"),
+        (["run", "clean-up-table", "--scenario", file("b.yaml", "table: {items: {x: mug}}\n")], "b.yaml:1"),
+        (["run", "clean-up-table", "--trace", tmp_path / "no" / "where.jsonl"], "cannot write the trace"),
+        (["plot", "check", file("c.yaml", PLOT.format(**{**good, "use": "recognize"}))], "did you mean 'recognise'?"),
+        (["plot", "check", file("d.yaml", PLOT.format(**{**good, "target": "endet"}))], "d.yaml:6"),
+        (["plot", "check", file("e.yaml", PLOT.format(**{**good, "third": "recognizd: ended"}))], "does not handle its outcome 'not_possible'"),
+        (["plot", "show", file("f.yaml", "plot: f\nstats: {}\n")], "f.yaml:2:1: unknown key 'stats'; did you mean 'states'?"),
+        (["plan", TABLE / "domain.pddl", file("g.pddl", problem.format(kind="cupp", fact=""))], "did you mean 'cup'?"),
+        (["plan", TABLE / "domain.pddl", file("h.pddl", problem.format(kind="cup", fact="(graspabel red)"))], "h.pddl:3"),
+        (["kb", "query", file("i.pddl", problem.format(kind="cup", fact="")), "(and (cup ?x) (seeen ?x))", "--domain", TABLE / "domain.pddl"], "did you mean 'seen'?"),
+    ]  # fmt: skip
+    for words, said in cases:
+        status, out, err = dsc(*words)
+        assert status == 2, (words, out, err)
+        assert said in out + err, (words, out, err)
+        assert "Traceback" not in out + err
+
+
+def test_usage_errors_are_exit_status_2(dsc):
+    assert dsc("run")[0] == 2
+    assert dsc("run", "clean-up-table", "--faults", "2")[0] == 2
+    assert dsc("fly")[0] == 2
+
+
+def test_the_installed_command_answers():
+    done = subprocess.run(
+        [Path(sys.executable).with_name("dsc"), "--help"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0
+    assert "Dynamic State Charts" in done.stdout

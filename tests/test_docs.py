@@ -1,0 +1,54 @@
+"""The pages are true: their Python runs, their plots and scenarios are read, their links lead somewhere."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from domains.clean_up_table import Scenario
+from dsc import load_library, load_plot, parse_plot
+from dsc.text.diagram import draw
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(page, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_python_on_a_page_runs_from_top_to_bottom(page):
+    names = {}
+    for block in blocks(page, "python"):
+        exec(compile(block, str(page), "exec"), names)  # noqa: S102  the page's own code is what is tested
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_yaml_on_a_page_is_a_plot_or_a_scenario(page):
+    for block in blocks(page, "yaml"):
+        (parse_plot if block.startswith("plot:") else Scenario.parse)(block, str(page))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
+        assert target.startswith("https://") or (page.parent / target).exists(), target
+
+
+def test_the_pictures_are_what_the_project_draws_today():
+    plots = ROOT / "domains" / "clean_up_table" / "plots"
+    picture = (ROOT / "docs" / "pictures" / "clean_up_table.svg").read_text()
+    assert picture == draw(load_plot(plots / "clean_up_table.yaml"), load_library(plots), rules=False), "make pictures"
+
+
+def test_the_run_on_the_first_screen_is_what_the_command_prints():
+    (shown,) = [block for block in blocks(ROOT / "README.md", "console") if "dsc run" in block]
+    command, *lines = shown.splitlines()
+    words = command.removeprefix("$ dsc ").split()
+    dsc = Path(sys.executable).with_name("dsc")
+    printed = iter(subprocess.run([dsc, *words], capture_output=True, text=True, check=True).stdout.splitlines())
+    for line in lines:
+        assert line.strip() == "…" or line in printed, line  # `in` goes on where the last line was found

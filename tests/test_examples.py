@@ -1,0 +1,28 @@
+"""Every example runs and prints what its last lines say; a new example is covered the day it appears."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
+MARK = "# Expected output:\n"
+
+
+def expected(source: str) -> str:
+    block = source.split(MARK, 1)[1]
+    return "".join(line.removeprefix("#").removeprefix(" ") for line in block.splitlines(keepends=True))
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_prints_its_expected_output(example):
+    done = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert [line.rstrip() for line in done.stdout.splitlines()] == [
+        line.rstrip() for line in expected(example.read_text()).splitlines()
+    ]
+
+
+def test_there_are_examples():
+    assert len(EXAMPLES) >= 4
