@@ -33,14 +33,21 @@ MAX_ATTEMPTS = 3
 """How often to plan anew because the world changed while the planner worked."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Running:
+    """A plan on its way: the step that is at work, and who waits to hear that the rest is of no use."""
+
     plan: Plan
     goal: Expression
+    step: int = 1
+    broken: asyncio.Future[Outcome] | None = None
 
 
 class PlanningComponent(Component):
-    """The skills behind the plot `achieve`: `plan`, `judge`, `monitor`; its parameter `step` says how far it is.
+    """The skills behind the plot `achieve`: `plan`, `judge`, `monitor`.
+
+    Several plans may be on their way, side by side in regions or one inside a step of another. Each has a
+    name, and the component's parameter of that name says how far it is.
 
     Args:
         domain: the planning domain.
@@ -73,21 +80,20 @@ class PlanningComponent(Component):
         self._clock = clock
         self._trace = trace
         self._busy = busy
-        self._running: _Running | None = None
-        self._broken: asyncio.Future[Outcome] | None = None
+        self._running: dict[str, _Running] = {}
         self._plans = 0
-        self._step = 1
 
     async def configure(self, parameter: str, value: Any) -> None:
-        """`step`: number of the plan's step that begins now; what earlier steps did is judged at this moment."""
+        """The plan named `parameter` begins step number `value`; what earlier steps did is judged at this moment."""
         await super().configure(parameter, value)
-        if parameter == "step":
-            self._step = int(value)
-            self._judge_plan("the steps before")
+        running = self._running.get(parameter)
+        if running is not None:
+            running.step = int(value)
+            self._judge_plan(running, "the steps before")
 
     @skill(
         outcomes={
-            "plan_found": {"plot": "plot", "steps": "number"},
+            "plan_found": {"plot": "plot", "name": "symbol", "steps": "number"},
             "goal_holds": {},
             "no_plan": {"reason": "text", "kind": "symbol"},
         }
@@ -109,27 +115,32 @@ class PlanningComponent(Component):
     @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}})
     async def judge(self, call: SkillCall, goal: str) -> Outcome:  # noqa: ARG002
         """Say whether the goal holds, and if not, which part of it is missing."""
-        why = explain(parse_condition(goal), self._knowledge)
+        try:
+            why = explain(parse_condition(goal), self._knowledge)
+        except InputError as error:  # what the goal is about is not there any more
+            return Outcome("goal_open", {"reason": str(error)})
         return Outcome("goal_holds") if why.truth else Outcome("goal_open", {"reason": str(why.deciding)})
 
     @skill(outcomes={"plan_invalid": {"reason": "text", "author": "symbol"}})
-    async def monitor(self, call: SkillCall) -> Outcome:  # noqa: ARG002
-        """Watch the plan being carried out; ends when the rest of it no longer leads to the goal.
+    async def monitor(self, call: SkillCall, plan: str) -> Outcome:  # noqa: ARG002
+        """Watch the plan of that name being carried out; ends when the rest of it no longer leads to the goal.
 
         What somebody else changes is judged at once, what the running step changes when it has ended.
         """
-        self._broken = asyncio.get_running_loop().create_future()
+        running = self._running[plan]
+        running.broken = asyncio.get_running_loop().create_future()
 
         def judge_change(change: Change) -> None:
             if change.author != CHART and change.author not in self._busy():
-                self._judge_plan(change.author)
+                self._judge_plan(running, change.author)
 
         unsubscribe = self._knowledge.subscribe(judge_change)
+        self._judge_plan(running, "earlier")  # the world went on between the search and now
         try:
-            return await self._broken
+            return await running.broken
         finally:
             unsubscribe()
-            self._broken = None
+            del self._running[plan]
 
     async def _search(self, call: SkillCall, goal: Expression, holder: str, seconds: float) -> Outcome:
         for _ in range(MAX_ATTEMPTS):
@@ -152,31 +163,28 @@ class PlanningComponent(Component):
 
     def _found(self, answer: PlanFound, goal: Expression, holder: str) -> Outcome:
         self._plans += 1
-        self._step = 1
-        self._running = _Running(answer.plan, goal)
         rules = self._library.plot(holder).rules if holder in self._library else ()
         name = f"plan_{self._plans}"
         plot = plot_from_plan(answer.plan, self._domain, self._library, rules, name)
+        self._running[name] = _Running(answer.plan, goal)
         steps = [str(step) for step in answer.plan.steps]
         self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine)
-        return Outcome("plan_found", {"plot": plot.to_form(), "steps": len(steps)})
+        return Outcome("plan_found", {"plot": plot.to_form(), "name": name, "steps": len(steps)})
 
     def _none(self, kind: str, reason: str) -> Outcome:
         self._trace.record("plan.none", kind=kind, reason=reason)
         return Outcome("no_plan", {"reason": reason, "kind": kind})
 
-    def _judge_plan(self, author: str) -> None:
-        why = None if self._broken is None or self._broken.done() else self._why_broken()
-        if why is not None and self._broken is not None:
-            self._trace.record("plan.broken", reason=why, author=author, step=self._step)
-            self._broken.set_result(Outcome("plan_invalid", {"reason": why, "author": author}))
+    def _judge_plan(self, running: _Running, author: str) -> None:
+        why = None if running.broken is None or running.broken.done() else self._why_broken(running)
+        if why is not None and running.broken is not None:
+            self._trace.record("plan.broken", reason=why, author=author, step=running.step)
+            running.broken.set_result(Outcome("plan_invalid", {"reason": why, "author": author}))
 
-    def _why_broken(self) -> str | None:
+    def _why_broken(self, running: _Running) -> str | None:
         """Why what is left of the plan no longer leads to the goal; the step at work may be half done."""
-        if self._running is None:
-            return None
-        left = self._running.plan.steps[self._step - 1 :]
-        whole = validate(Plan(left), self._domain, self._knowledge, self._running.goal)
-        if whole.valid or validate(Plan(left[1:]), self._domain, self._knowledge, self._running.goal).valid:
+        left = running.plan.steps[running.step - 1 :]
+        whole = validate(Plan(left), self._domain, self._knowledge, running.goal)
+        if whole.valid or validate(Plan(left[1:]), self._domain, self._knowledge, running.goal).valid:
             return None
         return whole.why

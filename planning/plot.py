@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from dsc.dynamic.rules import GAVE_UP_STATE, REPLAN_STATE
 from dsc.events import GAVE_UP
 from dsc.model.plot import ActionPlot, Rule
+from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.expression import (
@@ -58,7 +59,7 @@ def plot_from_plan(
     """
     states: dict[str, Any] = {"before": {"always": _onward(1, plan, domain, And(()))}}
     for number, step in enumerate(plan.steps, start=1):
-        states |= _step_states(number, step, plan, domain, library)
+        states |= _step_states(number, step, plan, domain, library, name)
     states |= {
         FINISHED: {"final": True},
         REPLAN_STATE: {"final": True, "emit": REPLAN, "with": {"reason": "?reason"}},
@@ -89,7 +90,7 @@ def implementing(step: PlanStep, library: Library) -> tuple[ActionPlot, ...]:
 
 
 def _step_states(
-    number: int, step: PlanStep, plan: Plan, domain: PlanningDomain, library: Library
+    number: int, step: PlanStep, plan: Plan, domain: PlanningDomain, library: Library, name: str
 ) -> dict[str, Any]:
     candidates = implementing(step, library)
     bindings = domain.bindings(step)
@@ -106,7 +107,7 @@ def _step_states(
     return {
         f"step_{number}": {
             "about": str(step),
-            "entry": {"set": "planner.step", "to": number},
+            "entry": {"set": f"planner.{name}", "to": number},
             "dynamic": [plot.name for plot in candidates],
             "with": {name: value for name, value in bindings.items() if name in taken},
             "on": {"done": done},
@@ -123,10 +124,12 @@ def _onward(number: int, plan: Plan, domain: PlanningDomain, expected: Expressio
     if number > len(plan.steps):
         return [{"to": FINISHED, "when": expected}]
     step = plan.steps[number - 1]
-    needed = domain.precondition(step)
+    needed = substitute(domain.action(step).precondition, domain.bindings(step))
+    parts = dict.fromkeys((*_parts(expected), *_parts(needed)))
+    otherwise = {"to": REPLAN_STATE, "assign": {"reason": f"not applicable: {step}"}}
     return [
-        {"to": f"step_{number}", "when": And((*_parts(expected), *_parts(needed)))},
-        {"to": REPLAN_STATE, "when": expected, "assign": {"reason": f"not applicable: {step}"}},
+        {"to": f"step_{number}", "when": And(tuple(parts))},
+        {**otherwise, "when": expected} if _parts(expected) else otherwise,
     ]
 
 
@@ -166,6 +169,11 @@ def _ground(atom: Atom, bindings: Mapping[str, Value]) -> Atom:
 
 
 def _concerns(rule: Rule, plan: Plan, library: Library) -> bool:
-    """Whether any step could end with the event the rule answers."""
+    """Whether any step could end with the event the rule answers.
+
+    A rule for named states of its plot, or with a way to one, is about that plot alone.
+    """
+    if rule.of or rule.do.then not in RESPONSES:
+        return False
     plots = {plot.name: plot for step in plan.steps for plot in implementing(step, library)}
     return any(rule.on in plot.emits for plot in plots.values())

@@ -30,7 +30,8 @@ class Validation:
 def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> Validation:
     """Execute `plan` in thought from `world`, which stays as it is.
 
-    Steps that name no action of the domain, or no known object, make the plan invalid like any other.
+    Steps that name no action of the domain, or no known object, make the plan invalid like any other; so does
+    a goal about an object that is not there any more.
     """
     ahead = Overlay(world)
     for index, step in enumerate(plan.steps):
@@ -41,5 +42,8 @@ def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression)
             ahead.apply(domain.effects(step, ahead))
         except InputError as error:
             return Validation(valid=False, failing_step=index, why=str(error))
-    reached = explain(goal, ahead)
+    try:
+        reached = explain(goal, ahead)
+    except InputError as error:
+        return Validation(valid=False, why=str(error))
     return Validation(valid=True) if reached.truth else Validation(valid=False, why=str(reached.deciding))

@@ -21,6 +21,7 @@ from dsc.model.states import (
     SubmachineState,
 )
 from knowledge_base.errors import Place
+from knowledge_base.language.expression import is_plain_name
 
 Path = tuple[str | int, ...]
 """Where in a plot's form something stands, e.g. `("states", "look", "on", "recognised")`."""
@@ -155,6 +156,25 @@ class ActionPlot(Frozen):
                 raise PydanticCustomError(MISNAMED, twice, {"name": name, "path": path})
             seen.add(name)
         return self
+
+    @model_validator(mode="after")
+    def _variables_can_be_written(self) -> ActionPlot:
+        for path in self._variable_paths():
+            name = path[-1]
+            if not is_plain_name(str(name)):
+                wrong = "'{name}' is no name for a variable: the language folds names to lower case"
+                raise PydanticCustomError(MISNAMED, wrong, {"name": name, "path": path})
+            if path[0] == "variables" and name in self.parameters:
+                twice = "'{name}' is a parameter and a variable"
+                raise PydanticCustomError(MISNAMED, twice, {"name": name, "path": path})
+        return self
+
+    def _variable_paths(self) -> Iterator[Path]:
+        """Everything that conditions and terms can only read as `?name` or `?event.name`."""
+        yield from (("parameters", name) for name in self.parameters)
+        yield from (("variables", name) for name in self.variables)
+        for group, events in (("emits", self.emits), ("receives", self.receives)):
+            yield from ((group, event, name) for event, attributes in events.items() for name in attributes or ())
 
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
         """All states in document order, with their names and paths."""

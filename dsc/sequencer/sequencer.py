@@ -41,7 +41,7 @@ class RunEnd:
     Attributes:
         finished: the plot reached its final state.
         emitted: outcome events of the plot, in order.
-        problem: why it ended without reaching it; `None` if it did.
+        problem: why it ended without reaching it, or what went wrong in its last step; else `None`.
     """
 
     finished: bool

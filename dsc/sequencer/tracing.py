@@ -22,7 +22,8 @@ class StepTracer:
 
     def event(self, event: Event, source: str, original: str | None = None) -> int:
         """An event that came in; `original` is the skill's own name for it where the chart uses another."""
-        data: dict[str, Any] = {"name": event.name, "source": source, "attributes": dict(event.attributes)}
+        attributes = {name: _told_once(value) for name, value in event.attributes.items()}
+        data: dict[str, Any] = {"name": event.name, "source": source, "attributes": attributes}
         if original not in (None, event.name):
             data["original"] = original
         return self._trace.record("event", **data)
@@ -116,3 +117,9 @@ class StepTracer:
             if digest not in self._known_plots:
                 self._known_plots.add(digest)
                 self._trace.record("plot", name=frame.plot, hash=digest, plot=compiled.plot.to_form())
+
+
+def _told_once(value: Any) -> Any:
+    """A plot that an event carries, by name only: its full text is written when it is bound."""
+    is_plot = isinstance(value, dict) and {"plot", "states"} <= value.keys()
+    return {"plot": value["plot"]} if is_plot else value

@@ -55,7 +55,7 @@ def json_schema() -> dict[str, Any]:
 
 _ORDER = (
     "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "receives",
-    "emits", "seconds", "to", "when", "of", "trigger", "set", "switch", "use", "dynamic", "assign", "tell",
+    "emits", "seconds", "set", "to", "when", "of", "trigger", "switch", "use", "dynamic", "assign", "tell",
     "emit", "with", "as", "within", "goal", "budget", "do", "then", "limit", "rule", "entry", "initial",
     "final", "states", "regions", "on", "after", "always", "exit", "rules",
 )

@@ -48,7 +48,7 @@ def test_an_empty_table_is_reported_clear_without_a_plan(planner):
     assert (report.goal_reached, report.items, report.plans, report.trips) == (True, 0, 0, 0)
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", range(12))
 def test_every_run_ends_with_the_truth(planner, seed):
     table, report = run(planner, seed, 0.2)
     assert report.problem is None
@@ -57,11 +57,13 @@ def test_every_run_ends_with_the_truth(planner, seed):
     assert all(one.reason for one in report.left)
     if not any(fault.permanent for fault in table.world.fired):
         assert report.goal_reached
+    disposed = {item.name for item in table.world.items if item.disposed}
+    assert {found["item"] for found in table.executive.knowledge.query("(disposed ?item)")} == disposed
 
 
-@pytest.mark.parametrize("seed", [1000, 1001, 1002])
-def test_however_often_things_fail_the_run_ends_with_the_truth(planner, seed):
-    table, report = run(planner, seed, 0.9)
+@pytest.mark.parametrize("faults", [0.5, 0.9])
+def test_however_often_things_fail_the_run_ends_with_the_truth(planner, faults):
+    table, report = run(planner, 1000, faults)
     assert report.problem is None
     assert {one.item for one in report.left} == table.world.touched()
 
@@ -85,17 +87,6 @@ def test_the_same_seed_gives_the_same_trace_byte_for_byte(planner):
     assert all(record["cause"] is None or record["cause"] < record["seq"] for record in records[1:])
     kinds = {record["type"] for record in records[1:]}
     assert {"plot", "event", "step", "decision", "knowledge", "action", "plan.asked", "plan.found", "scene", "end"} <= kinds
-
-
-def test_knowledge_agrees_with_the_world_at_the_end(planner):
-    for seed in (3, 5, 8):
-        table, _ = run(planner, seed, 0.2)
-        knowledge = table.executive.knowledge
-        for found in knowledge.query("(disposed ?item)"):
-            assert table.world.items[found["item"]].disposed
-        for item in table.world.items:
-            if item.seen and item.disposed:
-                assert knowledge.ask("(disposed ?item)", {"item": item.name})
 
 
 class Script:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from charts import FakeSituation, plot
+from dsc_charts import FakeSituation, plot
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import outcomes_of

@@ -6,7 +6,7 @@ import itertools
 import json
 from dataclasses import dataclass, field
 
-from charts import Run, marked, modes
+from dsc_charts import PROPERTY, Run, marked, modes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -138,6 +138,7 @@ def serials_of(frame):
 EVENT_LISTS = st.lists(st.sampled_from((*EVENTS, "leave")), max_size=8)
 
 
+@PROPERTY
 @given(charts(), EVENT_LISTS)
 def test_the_configuration_is_legal_after_every_step(chart, events):
     run = bound(chart)
@@ -150,6 +151,7 @@ def test_the_configuration_is_legal_after_every_step(chart, events):
             assert max(serials) <= step.state.serials
 
 
+@PROPERTY
 @given(charts(), EVENT_LISTS)
 def test_what_is_entered_was_not_active_and_what_is_left_was(chart, events):
     run = bound(chart)
@@ -166,6 +168,7 @@ def test_what_is_entered_was_not_active_and_what_is_left_was(chart, events):
             (running.add if mode[0] == "+" else running.remove)(mode[1:])
 
 
+@PROPERTY
 @given(charts(), EVENT_LISTS)
 def test_a_plot_acts_alike_bound_as_content_and_written_in_place(chart, events):
     one, other = bound(chart), in_place(chart)
@@ -179,8 +182,8 @@ def test_a_plot_acts_alike_bound_as_content_and_written_in_place(chart, events):
         assert [path.rsplit("/")[-1] for path in one.active] == other.active
 
 
+@settings(PROPERTY, max_examples=50)
 @given(charts(), EVENT_LISTS)
-@settings(max_examples=50)
 def test_the_same_input_gives_the_same_output_also_after_being_stored(chart, events):
     one, other = bound(chart), bound(chart)
     for a, b in zip(steps_of(one, events), steps_of(other, events), strict=True):
@@ -189,8 +192,8 @@ def test_the_same_input_gives_the_same_output_also_after_being_stored(chart, eve
         other.machine.state = MachineState.from_json(stored)
 
 
+@settings(PROPERTY, max_examples=50)
 @given(charts(), EVENT_LISTS)
-@settings(max_examples=50)
 def test_without_trigger_a_chart_at_rest_stays_at_rest(chart, events):
     run = bound(chart)
     for step in steps_of(run, events):

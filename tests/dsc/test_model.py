@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from charts import plot
+from dsc_charts import PROPERTY, plot
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -305,6 +305,7 @@ SIMPLE = st.fixed_dictionaries(
 )
 
 
+@PROPERTY
 @given(
     form=st.fixed_dictionaries(
         {"plot": st.just("p")},

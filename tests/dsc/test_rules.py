@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from charts import Run, modes, plot
+from dsc_charts import Run, modes, plot
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.rules import DEFAULT_RETRIES

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from charts import Run, plot
+from dsc_charts import Run, plot
 
 from dsc.events import Event
 from knowledge_base.facts import Fact

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 
-from charts import plot
+from dsc_charts import plot
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation

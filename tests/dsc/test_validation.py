@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from charts import plot
+from dsc_charts import plot
 
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from charts import plot
+from dsc_charts import plot
 
 from dsc.text.plots import json_schema, load_library, load_plot, parse_plot, plot_to_yaml
 from dsc.text.yaml import MAX_BYTES, load_document
@@ -69,6 +69,10 @@ BROKEN = [
     ("plot: p\nconfirm: .inf" + END, 2, "finite"),
     ("plot: p\nwhen: (or" + END, 2, "'(' is never closed"),
     ("plot: p\n1: 5" + END, 2, "found 1"),
+    ("plot: p\nparameters:\n  Item: item" + END, 3, "'Item' is no name for a variable"),
+    ("plot: p\nvariables:\n  two words: item" + END, 3, "'two words' is no name for a variable"),
+    ("plot: p\nemits:\n  failed:\n    itemName: item" + END, 4, "'itemName' is no name for a variable"),
+    ("plot: p\nparameters: {n: number}\nvariables:\n  n: number" + END, 4, "'n' is a parameter and a variable"),
     # states
     ("plot: p\nstates:\n  s: text", 3, "a mapping was expected"),
     ("plot: p\nstates:\n  a/b: {}", 3, "'a/b' is no name for a state"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping
 
+from hypothesis import settings
+
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.situation import Decision
@@ -15,6 +17,9 @@ from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.language import effect as eff
 from knowledge_base.language import expression as lang
+
+PROPERTY = settings(deadline=None, derandomize=True)
+"""How properties are tested: the same examples on every machine, however slow it is."""
 
 
 def plot(text, source=None):

@@ -1,0 +1,127 @@
+"""An arm whose skills end in every way there is, and whole runs with it in simulated time."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+
+from dsc_charts import plot
+
+from dsc.dynamic.library import Library
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.sequencer.sequencer import Sequencer
+from dsc.skills import Component, Outcome, skill
+from dsc.trace import Trace
+from knowledge_base.facts import Delta, Fact, fact
+from knowledge_base.schema import Schema
+from knowledge_base.store import KnowledgeBase
+
+SCHEMA = Schema.parse("""
+    (define (domain kitchen)
+      (:types item - object)
+      (:predicates (seen ?i - item) (p) (q) (told)))
+""")
+
+SLOW = 1000.0
+
+
+class Arm(Component):
+    """Skills that end in every way there is; `log` is what happened, in order, with the time."""
+
+    name = "arm"
+
+    def __init__(self, name=None, slow_to_configure=0.0):
+        super().__init__(name)
+        self.log = []
+        self.clock = None
+        self.slow = slow_to_configure
+
+    def note(self, text):
+        self.log.append(text)
+
+    async def configure(self, parameter, value):
+        if self.slow:
+            await asyncio.sleep(self.slow)
+        if value == "impossible":
+            raise RuntimeError("cannot be set")
+        await super().configure(parameter, value)
+        self.note(f"{parameter}={value}")
+
+    async def switch(self, mode):
+        if self.slow:
+            await asyncio.sleep(self.slow)
+        await super().switch(mode)
+        self.note(f"mode {mode}")
+
+    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}}, types={"item": "item"})
+    async def grasp(self, call, item="cup1", seconds=2.0, ends="grasped"):
+        self.note(f"grasp {item}")
+        try:
+            await call.clock.sleep(seconds)
+        except asyncio.CancelledError:
+            self.note("cancelled")
+            raise
+        return Outcome(ends, {"item": item} if ends == "slipped" else {})
+
+    @skill(outcomes={"found": {"item": "item"}, "glimpse": {"n": "number"}})
+    async def look(self, call, glimpses=0, seconds=1.0):
+        for n in range(glimpses):
+            await call.clock.sleep(seconds)
+            call.report(Outcome("glimpse", {"n": n}, Delta(added=(Fact("p"),))))
+        await call.clock.sleep(seconds)
+        return Outcome("found", {"item": "cup1"}, Delta(nodes={"cup1": "item"}, added=(fact("seen", "cup1"),)))
+
+    @skill(outcomes={"ok": {}})
+    async def breaks(self, call, how="raise"):
+        await call.clock.sleep(1)
+        if how == "raise":
+            raise RuntimeError("the gripper is stuck")
+        if how == "timeout":
+            raise TimeoutError("the bus does not answer")
+        if how == "cancel":
+            raise asyncio.CancelledError
+        if how == "undeclared":
+            return Outcome("splendid")
+        if how == "nothing":
+            return None
+        if how == "no_data":
+            return Outcome("ok", {"thing": object()})
+        return Outcome("ok", observed=Delta(added=(fact("nonsense", "x"),)))
+
+    @skill(outcomes={"ok": {}})
+    async def waits_for_a_thread(self, call):
+        with call.clock.hold():
+            await asyncio.to_thread(threading.Event().wait, 0.02)
+        return Outcome("ok")
+
+
+class Ran:
+    """A whole run: how it ended, when, what was traced and what is known then."""
+
+    def __init__(self, text, *inner, arm=None, prepare=None, facts=(), open_ended=False, arguments=None):
+        self.kb = KnowledgeBase(SCHEMA)
+        self.kb.apply(Delta(added=tuple(facts)), "test")
+        self.arm = arm or Arm()
+        self.records = []
+        library = Library([plot(text), *map(plot, inner)])
+
+        async def main():
+            clock = LoopClock()
+            trace = Trace(clock.now)
+            trace.listen(self.records.append)
+            sequencer = Sequencer(library, self.kb, [self.arm], clock, trace, open_ended=open_ended)
+            self.sequencer = sequencer
+            if prepare is not None:
+                prepare(sequencer)
+            self.end = await sequencer.run(library_first, arguments or {})
+            self.at = clock.now()
+
+        library_first = next(iter(library)).name
+        run_simulated(main())
+
+    def of_type(self, type_):
+        return [record.data for record in self.records if record.type == type_]
+
+    @property
+    def lines(self):
+        return [record.to_line() for record in self.records]

@@ -1,0 +1,99 @@
+"""The machine's state as a value: stored, copied, compared, never changed by a step."""
+
+from __future__ import annotations
+
+import json
+from copy import deepcopy
+
+import pytest
+from dsc_charts import FakeSituation, Run, plot
+
+from dsc.dynamic.library import Library
+from dsc.engine.configuration import MachineState
+from dsc.engine.machine import step
+from dsc.engine.situation import Decision
+from dsc.events import Event
+from knowledge_base.errors import UnknownNameError
+
+RICH = """
+    plot: p
+    variables: {n: {type: number, initial: 0}}
+    states:
+      o:
+        on: {done: e}
+        regions:
+          r1: {states: {x: {use: q, on: {done: x2}}, x2: {final: true}}}
+          r2: {states: {y: {dynamic: [q], after: {seconds: 5, to: y}, on: {done: y2}}, y2: {final: true}}}
+      e: {final: true}
+"""
+INNER = """
+    plot: q
+    variables: {k: {type: number, initial: 1}}
+    states: {a: {on: {tick: {to: a, assign: {k: (- ?k 1)}}}, always: {to: b, when: (<= ?k 0)}}, b: {final: true}}
+"""
+
+
+def rich():
+    return Run(plot(RICH), plot(INNER), choices={"q": Decision("q")})
+
+
+def test_the_state_goes_to_json_and_back_exactly_in_the_middle_of_a_run():
+    run, other = rich(), rich()
+    assert run.start() == other.start()
+    for name in ("nothing", "tick", "tick"):
+        stored = json.dumps(other.machine.state.to_json())
+        other.machine.state = MachineState.from_json(json.loads(stored))
+        assert other.machine.state == run.machine.state
+        assert run.send(name) == other.send(name)
+    assert run.machine.state.finished
+
+
+def test_a_bound_plot_goes_to_json_with_the_state():
+    host = plot("{plot: p, parameters: {what: plot}, states: {h: {use: ?what, on: {done: e}}, e: }}")
+    run = Run(host)
+    run.start(what={"plot": "made", "states": {"a": {"on": {"go": "b"}}, "b": {"final": True}}})
+    state = MachineState.from_json(json.loads(json.dumps(run.machine.state.to_json())))
+    assert state == run.machine.state
+    fresh = Library([host])  # as after a restart
+    assert step(fresh, state, Event("go"), FakeSituation()).state.configuration() == ("e",)
+
+
+def test_a_state_of_another_library_is_refused():
+    run = rich()
+    run.start()
+    with pytest.raises(UnknownNameError, match="there is no plot 'p'"):
+        step(Library([]), run.machine.state, Event("tick"), FakeSituation())
+    changed = Library([plot(RICH.replace("x: {use", "x_: {use")), plot(INNER)])
+    with pytest.raises(UnknownNameError, match="plot 'p' no longer has the state 'x'"):
+        step(changed, run.machine.state, Event("tick"), FakeSituation())
+
+
+def test_a_step_changes_nothing_it_was_given():
+    run = rich()
+    run.start()
+    before, kept = run.machine.state, deepcopy(run.machine.state)
+    first = step(run.library, before, Event("tick"), run.situation())
+    assert before == kept
+    assert step(run.library, before, Event("tick"), run.situation()) == first
+    assert run.machine.state is before
+    assert run.send("tick") == first
+    assert run.machine.state == first.state
+
+
+def test_the_configuration_names_states_by_their_paths_and_regions_not_at_all():
+    run = rich()
+    run.start()
+    state = run.machine.state
+    assert state.configuration() == ("o", "x", "x/a", "y", "y/a")
+    assert state.is_active("x/a")
+    assert state.is_active("a")
+    assert not state.is_active("x2")
+    assert state.has_activation(run.serial("y"))
+    assert not state.has_activation(10_000)
+
+
+def test_a_machine_that_was_not_started_or_has_ended_does_nothing():
+    run = Run(plot("{plot: p, states: {a: {final: true}}}"))
+    assert run.send("e").moved is False
+    assert run.start().state.finished
+    assert run.send("e").handled is False

@@ -1,0 +1,267 @@
+"""What components do and do wrong, as the chart sees it."""
+
+from __future__ import annotations
+
+import pytest
+from dsc_runs import SLOW, Arm, Ran
+
+from dsc.sequencer.clock import run_simulated
+from dsc.skills import Component, Outcome, check_arguments, skill
+from knowledge_base.errors import InputError, UnknownNameError
+
+GRASP = """
+    plot: p
+    emits: {lost: {item: item}}
+    states:
+      a: {entry: {trigger: arm.grasp, with: {item: cup1}}, on: {grasped: e, slipped: {to: e, emit: lost, with: {item: ?event.item}}}}
+      e: {final: true}
+"""
+
+
+# -- leaving -----------------------------------------------------------------------------------------------
+
+
+def test_leaving_a_state_cancels_its_skill_before_the_exit_actions():
+    ran = Ran(f"""
+        plot: p
+        states:
+          a:
+            entry: {{trigger: arm.grasp, with: {{seconds: {SLOW}}}}}
+            exit: {{switch: arm, to: neutral}}
+            after: {{seconds: 3, to: e}}
+            on: {{grasped: e}}
+          e: {{after: {{seconds: 1, to: f}}}}
+          f: {{final: true}}
+    """)
+    assert ran.at == pytest.approx(4)
+    assert ran.arm.log == ["grasp cup1", "cancelled", "mode neutral"]
+
+
+def test_the_exit_actions_of_the_last_step_are_carried_out_too():
+    ran = Ran(
+        """
+        plot: p
+        states:
+          a: {entry: {trigger: arm.grasp}, exit: {switch: arm, to: neutral}, on: {grasped: e}}
+          e: {final: true}
+        """,
+        arm=Arm(slow_to_configure=1),
+    )
+    assert ran.end.finished
+    assert ran.arm.log == ["grasp cup1", "mode neutral"]
+
+
+def test_a_state_left_while_its_component_is_configured_spoils_nothing():
+    ran = Ran(
+        """
+        plot: p
+        states:
+          a:
+            entry: [{set: arm.approach, to: side}, {trigger: arm.grasp, with: {item: cup1}}]
+            exit: {switch: arm, to: neutral}
+            after: {seconds: 1, to: b}
+            on: {grasped: e}
+          b: {entry: {trigger: arm.grasp, with: {item: cup2}}, on: {grasped: e}}
+          e: {final: true}
+        """,
+        arm=Arm(slow_to_configure=5),
+    )
+    assert ran.end.finished
+    assert ran.arm.log == ["approach=side", "mode neutral", "grasp cup2"]
+
+
+def test_a_timeout_of_a_state_that_was_left_does_nothing():
+    ran = Ran("""
+        plot: p
+        states:
+          a: {entry: {trigger: arm.grasp}, after: {seconds: 5, to: wrong}, on: {grasped: b}}
+          b: {after: {seconds: 10, to: e}}
+          wrong:
+          e: {final: true}
+    """)
+    assert ran.at == pytest.approx(12)
+    assert [event["source"] for event in ran.of_type("event")] == ["arm.grasp", "timer"]
+
+
+def test_several_timeouts_of_a_state_each_come_in_time():
+    ran = Ran("""
+        plot: p
+        variables: {n: {type: number, initial: 0}}
+        states:
+          a: {after: [{seconds: 0.3, assign: {n: 1}}, {seconds: 0.1, assign: {n: 2}}, {seconds: 0.7, to: e, when: (= ?n 1)}]}
+          e: {final: true}
+    """)
+    assert ran.end.finished
+    assert ran.at == pytest.approx(0.7)
+
+
+def test_what_was_observed_is_known_even_if_the_state_was_left_meanwhile():
+    ran = Ran("""
+        plot: p
+        states:
+          o:
+            regions:
+              r1: {states: {x: {entry: {trigger: arm.look, with: {seconds: 2}}, on: {found: x2}}, x2: {}}}
+              r2: {states: {y: {entry: {trigger: arm.grasp, with: {seconds: 2}}, on: {grasped: y2}}, y2: {}}}
+            on: {out: e}
+            always: {to: e, when: (seen cup1)}
+          e: {final: true}
+    """.replace("(seen cup1)", "(exists (?i - item) (seen ?i))"))
+    # Both answers come at the same time; the first one leaves the state, the second is dropped.
+    assert ran.end.finished
+    assert ran.kb.ask("(exists (?i - item) (seen ?i))")
+
+    late = Ran("""
+        plot: p
+        states:
+          o:
+            regions:
+              r1: {states: {x: {entry: {trigger: arm.grasp, with: {seconds: 2}}, on: {grasped: {emit: out}}}}}
+              r2: {states: {y: {entry: {trigger: arm.look, with: {seconds: 2}}, on: {found: wrong}}, wrong: {}}}
+            on: {out: b}
+          b: {always: {to: e, when: (exists (?i - item) (seen ?i))}}
+          e: {final: true}
+    """)
+    assert late.end.finished
+    assert late.kb.ask("(seen cup1)")
+
+
+# -- when skills go wrong ----------------------------------------------------------------------------------
+
+BREAKS = """
+    plot: p
+    variables: {why: text}
+    emits: {because: {why: text}}
+    states:
+      a:
+        entry: {trigger: arm.breaks, with: {how: HOW}, within: 100}
+        on: {ok: e, skill_error: {to: f, assign: {why: ?event.reason}}, timed_out: e}
+      e: {final: true}
+      f: {final: true, emit: because, with: {why: ?why}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [
+        ("raise", "RuntimeError: the gripper is stuck"),
+        ("timeout", "TimeoutError: the bus does not answer"),
+        ("cancel", "CancelledError"),
+        ("undeclared", "'splendid', which it does not declare"),
+        ("nothing", "None"),
+        ("no_data", "object"),
+    ],
+)
+def test_whatever_a_skill_does_wrong_is_a_skill_error(how, reason):
+    ran = Ran(BREAKS.replace("HOW", how))
+    assert ran.end.finished
+    (event,) = ran.end.emitted
+    assert reason in event.attributes["why"]
+
+
+def test_an_observation_the_schema_does_not_know_ends_the_run_with_a_problem():
+    ran = Ran(BREAKS.replace("HOW", "observes"))
+    assert not ran.end.finished
+    assert "nonsense" in ran.end.problem
+
+
+def test_a_skill_that_takes_too_long_is_cancelled_and_timed_out():
+    ran = Ran(f"""
+        plot: p
+        states:
+          a: {{entry: {{trigger: arm.grasp, with: {{seconds: {SLOW}}}, within: 3}}, on: {{grasped: wrong, timed_out: e}}}}
+          wrong:
+          e: {{final: true}}
+    """)
+    assert ran.at == pytest.approx(3)
+    assert ran.arm.log == ["grasp cup1", "cancelled"]
+    (event,) = ran.of_type("event")
+    assert event["attributes"] == {"skill": "arm.grasp", "seconds": 3.0}
+
+
+def test_a_skill_has_a_bound_even_if_nobody_says_so():
+    ran = Ran(GRASP.replace("{item: cup1}}, on", "{seconds: 1000000}}, on"))
+    assert not ran.end.finished
+    assert "nobody handles 'timed_out' of arm.grasp" in ran.end.problem
+
+
+@pytest.mark.parametrize("entry", ["{trigger: arm.grap}", "{trigger: arm.grasp, with: {itm: cup1}}", "{trigger: arm.grasp}"])
+def test_a_wrong_call_of_a_skill_is_a_skill_error_that_says_so(entry):
+    class Strict(Arm):
+        @skill(outcomes={"grasped": {}})
+        async def grasp(self, call, item):
+            return Outcome("grasped")
+
+    ran = Ran("{plot: p, states: {a: {entry: " + entry + ", on: {grasped: e}}, e: {final: true}}}", arm=Strict())
+    assert not ran.end.finished
+    assert "nobody handles 'skill_error'" in ran.end.problem
+    assert "grasp" in ran.end.problem
+
+
+def test_a_component_that_cannot_be_configured_fails_the_skill_that_needs_it():
+    ran = Ran("""
+        plot: p
+        states:
+          a:
+            entry: [{set: arm.approach, to: impossible}, {trigger: arm.grasp}]
+            on: {grasped: wrong, skill_error: b}
+          b: {entry: [{set: arm.approach, to: side}, {trigger: arm.grasp}], on: {grasped: e}}
+          wrong:
+          e: {final: true}
+    """)
+    assert ran.end.finished
+    assert ran.arm.log == ["approach=side", "grasp cup1"]
+    assert "cannot be set" in ran.of_type("event")[0]["attributes"]["reason"]
+
+
+def test_a_component_that_is_for_ever_being_configured_is_timed_out():
+    ran = Ran(
+        """
+        plot: p
+        states:
+          a: {entry: [{set: arm.x, to: 1}, {trigger: arm.grasp, within: 3}], on: {grasped: e, timed_out: e}}
+          e: {final: true}
+        """,
+        arm=Arm(slow_to_configure=1e6),
+    )
+    assert ran.end.finished
+    assert ran.at < 1000
+
+
+# -- components --------------------------------------------------------------------------------------------
+
+
+def test_a_component_tells_its_skills():
+    signature = Arm("left").skills()["grasp"]
+    assert signature.component == "left"
+    assert signature.parameters == {"item": "item", "seconds": None, "ends": None}
+    assert signature.optional == {"item", "seconds", "ends"}
+    assert signature.outcomes == {"grasped": {}, "slipped": {"item": "item"}}
+    assert set(Arm().skills()) == {"grasp", "look", "breaks", "waits_for_a_thread"}
+
+
+def test_arguments_are_checked_against_the_signature():
+    class Strict(Component):
+        @skill(outcomes={})
+        async def go(self, call, to, speed=1):
+            return Outcome("ok")
+
+    signature = Strict().skills()["go"]
+    check_arguments(signature, {"to": 1})
+    with pytest.raises(InputError, match=r"'strict\.go' needs its parameter 'to'"):
+        check_arguments(signature, {})
+    with pytest.raises(UnknownNameError, match="did you mean 'speed'"):
+        check_arguments(signature, {"to": 1, "sped": 2})
+
+
+def test_components_remember_parameters_and_modes():
+    async def main():
+        component = Component("c")
+        assert component.mode == "neutral"
+        await component.configure("x", 1)
+        await component.switch("up")
+        return component
+
+    component = run_simulated(main())
+    assert component.parameters == {"x": 1}
+    assert component.mode == "up"
