@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dsc.sequencer.sequencer import CHART
 from dsc.skills import Component, Outcome, SkillCall, skill
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition
 from planning.explain import why_unsolvable
@@ -127,7 +127,9 @@ class PlanningComponent(Component):
 
         What somebody else changes is judged at once, what the running step changes when it has ended.
         """
-        running = self._running[plan]
+        running = self._running.get(plan)
+        if running is None:
+            raise UnknownNameError(f"there is no plan '{plan}'", found=plan, valid=self._running)
         running.broken = asyncio.get_running_loop().create_future()
 
         def judge_change(change: Change) -> None:
@@ -140,10 +142,11 @@ class PlanningComponent(Component):
             return await running.broken
         finally:
             unsubscribe()
-            del self._running[plan]
+            self._running.pop(plan, None)
 
     async def _search(self, call: SkillCall, goal: Expression, holder: str, seconds: float) -> Outcome:
         for _ in range(MAX_ATTEMPTS):
+            version = self._knowledge.version
             problem = pose(self._domain, self._knowledge.snapshot(), goal)
             with self._clock.hold():
                 answer = await self._planner.solve(problem, seconds)
@@ -159,6 +162,8 @@ class PlanningComponent(Component):
             verdict = validate(answer.plan, self._domain, self._knowledge, goal)
             if verdict.valid:
                 return self._found(answer, goal, holder)
+            if version == self._knowledge.version:
+                return self._none("failed", f"the plan found does not lead to the goal: {verdict.why}")
         return self._none("failed", f"the world changes faster than plans are made: {verdict.why}")
 
     def _found(self, answer: PlanFound, goal: Expression, holder: str) -> Outcome:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -65,7 +64,8 @@ class Executive:
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        findings = validate_library(self.library, self.domain.schema, skills)
+        names = {PlanningComponent.name, *(c.name for c in self.components)}
+        findings = validate_library(self.library, self.domain.schema, skills, names)
         raise_findings([*findings, *check_implementations(self.library, self.domain)])
 
     def listen(self, listener: Listener) -> None:
@@ -78,6 +78,7 @@ class Executive:
         arguments: Mapping[str, Any] | None = None,
         *,
         simulated: bool = True,
+        open_ended: bool = False,
         prepare: Prepare | None = None,
     ) -> RunEnd:
         """Run a plot to its end.
@@ -86,13 +87,15 @@ class Executive:
             plot: its name.
             arguments: values for its parameters.
             simulated: whether time jumps from event to event; if not, it passes as on the clock on the wall.
+            open_ended: whether events may still come from outside (an operator, a user interface) when nothing
+                is going on; if not, such a run ends and says so.
             prepare: see `Prepare`.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
         """
         runner = run_simulated if simulated else run_real
-        return runner(self.execute(plot, arguments or {}, prepare))
+        return runner(self.execute(plot, arguments or {}, prepare, open_ended=open_ended))
 
     def achieve(self, goal: str, *, simulated: bool = True) -> RunEnd:
         """Plan for a goal, carry the plan out, and plan again when the world disagrees.
@@ -105,14 +108,16 @@ class Executive:
         arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
         return self.run(ACHIEVE, arguments, simulated=simulated)
 
-    async def execute(self, plot: str, arguments: Mapping[str, Any], prepare: Prepare | None = None) -> RunEnd:
+    async def execute(
+        self, plot: str, arguments: Mapping[str, Any], prepare: Prepare | None = None, *, open_ended: bool = False
+    ) -> RunEnd:
         """As `run`, inside a loop that is there already."""
         clock = LoopClock()
         trace = Trace(clock.now)
         for listener in self._listeners:
             trace.listen(listener)
         components: list[Component] = list(self.components)
-        sequencer = Sequencer(self.library, self.knowledge, components, clock, trace)
+        sequencer = Sequencer(self.library, self.knowledge, components, clock, trace, open_ended=open_ended)
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner, clock, trace,
             busy=lambda: sequencer.dispatcher.busy,
@@ -125,7 +130,7 @@ class Executive:
     def close(self) -> None:
         """End the planner's process, if there is one of its own."""
         if self._own_planner is not None:
-            asyncio.run(self._own_planner.close())
+            self._own_planner.kill()
 
     def __enter__(self) -> Self:
         """Itself; `close` at the end."""

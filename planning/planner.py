@@ -58,7 +58,8 @@ class PlannerProcess:
         self._command = tuple(command)
         self._start_up_seconds = start_up_seconds
         self._process: EngineProcess | None = None
-        self._turn = asyncio.Lock()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._lock = asyncio.Lock()
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
         """Plan within `seconds` of real time, counted while the engine works.
@@ -69,19 +70,32 @@ class PlannerProcess:
             return ProvenUnsolvable(ENGINE, "unreachable: " + ", ".join(problem.unreachable))
         if not problem.goal:
             return PlanFound(Plan(), ENGINE, 0.0, problem.simulated_seconds)
-        async with self._turn:
+        async with self._turn():
             with self._clock_hold():
                 return await self._solve(problem, seconds)
 
     async def warm_up(self) -> None:
         """Start the process now, so that the first problem does not wait; what goes wrong shows then."""
-        async with self._turn:
+        async with self._turn():
             with self._clock_hold(), contextlib.suppress(OSError, EngineStoppedError, OutOfTimeError):
                 await self._ready()
 
     async def close(self) -> None:
         """End the process; a later `solve` would start a new one."""
-        self._kill()
+        self.kill()
+
+    def kill(self) -> None:
+        """As `close`, without a loop."""
+        if self._process is not None:
+            self._process.kill()
+            self._process = None
+
+    def _turn(self) -> asyncio.Lock:
+        """The running loop's lock: a planner may outlive the run, and with it the loop, that it served before."""
+        loop = asyncio.get_running_loop()
+        if loop is not self._loop:
+            self._loop, self._lock = loop, asyncio.Lock()
+        return self._lock
 
     async def _solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
         if problem.whole is None:
@@ -112,7 +126,7 @@ class PlannerProcess:
 
     async def _ready(self) -> EngineProcess:
         if self._process is None or not self._process.alive:
-            self._kill()
+            self.kill()
             process = self._process = EngineProcess(self._command)
             await self._in_thread(lambda: process.ask(None, self._start_up_seconds))
         return self._process
@@ -139,13 +153,8 @@ class PlannerProcess:
         try:
             return await finished
         except asyncio.CancelledError:
-            self._kill()
+            self.kill()
             raise
-
-    def _kill(self) -> None:
-        if self._process is not None:
-            self._process.kill()
-            self._process = None
 
 
 def _judged(answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:

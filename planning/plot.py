@@ -72,7 +72,8 @@ def plot_from_plan(
             "variables": {"reason": {"type": "text", "initial": "unknown"}},
             "emits": {REPLAN: {"reason": "text"}, GAVE_UP: {"reason": "text"}},
             "states": states,
-            "rules": [rule for rule in rules if _concerns(rule, plan, library)],
+            "initial": "before",
+        "rules": [rule for rule in rules if _concerns(rule, plan, library)],
             "generated": True,
         }
     )

@@ -67,13 +67,18 @@ class Execution:
         self._rest()
         return handled
 
+    def leave(self) -> None:
+        """Leave all active states of all plots."""
+        assert self._root is not None  # noqa: S101
+        self._exit(everything(self._root))
+        self._record(None, ())
+        self._root = None
+        self._errors += [_reason(event) for event in self._internal if event.name == ERROR]
+
     def finish(self, event: Event | None, *, handled: bool) -> Step:
         """The step as a value."""
         if self._finished and self._root is not None:
-            self._exit(everything(self._root))
-            self._record(None, ())
-            self._root = None
-            self._errors += [_reason(event) for event in self._internal if event.name == ERROR]
+            self.leave()
         root = freeze(self._root) if self._root else None
         return Step(
             state=MachineState(root, self._serials, self._finished),

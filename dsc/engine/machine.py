@@ -41,6 +41,15 @@ def step(chart: Chart, state: MachineState, event: Event | None, situation: Situ
     return execution.finish(event, handled=handled)
 
 
+def leave(chart: Chart, state: MachineState, situation: Situation) -> Step:
+    """Leave all active states without reaching the end: their exit actions put the skills at rest (S0.15)."""
+    if state.root is None:
+        return Step(state, None, handled=False)
+    execution = Execution(chart, situation, state)
+    execution.leave()
+    return execution.finish(None, handled=False)
+
+
 @dataclass(slots=True)
 class Machine:
     """Holds the state of one running chart; everything else is in `step`.
@@ -62,5 +71,11 @@ class Machine:
     def send(self, event: Event | None, situation: Situation) -> Step:
         """See `step`."""
         done = step(self.chart, self.state, event, situation)
+        self.state = done.state
+        return done
+
+    def leave(self, situation: Situation) -> Step:
+        """See `leave`."""
+        done = leave(self.chart, self.state, situation)
         self.state = done.state
         return done

@@ -92,7 +92,13 @@ class Sequencer:
         self._caused_by: dict[str, int] = {}
 
     def post(self, event: Event) -> None:
-        """Hand in an event from outside, e.g. an operator's `stop`; from the loop's own thread."""
+        """Hand in an event from outside, e.g. an operator's `stop`; from the loop's own thread.
+
+        Raises:
+            InputError: the event is one that only the executive itself fires, e.g. `done`.
+        """
+        if event.name in RESERVED:
+            raise InputError(f"the event '{event.name}' is fired by the executive itself", found=event.name)
         self._inbox.put_nowait(event)
 
     def change(self, delta: Delta, author: str) -> None:
@@ -114,6 +120,7 @@ class Sequencer:
                     break
                 self._take(await self._inbox.get(), progress)
         finally:
+            self._leave(progress)
             await self.dispatcher.close()
         self.trace.record("end", finished=self.machine.state.finished, problem=progress.problem)
         return RunEnd(self.machine.state.finished, tuple(progress.emitted), progress.problem)
@@ -128,6 +135,13 @@ class Sequencer:
             self._commit(step, progress)
         except InputError as error:
             progress.problem = str(error)
+
+    def _leave(self, progress: _Progress) -> None:
+        """Wherever the run ends, exit actions put the components at rest; a finished machine has nothing to leave."""
+        try:
+            self._commit(self.machine.leave(self._situation()), progress)
+        except InputError as error:
+            progress.problem = progress.problem or str(error)
 
     def _idle(self) -> bool:
         return not self._open_ended and self._inbox.empty() and not self.dispatcher.waiting
@@ -187,7 +201,7 @@ class Sequencer:
             self.dispatcher.dispatch(output)
         progress.emitted.extend(step.emitted)
         if step.errors:
-            progress.problem = "; ".join(step.errors)
+            progress.problem = progress.problem or "; ".join(step.errors)
 
     def _unhandled(self, message: Message, event: Event, progress: _Progress) -> None:
         """An answer that its own, still active state does not take would leave that state waiting for ever."""

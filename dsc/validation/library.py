@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, PlotError
 from dsc.model.plot import ActionPlot
 from dsc.skills import SkillSignature
+from dsc.validation.components import check_components
 from dsc.validation.data import check_data
 from dsc.validation.structure import check_structure
 from dsc.validation.wiring import check_wiring
@@ -15,11 +16,14 @@ from knowledge_base.schema import Schema
 
 
 def validate_library(
-    library: Library, schema: Schema | None, skills: Iterable[SkillSignature] | None
+    library: Library,
+    schema: Schema | None,
+    skills: Iterable[SkillSignature] | None,
+    components: Collection[str] | None = None,
 ) -> list[Finding]:
     """All findings about all plots; see `validate_plot`."""
     known = None if skills is None else list(skills)
-    return [finding for plot in library for finding in validate_plot(plot, library, schema, known)]
+    return [finding for plot in library for finding in validate_plot(plot, library, schema, known, components)]
 
 
 def validate_plot(
@@ -27,6 +31,7 @@ def validate_plot(
     library: Library,
     schema: Schema | None = None,
     skills: Iterable[SkillSignature] | None = None,
+    components: Collection[str] | None = None,
 ) -> list[Finding]:
     """What is wrong with a plot; empty if nothing is.
 
@@ -35,6 +40,7 @@ def validate_plot(
         library: where the plots it uses are found.
         schema: to check conditions and types against; without it, they are not checked.
         skills: the skills that are deployed; without them, triggers are not checked.
+        components: names of the components that are deployed; without them, `set` and `switch` are not checked.
     """
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
     findings = list(check_structure(plot, library))
@@ -42,9 +48,9 @@ def validate_plot(
         return findings
     findings = list(check_wiring(plot, library, signatures))
     findings += check_data(plot, library, schema, signatures)
+    if components is not None:
+        findings += check_components(plot, components)
     return findings
-
-
 
 
 def raise_findings(findings: list[Finding]) -> None:

@@ -53,7 +53,7 @@ class EngineProcess:
     @property
     def alive(self) -> bool:
         """Whether it can still be asked."""
-        return self.kill.alive and self._popen.poll() is None
+        return self.kill.alive and not self._out_of_time and self._popen.poll() is None
 
     def ask(self, request: Mapping[str, Any] | None, seconds: float) -> dict[str, Any]:
         """The answer to one request (`None`: just listen), within `seconds` of real time.

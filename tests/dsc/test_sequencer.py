@@ -9,7 +9,7 @@ from dsc_runs import SLOW, Arm, Ran
 
 from dsc.events import Event
 from dsc.skills import Outcome, skill
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
 
 GRASP = """
@@ -336,3 +336,49 @@ def test_arguments_and_answers_are_copies():
         arguments=made,
     )
     assert ran.end.emitted[0].attributes == {"yours": ["yours"], "mine": ["yours", "mine"]}
+
+
+def test_a_run_that_ends_with_a_problem_puts_its_components_at_rest():
+    ran = Ran(
+        """
+        plot: p
+        states:
+          a:
+            entry: {switch: arm, to: busy}
+            exit: {switch: arm, to: neutral}
+            on: {done: b}
+            states:
+              c: {entry: {trigger: arm.grasp}, exit: {set: arm.speed, to: 0}, on: {slipped: d}}
+              d: {final: true}
+          b: {final: true}
+        """
+    )
+    assert "nobody handles 'grasped'" in ran.end.problem
+    assert ran.arm.log[-2:] == ["speed=0", "mode neutral"]
+    assert ran.of_type("end")[0]["problem"] == ran.end.problem
+    assert ran.sequencer.machine.state.root is None
+
+
+def test_a_run_that_is_cancelled_puts_its_components_at_rest():
+    def prepare(sequencer):
+        asyncio.get_running_loop().call_later(1.0, asyncio.current_task().cancel)
+
+    arm = Arm()
+    text = """
+        plot: p
+        states:
+          a: {entry: {trigger: arm.grasp, with: {seconds: 50}}, exit: {switch: arm, to: neutral}, on: {grasped: e, slipped: e}}
+          e: {final: true}
+    """
+    with pytest.raises(asyncio.CancelledError):
+        Ran(text, arm=arm, prepare=prepare)
+    assert arm.log[-1] == "mode neutral"
+
+
+@pytest.mark.parametrize("name", ["done", "timed_out", "error"])
+def test_events_of_the_executive_itself_cannot_be_posted_from_outside(name):
+    def prepare(sequencer):
+        with pytest.raises(InputError, match=f"the event '{name}' is fired by the executive itself"):
+            sequencer.post(Event(name))
+
+    Ran("{plot: p, states: {e: {final: true}}}", prepare=prepare)

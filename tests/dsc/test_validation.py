@@ -55,7 +55,7 @@ HELPERS = [
 
 def findings_of(text, schema=SCHEMA, skills=SKILLS):
     made = parse_plot(text, "p.yaml")
-    return validate_plot(made, Library([made, *HELPERS]), schema, skills)
+    return validate_plot(made, Library([made, *HELPERS]), schema, skills, {"arm", "base"})
 
 
 S = "plot: p\nstates:\n"
@@ -114,6 +114,16 @@ WRONG = [
         "known skill",
         S + "  a:\n    entry:\n      - {trigger: arm.grsp}\n    on: {error: e}\n" + E,
         5, "no component offers the skill 'arm.grsp'; did you mean 'arm.grasp'", "",
+    ),
+    (
+        "known component",
+        S + "  a:\n    entry:\n      - {set: base.speed, to: slow}\n      - {switch: bse, to: neutral}\n    on: {done: e}\n" + E,
+        6, "there is no component 'bse'; did you mean 'base'", "",
+    ),
+    (
+        "known component",
+        S + "  a:\n    entry: {set: base.speed, to: slow}\n    exit: {set: arn.speed, to: 1}\n    on: {done: e}\n" + E,
+        5, "there is no component 'arn'; did you mean 'arm'", "",
     ),
     (
         "known outcome",

@@ -194,3 +194,140 @@ def test_plots_and_domain_must_fit_before_anything_runs():
     wrong = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-onn")
     with pytest.raises(PlotError, match="did you mean 'switch-on'"):
         Executive(DOMAIN, [wrong], [lamps])
+
+
+NESTED = PlanningDomain.parse("""
+(define (domain lights)
+  (:types lamp)
+  (:predicates (on ?l - lamp) (near ?l - lamp) (works ?l - lamp))
+  (:action approach :parameters (?lamp - lamp) :precondition () :effect (near ?lamp))
+  (:action switch-on :parameters (?lamp - lamp) :precondition (works ?lamp) :effect (on ?lamp)))
+""")
+GO_AND_LIGHT = parse_plot("""
+plot: go_and_light
+parameters: {lamp: lamp}
+implements: switch-on
+states:
+  go:
+    goal: (near ?lamp)
+    on: {done: light, no_plan: light, gave_up: light}
+  light:
+    entry: {trigger: lamps.light, with: {lamp: ?lamp}}
+    on: {lit: ended, nothing: ended, bulb_blown: ended}
+  ended: {final: true}
+""")
+LIGHT_ALL = parse_plot(f"""
+plot: light_all
+states:
+  lighting: {{goal: {GOAL}, on: {{done: ended, no_plan: ended, gave_up: ended}}}}
+  ended: {{final: true}}
+""")
+
+
+class Walker(Component):
+    name = "legs"
+
+    @skill(outcomes={"there": {}}, types={"lamp": "lamp"})
+    async def walk(self, call: SkillCall, lamp: str) -> Outcome:
+        await call.clock.sleep(1.0)
+        return Outcome("there", observed=Delta(added=(fact("near", lamp),)))
+
+
+def test_a_plan_is_watched_also_after_one_of_its_steps_has_planned_for_itself():
+    approach = PlanFound(Plan((PlanStep("approach", ("a",)),)), "fake", 0.0, 0.1)
+    planner = Answers(found("a", "b"), approach, found("a"))
+    legs = Walker()
+    walk = primitive_plot(legs.skills()["walk"], done="there", implements="approach")
+    robot = Executive(NESTED, [LIGHT_ALL, GO_AND_LIGHT, walk], [Lamps(), legs], planner=planner)
+    works = tuple(fact("works", lamp) for lamp in "ab")
+    robot.knowledge.apply(Delta(nodes={"a": "lamp", "b": "lamp"}, added=works), "test")
+    records = []
+    robot.listen(records.append)
+
+    def prepare(sequencer):
+        broken = Delta(removed=(fact("works", "b"),))
+        asyncio.get_running_loop().call_later(2.0, sequencer.change, broken, "somebody")
+
+    robot.run("light_all", prepare=prepare)
+    (broken,) = [record for record in records if record.type == "plan.broken"]
+    assert (broken.t, broken.data["author"], broken.data["reason"]) == (2.0, "somebody", "(works b) is false")
+
+
+def test_a_thing_that_is_taken_out_of_the_world_ends_no_run_in_an_error():
+    robot, _ = executive(Answers(found("a")))
+    robot.knowledge.apply(Delta(added=(fact("on", "b"),)), "test")
+
+    def prepare(sequencer):
+        gone = Delta(removed_nodes=("b",), removed=(fact("works", "b"), fact("on", "b")))
+        asyncio.get_running_loop().call_later(0.5, sequencer.change, gone, "somebody")
+
+    arguments = {"goal": "(and (on a) (on b))", "holder": "", "replans": 2, "seconds": 5}
+    end = robot.run("achieve", arguments, prepare=prepare)
+    assert end.finished
+    assert "there is no object 'b'" in end.emitted[-1].attributes["reason"]
+
+
+def test_a_goal_about_a_thing_that_went_away_is_judged_open():
+    robot, lamps = executive(Answers(found("a")))
+    robot.knowledge.apply(Delta(added=(fact("on", "b"),)), "test")
+    light = lamps.light
+
+    async def light_and_lose(call, lamp):
+        outcome = await light(call, lamp)
+        gone = Delta(removed_nodes=("b",), removed=(fact("works", "b"), fact("on", "b")), added=outcome.observed.added)
+        return Outcome("lit", observed=gone)
+
+    lamps.light = light_and_lose
+    arguments = {"goal": "(and (on a) (on b))", "holder": "", "replans": 0, "seconds": 5}
+    end = robot.run("achieve", arguments)
+    assert end.finished
+    assert end.emitted[-1].name == "gave_up"
+
+
+def test_a_plan_that_is_wrong_is_not_put_down_to_the_world():
+    robot, _ = executive(Answers(found("a")))
+    assert "the plan found does not lead to the goal: (on b) is false" in how(robot.run("light_up"))
+
+
+def test_an_executive_can_be_closed_inside_a_loop():
+    async def main():
+        lamps = Lamps()
+        light = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
+        with Executive(DOMAIN, [HOLDER, light], [lamps]) as robot:
+            pass
+        return robot
+
+    assert asyncio.run(main()).library
+
+
+@pytest.mark.parametrize("rule", ["do: {then: help}", "of: [step_1], do: {then: give_up}"])
+def test_a_rule_about_the_states_of_its_plot_is_not_handed_to_a_plan(rule):
+    class Blown(Lamps):
+        @skill(outcomes={"lit": {}, "bulb_blown": {"lamp": "lamp"}, "nothing": {}}, types={"lamp": "lamp"})
+        async def light(self, call, lamp):
+            return Outcome("bulb_blown", {"lamp": lamp})
+
+    holder = parse_plot(f"""
+plot: light_up
+emits: {{ended: {{how: symbol}}}}
+states:
+  lighting:
+    goal: {GOAL}
+    budget: {{replans: 2, seconds: 5}}
+    on:
+      done: {{to: lit, emit: ended, with: {{how: reached}}}}
+      no_plan: {{to: lit, emit: ended, with: {{how: ?event.reason}}}}
+      gave_up: {{to: lit, emit: ended, with: {{how: ?event.reason}}}}
+  help: {{always: step_1}}
+  step_1: {{always: lit}}
+  lit: {{final: true}}
+rules:
+  - {{on: bulb_blown, {rule}}}
+""")
+    lamps = Blown()
+    light = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
+    robot = Executive(DOMAIN, [holder, light], [lamps], planner=Answers(found("a")))
+    robot.knowledge.apply(Delta(nodes={"a": "lamp"}, added=(fact("works", "a"),)), "test")
+    end = robot.run("light_up")
+    assert end.problem is None
+    assert how(end) == "bulb_blown"

@@ -201,3 +201,34 @@ def test_the_clock_is_held_while_the_engine_works_and_no_timer_of_the_loop_is_us
 
     asyncio.run(run())
     assert held == ["held", "released"]
+
+
+def test_a_planner_serves_one_run_after_the_other_each_in_a_loop_of_its_own():
+    both = planner(answering('{"actions": [0, 1]}'))
+
+    async def two_at_once():
+        return await asyncio.gather(both.solve(PROBLEM, 20), both.solve(PROBLEM, 20))
+
+    try:
+        found = [*asyncio.run(two_at_once()), *asyncio.run(two_at_once())]
+    finally:
+        both.kill()
+    assert all(isinstance(one, PlanFound) for one in found)
+
+
+def test_a_deadline_that_comes_just_after_the_answer_does_not_spoil_the_next_problem():
+    async def run():
+        asked = planner(answering('{"actions": [0, 1]}'))
+        await asked.solve(PROBLEM, 20)
+        process = asked._process
+        real = process._popen.kill
+        process._popen.kill = lambda: None  # the signal is on its way, the process has not ended yet
+        process._expire()
+        process._popen.kill = real
+        found = await asked.solve(PROBLEM, 20)
+        await asked.close()
+        return found, process
+
+    found, process = asyncio.run(run())
+    assert isinstance(found, PlanFound)
+    assert not process.alive
