@@ -37,16 +37,27 @@ def primitive_plot(
     on: dict[str, Any] = {done: "completed"}
     for event, attributes in others.items():
         on[event] = {"to": "ended", "emit": event, "with": {key: f"?event.{key}" for key in attributes}}
-    trigger = {"trigger": f"{skill.component}.{skill.name}", "with": {key: f"?{key}" for key in skill.parameters}}
+    parameters = {key: _parameter(skill, key) for key in skill.parameters if _can_be_given(skill, key)}
+    trigger = {"trigger": f"{skill.component}.{skill.name}", "with": {key: f"?{key}" for key in parameters}}
     states: dict[str, Any] = {"execute": {"entry": trigger, "on": on}, "completed": {"final": True}}
     if others:
         states["ended"] = {"final": True}
     return ActionPlot.model_validate({
         "plot": name or skill.name,
-        "parameters": {key: kind or "symbol" for key, kind in skill.parameters.items()},
+        "parameters": parameters,
         "emits": {event: {key: kind or "symbol" for key, kind in a.items()} for event, a in others.items()},
         "implements": implements,
         "when": when,
         "effects": effects,
         "states": states,
     })
+
+
+def _can_be_given(skill: SkillSignature, key: str) -> bool:
+    """A default that no plot can say (a list, `None`) is left to the skill."""
+    return key not in skill.defaults or isinstance(skill.defaults[key], str | int | float | bool)
+
+
+def _parameter(skill: SkillSignature, key: str) -> dict[str, Any]:
+    declared = {"type": skill.parameters[key] or "symbol"}
+    return {**declared, "default": skill.defaults[key]} if key in skill.defaults else declared

@@ -67,12 +67,19 @@ _Body = TypeVar("_Body", bound=SkillBody)
 
 @dataclass(frozen=True, slots=True)
 class SkillSignature:
-    """A skill's interface: parameter names with types (`None`: anything) and outcome events with attributes."""
+    """A skill's interface.
+
+    Attributes:
+        component, name: how charts address it, `component.name`.
+        parameters: names with types (`None`: anything).
+        defaults: values of the parameters that may be left out.
+        outcomes: events it may end with or report, with their attributes and types.
+    """
 
     component: str
     name: str
     parameters: Mapping[str, str | None]
-    optional: frozenset[str]
+    defaults: Mapping[str, Any]
     outcomes: Mapping[str, Mapping[str, str | None]]
 
 
@@ -161,7 +168,7 @@ def check_arguments(signature: SkillSignature, arguments: Mapping[str, Any]) -> 
                 f"skill '{name}' has no parameter '{given}'", found=given, valid=signature.parameters
             )
     for wanted in signature.parameters:
-        if wanted not in arguments and wanted not in signature.optional:
+        if wanted not in arguments and wanted not in signature.defaults:
             raise InputError(f"skill '{name}' needs its parameter '{wanted}'")
 
 
@@ -171,6 +178,6 @@ def _signature(component: str, name: str, body: SkillBody, declared: _Declared) 
         component=component,
         name=name,
         parameters={p.name: declared.types.get(p.name) for p in own},
-        optional=frozenset(p.name for p in own if p.default is not inspect.Parameter.empty),
+        defaults={p.name: p.default for p in own if p.default is not inspect.Parameter.empty},
         outcomes=declared.outcomes,
     )

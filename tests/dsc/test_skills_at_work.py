@@ -228,6 +228,24 @@ def test_a_component_that_is_for_ever_being_configured_is_timed_out():
     assert ran.at < 1000
 
 
+@pytest.mark.parametrize(
+    ("value", "slow", "why"),
+    [("impossible", 0.0, "RuntimeError: cannot be set"), ("side", 1e6, "no answer within 30 s")],
+)
+def test_a_component_that_cannot_be_configured_is_told_also_when_no_skill_needs_it(value, slow, why):
+    ran = Ran(
+        f"""
+        plot: p
+        states:
+          a: {{entry: {{set: arm.approach, to: {value}}}, after: {{seconds: 5, to: e}}}}
+          e: {{final: true}}
+        """,
+        arm=Arm(slow_to_configure=slow),
+    )
+    assert ran.end.finished
+    assert ran.end.problem == f"component 'arm' did not take what it was told: {why}"
+
+
 # -- components --------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,64 @@
+"""What people see of a run."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from domains.progress import LiveProgress, PlainProgress
+from domains.tally import Tally
+from dsc.trace import Record
+
+
+def record(seq, type_, **data):
+    return Record(seq, float(seq), type_, None, data)
+
+
+def step(entered=(), taken=()):
+    return {"microsteps": [{"event": None, "taken": list(taken), "exited": [], "entered": list(entered)}]}
+
+
+PLOT = {"plot": "main", "states": {"group": {"states": {"look": {"use": "search"}, "decide": {}}}, "end": {"final": True}}}
+PLAN = {
+    "plot": "plan_1", "generated": True,
+    "states": {"step_1": {"about": "(pick cup)", "dynamic": ["pick"]}, "step_1_slipped_0_retry": {"about": "rule", "use": "x"}},
+}  # fmt: skip
+RECORDS = [
+    record(1, "plot", plot=PLOT),
+    record(2, "step", **step(["group", "group/decide", "look"])),
+    record(3, "plan.found", plot="plan_1", steps=["(pick cup)"], engine="fake"),
+    record(4, "plot", plot=PLAN),
+    record(5, "step", **step(["clear/execute/step_1", "clear/execute/step_1/pick"])),
+    record(6, "rule", rule="slipped: pick, retry", state="clear/execute/step_1"),
+    record(7, "plan.none", kind="timed_out", reason="no plan within 5 s"),
+    record(8, "plan.broken", reason="(on cup) is false", author="somebody", step=1),
+    record(9, "end", finished=False, problem="nobody handles 'x'"),
+]
+LINES = [
+    "look", "plan with 1 steps (fake)", "step   1  (pick cup)", "rule  slipped: pick, retry",
+    "no plan, timed_out: no plan within 5 s", "the plan no longer holds: (on cup) is false",
+    "ended early: nobody handles 'x'",
+]  # fmt: skip
+
+
+def test_plain_lines_say_what_is_worth_knowing():
+    lines = []
+    progress = PlainProgress(lines.append)
+    for one in RECORDS:
+        progress(one)
+    assert [line.split(" s  ", 1)[1] for line in lines] == LINES
+
+
+@pytest.mark.parametrize("skill", ["arm.grasp", "planner.plan"])
+def test_on_a_terminal_a_status_line_stands_below_the_same_lines(skill):
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=True, width=100)
+    tally = Tally()
+    with LiveProgress(console, lambda: 4, tally) as progress:
+        for one in [*RECORDS, record(10, "action", action="start", id="a1", skill=skill, arguments={"item": "[cup]"})]:
+            tally(one)
+            progress(one)
+    shown = screen.getvalue()
+    assert all(line in shown for line in LINES)
+    assert "left 4  plans 1" in shown
+    assert ("arm.grasp([cup])" in shown) == (skill == "arm.grasp")

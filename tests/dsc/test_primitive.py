@@ -1,0 +1,39 @@
+"""One skill as a plot."""
+
+import pytest
+
+from dsc import Component, Library, Outcome, primitive_plot, skill, validate_plot
+from knowledge_base import UnknownNameError
+
+
+class Arm(Component):
+    name = "arm"
+
+    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}}, types={"item": "item"})
+    async def grasp(self, call, item, force=1):
+        return Outcome("grasped")
+
+
+GRASP = Arm().skills()["grasp"]
+
+
+def test_it_is_done_after_one_outcome_and_emits_every_other():
+    plot = primitive_plot(GRASP, done="grasped", name="take", implements="pick-up", when="(free)", effects="assumed")
+    assert (plot.name, plot.implements, plot.effects) == ("take", "pick-up", "assumed")
+    assert plot.emits == {"slipped": {"item": "item"}}
+    assert {name: one.type for name, one in plot.parameters.items()} == {"item": "item", "force": "symbol"}
+    (slipped,) = plot.states["execute"].on["slipped"]
+    assert (slipped.emit, slipped.target) == ("slipped", "ended")
+
+
+def test_a_parameter_that_the_skill_can_do_without_may_be_left_out():
+    plot = primitive_plot(GRASP, done="grasped")
+    holder = {"plot": "h", "states": {"s": {"use": "grasp", "with": {"item": "cup"}, "on": {"done": "e", "slipped": "e"}},
+                                      "e": {"final": True}}}  # fmt: skip
+    made = type(plot).model_validate(holder)
+    assert validate_plot(made, Library([made, plot]), None, [GRASP], {"arm"}) == []
+
+
+def test_an_outcome_that_the_skill_does_not_have_is_an_error():
+    with pytest.raises(UnknownNameError, match="did you mean 'grasped'"):
+        primitive_plot(GRASP, done="grapsed")
