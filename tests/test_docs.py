@@ -38,10 +38,21 @@ def test_links_lead_somewhere(page):
         assert target.startswith("https://") or (page.parent / target).exists(), target
 
 
-def test_the_pictures_are_what_the_project_draws_today():
-    plots = ROOT / "domains" / "clean_up_table" / "plots"
-    picture = (ROOT / "docs" / "pictures" / "clean_up_table.svg").read_text()
-    assert picture == draw(load_plot(plots / "clean_up_table.yaml"), load_library(plots), rules=False), "make pictures"
+TABLE = ROOT / "domains" / "clean_up_table" / "plots"
+PICTURES = {"clean_up_table": TABLE, "search": TABLE, "achieve": ROOT / "planning" / "plots"}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_the_pictures_are_what_the_project_draws_today(name):
+    picture = (ROOT / "docs" / "pictures" / f"{name}.svg").read_text()
+    folder = PICTURES[name]
+    assert picture == draw(load_plot(folder / f"{name}.yaml"), load_library(folder)), "make pictures"
+
+
+def test_every_picture_is_shown_somewhere():
+    shown = "".join(page.read_text() for page in PAGES)
+    assert {picture.stem for picture in (ROOT / "docs" / "pictures").iterdir()} == set(PICTURES)
+    assert all(f"pictures/{name}.svg" in shown for name in PICTURES)
 
 
 def test_the_run_on_the_first_screen_is_what_the_command_prints():
