@@ -70,15 +70,26 @@ def show(file: File, domain: Domain = None, json: Json = False) -> None:
 
 
 def _load(file: Path, domain: Path | None) -> tuple[KnowledgeBase, ProblemText]:
+    from knowledge_base.exchange.files import read_text
     from knowledge_base.exchange.pddl import read_problem
     from knowledge_base.schema import Schema
     from knowledge_base.store import KnowledgeBase
 
-    schema = Schema.from_pddl(domain or file.parent / "domain.pddl")
+    read_text(file)  # what was asked for comes first: without it nobody cares for its domain
+    schema = Schema.from_pddl(domain or _beside(file))
     problem = read_problem(file, schema)
     kb = KnowledgeBase(schema)
     kb.apply(problem.delta(), author=str(file))
     return kb, problem
+
+
+def _beside(problem: Path) -> Path:
+    from knowledge_base.errors import InputError
+
+    domain = problem.parent / "domain.pddl"
+    if not domain.exists():
+        raise InputError(f"there is no '{domain}' beside the problem; name its domain with --domain")
+    return domain
 
 
 def _print_json(said: dict[str, Any]) -> None:

@@ -53,7 +53,7 @@ class InputError(Exception):
         self.message = message
         self.place = place
         self.found = found
-        self.valid = tuple(sorted(valid))
+        self.valid = tuple(sorted(set(valid)))
 
     @property
     def nearest(self) -> str | None:

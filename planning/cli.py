@@ -38,12 +38,9 @@ def plan_command(
     from planning.problem import pose
 
     planning_domain = PlanningDomain.from_pddl(domain)
-    read = read_problem(problem, planning_domain.schema)
-    if read.domain != planning_domain.name:
-        raise InputError(
-            f"the problem is for the domain '{read.domain}', but '{domain}' defines '{planning_domain.name}'",
-            place=Place(str(problem)),
-        )
+    read = read_problem(problem, planning_domain.schema, domain=planning_domain.name)
+    if not read.has_goal:
+        raise InputError("the problem has no goal: (:goal CONDITION)", place=Place(str(problem), 1))
     world = KnowledgeBase(planning_domain.schema)
     world.apply(read.delta(), author=str(problem))
     outcome = _solve(pose(planning_domain, world, read.goal), seconds)

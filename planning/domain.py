@@ -117,6 +117,7 @@ def _checked(action: ActionText, schema: Schema) -> PlanningAction:
         for one in parameter.types:
             schema.require_type(one, parameter.place)  # a parameter is a thing: a plan names it
     variables = check_parameters(action.parameters, schema)
-    check(action.precondition, schema, variables)
-    check_effect(action.effect, schema, variables)
+    # A name that is no constant is a mistake here: the problem's objects are not known to the domain.
+    check(action.precondition, schema, variables, objects=schema.constants)
+    check_effect(action.effect, schema, variables, objects=schema.constants)
     return PlanningAction(action.name, action.parameters, action.precondition, action.effect, action.place)

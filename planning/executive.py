@@ -23,6 +23,7 @@ from planning.component import PlanningComponent
 from planning.domain import PlanningDomain
 from planning.implementations import check_implementations
 from planning.planner import Planner, PlannerProcess
+from planning.problem import check_goal
 
 Prepare = Callable[[Sequencer], None]
 """Called before a run starts, e.g. to post events or to keep the sequencer at hand."""
@@ -100,10 +101,13 @@ class Executive:
     def achieve(self, goal: str, *, simulated: bool = True) -> RunEnd:
         """Plan for a goal, carry the plan out, and plan again when the world disagrees.
 
+        The end is `finished` when the attempt has come to its end; a goal that was not reached shows in what
+        it `emitted`: `no_plan` or `gave_up`, with the reason.
+
         Raises:
-            InputError: the goal is no condition.
+            InputError: the goal is no condition, or names something that is not declared or not known.
         """
-        parse_condition(goal)
+        check_goal(parse_condition(goal), self.knowledge)
         budget = Budget()
         arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
         return self.run(ACHIEVE, arguments, simulated=simulated)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.effect import Add
+from knowledge_base.language.effect import Add, AllOf, Effect, ForEach, When
 from knowledge_base.language.evaluation import World, explain
-from knowledge_base.language.expression import And, Expression, substitute
+from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
 from knowledge_base.language.printer import to_text
 from planning.conditions import Every, Grounder, Literal, Residual, Some
 from planning.grounding import Reached, Rule
@@ -20,7 +20,7 @@ from planning.relevance import effect_leaves, reachable
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from planning.domain import PlanningDomain
+    from planning.domain import PlanningAction, PlanningDomain
 
 _LONGEST_CHAIN = 6
 
@@ -38,10 +38,10 @@ def why_unsolvable(domain: PlanningDomain, world: World, goal: Expression) -> tu
     problem = grounded(domain, world, goal)
     if problem.wanted is False:
         return (f"{explain(goal, world).deciding} and no planning action changes that",)
-    rules = tuple(Rule.of(action, problem.grounder) for action in problem.actions)
+    rules = tuple(Rule.of(case, problem.grounder) for action in problem.actions for case in _cases(action))
     possible, _ = reachable(problem.init, problem.ways)
     known = dict.fromkeys([*_present(rules, world), *sorted(possible, key=str)])
-    causes = _Causes(rules, problem.grounder, frozenset(known), Reached(known))
+    causes = _Causes(domain, rules, problem.grounder, frozenset(known), Reached(known))
     return tuple(dict.fromkeys(causes.of(problem.wanted))) or (
         "each goal fact can be reached by itself, but not all of them together",
     )
@@ -60,6 +60,7 @@ class _Nearest:
 
 @dataclass(frozen=True, slots=True)
 class _Causes:
+    domain: PlanningDomain
     rules: tuple[Rule, ...]
     grounder: Grounder
     reached: frozenset[Fact]
@@ -129,14 +130,43 @@ class _Causes:
         return {k: v for k, v in full.items() if v is not None} if None not in full.values() else None
 
     def lacking(self, rule: Rule, bindings: dict[str, Value]) -> _Nearest:
-        step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in rule.action.parameters))
+        parameters = self.domain.actions[rule.action.name].parameters
+        step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in parameters))
         needed = [self.grounder.fact(atom, bindings) for atom in rule.atoms]
-        precondition = rule.action.precondition
-        others = precondition.parts if isinstance(precondition, And) else (precondition,)
+        others = _parts(rule.action.precondition)
         unmet = [c for c in others if c not in rule.atoms and self.grounder.residual(c, bindings) is False]
         missing = tuple(fact for fact in needed if fact not in self.reached)
         fixed = len(unmet) + sum(fact.predicate not in self.grounder.changing for fact in missing)
         return _Nearest(step, missing, tuple(to_text(substitute(c, bindings)) for c in unmet), fixed)
+
+
+def _cases(action: PlanningAction) -> Iterator[PlanningAction]:
+    """One action for each effect, with what the effect depends on as parameters and precondition."""
+    for leaf, variables, conditions in _effects(action.effect):
+        needed = (*_parts(action.precondition), *(part for one in conditions for part in _parts(one)))
+        yield replace(
+            action, parameters=(*action.parameters, *variables), precondition=And(needed), effect=leaf
+        )
+
+
+def _effects(
+    effect: Effect, variables: tuple[TypedVariable, ...] = (), conditions: tuple[Expression, ...] = ()
+) -> Iterator[tuple[Effect, tuple[TypedVariable, ...], tuple[Expression, ...]]]:
+    """The changes an effect consists of, each with the variables and conditions around it."""
+    match effect:
+        case AllOf(parts):
+            for part in parts:
+                yield from _effects(part, variables, conditions)
+        case ForEach(more, body):
+            yield from _effects(body, (*variables, *more), conditions)
+        case When(condition, body):
+            yield from _effects(body, variables, (*conditions, condition))
+        case _:
+            yield effect, variables, conditions
+
+
+def _parts(e: Expression) -> tuple[Expression, ...]:
+    return e.parts if isinstance(e, And) else (e,)
 
 
 def _present(rules: Iterable[Rule], world: World) -> Iterator[Fact]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 from dsc.dynamic.library import Library
 from dsc.errors import Finding
@@ -12,6 +13,9 @@ from planning.domain import PlanningDomain
 
 def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[Finding]:
     """Findings: an unknown action, a parameter the action does not have, an action without any plot.
+
+    Also plots of one action of which some are `observed` and some `assumed`: a generated plot does not know
+    which of them will be chosen, and would wait for effects that nobody reports.
 
     A domain none of whose actions is implemented is fine: it is then used without a planner.
     """
@@ -37,6 +41,18 @@ def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[
                 )  # fmt: skip
                 yield Finding(missing, "parameters of the action")
     for name, action in domain.actions.items():
+        yield from _mixed_effects(name, library)
         if implemented and name not in implemented:
             error = SchemaError(f"no plot implements the planning action '{name}'", place=action.place)
             yield Finding(error, "every action has a plot", f"add a plot with `implements: {name}`")
+
+
+def _mixed_effects(action: str, library: Library) -> Iterator[Finding]:
+    for first, plot in pairwise(library.implementing(action)):
+        if plot.effects != first.effects:
+            error = SchemaError(
+                f"the plots '{first.name}' and '{plot.name}' implement '{action}', but only one says"
+                " `effects: assumed`",
+                place=plot.place(("effects",)) or plot.place(("implements",)),
+            )
+            yield Finding(error, "effects of the action", "say the same in all plots of an action")

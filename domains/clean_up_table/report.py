@@ -41,8 +41,8 @@ class Report:
     """What a run came to.
 
     Attributes:
-        goal_reached: every item that ever stood on the table, seen or not, is where it belongs, and the robot
-            says so too.
+        goal_reached: every item that ever stood on the table, seen or not, is where it belongs, and the run
+            came to its end without a problem.
         items: how many stood on the table.
         left: those that are not where they belong.
         trips: times something was thrown away.

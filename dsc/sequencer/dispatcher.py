@@ -99,8 +99,12 @@ class Dispatcher:
         """The final answer of a skill has been taken; until then its component counts as busy."""
         self._running.pop(start.action_id, None)
 
-    async def close(self) -> None:
-        """Cancel skills and timers, and wait until they have stopped and components are told what they were sent."""
+    async def close(self) -> list[str]:
+        """Cancel skills and timers, and wait until they have stopped and components are told what they were sent.
+
+        Returns:
+            What components could not take, as far as no skill has failed because of it.
+        """
         for activation in {start.activation for start, _ in self._running.values()}:
             self._cancel(activation)
         for handle in self._timers.values():
@@ -112,7 +116,8 @@ class Dispatcher:
             for task in late:
                 task.cancel()
             for task in stopped:
-                _failure(task)  # nobody is left to hear of it
+                _failure(task)  # of a skill that was cancelled, nobody wants to hear it
+        return [_untaken(name, task) for name, task in self._configuring.items() if not _succeeded(task)]
 
     def _switch(self, output: SwitchMode) -> None:
         component = self.component(output.component)
@@ -198,6 +203,16 @@ class Dispatcher:
 def _failure(task: asyncio.Task[None]) -> BaseException | None:
     """What a task that is over raised, if anything."""
     return None if task.cancelled() else task.exception()
+
+
+def _succeeded(task: asyncio.Task[None]) -> bool:
+    return task.done() and not task.cancelled() and task.exception() is None
+
+
+def _untaken(component: str, task: asyncio.Task[None]) -> str:
+    why = _failure(task) if task.done() else None
+    reason = f"{type(why).__name__}: {why}" if why is not None else f"no answer within {CLOSING:g} s"
+    return f"component '{component}' did not take what it was told: {reason}"
 
 
 def _cancelled_from_outside() -> bool:

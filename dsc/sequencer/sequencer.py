@@ -112,6 +112,8 @@ class Sequencer:
             InputError: the plot is unknown, or a parameter is missing or unknown.
         """
         progress = _Progress()
+        # Before anybody who is started by the run subscribes: what follows from a change is recorded after it.
+        unsubscribe = self.knowledge.subscribe(self._tracer.knowledge)
         try:
             self._start(plot, arguments or {}, progress)
             while not self.machine.state.finished and progress.problem is None:
@@ -121,7 +123,10 @@ class Sequencer:
                 self._take(await self._inbox.get(), progress)
         finally:
             self._leave(progress)
-            await self.dispatcher.close()
+            untaken = await self.dispatcher.close()
+            unsubscribe()
+        if untaken and progress.problem is None:
+            progress.problem = "; ".join(untaken)
         self.trace.record("end", finished=self.machine.state.finished, problem=progress.problem)
         return RunEnd(self.machine.state.finished, tuple(progress.emitted), progress.problem)
 
@@ -186,8 +191,7 @@ class Sequencer:
 
     def _apply(self, delta: Delta, author: str) -> None:
         if delta:
-            change = self.knowledge.apply(delta, author)
-            self._tracer.knowledge(change)
+            self.knowledge.apply(delta, author)
 
     def _commit(self, step: Step, progress: _Progress) -> None:
         """First what the chart told becomes knowledge, then actions leave."""

@@ -70,19 +70,21 @@ class StepTracer:
             )
 
     def knowledge(self, change: Change) -> None:
-        """A committed change of the knowledge base, if it changed anything."""
+        """A committed change of the knowledge base, if any; what nothing else led to is itself a cause."""
         delta = change.delta
-        if delta:
-            self._trace.record(
-                "knowledge",
-                version=change.version,
-                author=change.author,
-                nodes=dict(delta.nodes),
-                removed=[str(f) for f in delta.removed],
-                added=[str(f) for f in delta.added],
-                values={str(f): value for f, value in delta.values.items()},
-                **({"removed_nodes": list(delta.removed_nodes)} if delta.removed_nodes else {}),
-            )
+        if not delta:
+            return
+        seq = self._trace.record(
+            "knowledge",
+            version=change.version,
+            author=change.author,
+            nodes=dict(delta.nodes),
+            removed=[str(f) for f in delta.removed],
+            added=[str(f) for f in delta.added],
+            values={str(f): value for f, value in delta.values.items()},
+            **({"removed_nodes": list(delta.removed_nodes)} if delta.removed_nodes else {}),
+        )
+        self._trace.cause = self._trace.cause or seq
 
     def output(self, output: Output) -> int | None:
         """An action that leaves; timers do not."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeGuard
 
-from knowledge_base.errors import ParseError, SchemaError
+from knowledge_base.errors import ParseError, SchemaError, UnknownNameError
 from knowledge_base.exchange.files import text_and_source
 from knowledge_base.exchange.sections import Definition, read_definition, word
 from knowledge_base.facts import Delta, Fact, Value
@@ -50,6 +50,7 @@ class ProblemText:
         init: what holds at first; what is not said does not hold.
         values: numeric fluents' values at first.
         goal: the condition wanted; true when the file has none.
+        has_goal: whether the file says what is wanted.
     """
 
     name: str
@@ -58,13 +59,16 @@ class ProblemText:
     init: tuple[Fact, ...]
     values: Mapping[Fact, float]
     goal: Expression
+    has_goal: bool
 
     def delta(self) -> Delta:
         """The change from an empty world to the problem's first state."""
         return Delta(nodes=self.objects, added=self.init, values=self.values)
 
 
-def read_problem(text_or_path: str | Path, schema: Schema, source: str | None = None) -> ProblemText:
+def read_problem(
+    text_or_path: str | Path, schema: Schema, source: str | None = None, domain: str | None = None
+) -> ProblemText:
     """Read a PDDL problem: a `Path` or a file's name, or the text itself.
 
     `:metric` and negative facts in `:init` are accepted and say nothing new.
@@ -73,9 +77,10 @@ def read_problem(text_or_path: str | Path, schema: Schema, source: str | None = 
         text_or_path: a file, or text that begins with `(` or a comment.
         schema: the schema of its domain.
         source: the name of the text in messages.
+        domain: the name of that domain, if the problem must be for it.
 
     Raises:
-        InputError: the file cannot be read.
+        InputError: the file cannot be read, or is for another domain.
         ParseError: the form is wrong, or a part of PDDL is used that is not supported.
         UnknownNameError: an undeclared type, predicate, function or object.
         SchemaError: a wrong number of arguments, a wrong type, an object declared in two ways.
@@ -83,25 +88,33 @@ def read_problem(text_or_path: str | Path, schema: Schema, source: str | None = 
     text, source = text_and_source(text_or_path, source)
     definition = read_definition(text, source, "problem", _SECTIONS)
     definition.requirements()
+    named = _domain(definition, domain)
     objects = _objects(parse_names(definition.nodes(":objects")), schema)
     init = _Init(schema, {**schema.constants, **objects})
     for node in definition.nodes(":init"):
         init.read(node)
     return ProblemText(
         name=definition.name,
-        domain=_domain(definition),
+        domain=named,
         objects=objects,
         init=tuple(init.facts),
         values=init.values,
         goal=_goal(definition, schema, init.objects),
+        has_goal=bool(definition.nodes(":goal")),
     )
 
 
-def _domain(definition: Definition) -> str:
+def _domain(definition: Definition, expected: str | None) -> str:
     nodes = definition.nodes(":domain")
     if len(nodes) != 1:
         raise ParseError("a problem says what it is for: (:domain NAME)", place=definition.place)
-    return word(nodes[0], "the domain's name").folded()
+    named = word(nodes[0], "the domain's name")
+    if expected is not None and named.folded() != expected:
+        raise UnknownNameError(
+            f"the problem is for the domain '{named.folded()}', not for '{expected}'",
+            place=named.place, found=named.folded(), valid=(expected,),
+        )  # fmt: skip
+    return named.folded()
 
 
 def _objects(names: Sequence[TypedName], schema: Schema) -> dict[str, str]:

@@ -116,11 +116,12 @@ def _define(nodes: list[Node], source: str | None) -> Group:
 def _name(group: Group, kind: str) -> tuple[str, Place]:
     head = group.head()
     if head != kind:
+        misspelt = head not in ("domain", "problem")  # the other kind of file is no typing error
         raise ParseError(
             f"a {kind} file is expected, this defines a '{head}'",
             place=group.place,
             found=head,
-            valid=("domain", "problem"),
+            valid=(kind,) if misspelt else (),
         )
     if len(group.items) != 2:
         raise ParseError(f"a {kind} has one name: ({kind} NAME)", place=group.place)

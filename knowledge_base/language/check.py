@@ -104,6 +104,17 @@ def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
     return ("text" if isinstance(value, str) else "number") in wanted
 
 
+def _written(term: Term) -> str:
+    """A term as messages call it."""
+    match term:
+        case Variable(name):
+            return f"'?{name}'"
+        case Constant(value):
+            return f"'{value}'"
+        case _:
+            return "the argument"
+
+
 def _single(types: tuple[str, ...]) -> str | None:
     if not types:
         return "object"
@@ -210,9 +221,8 @@ class _Checker:
             return
         if isinstance(arg, Constant) and types == ("text",):
             raise unknown_object(str(arg.value), arg.place, self.names())
-        written = f"'?{arg.name}'" if isinstance(arg, Variable) else "the argument"
         raise SchemaError(
-            f"{written} is of type {' or '.join(types)}, but '?{parameter.name}' of '{signature.name}' is of "
+            f"{_written(arg)} is of type {' or '.join(types)}, but '?{parameter.name}' of '{signature.name}' is of "
             f"type {' or '.join(wanted)}",
             place=arg.place or signature.place,
         )

@@ -253,7 +253,7 @@ def test_a_component_tells_its_skills():
     signature = Arm("left").skills()["grasp"]
     assert signature.component == "left"
     assert signature.parameters == {"item": "item", "seconds": None, "ends": None}
-    assert signature.optional == {"item", "seconds", "ends"}
+    assert set(signature.defaults) == {"item", "seconds", "ends"}
     assert signature.outcomes == {"grasped": {}, "slipped": {"item": "item"}}
     assert set(Arm().skills()) == {"grasp", "look", "breaks", "waits_for_a_thread"}
 

@@ -135,7 +135,7 @@ PROBLEMS = [
     ("(:objects ?a - cup)", ParseError, "cannot be a name", None),
     ("(:init (quiett))", UnknownNameError, "no predicate", "quiet"),
     ("(:init (on cup1 home))", UnknownNameError, "no object 'cup1'", None),
-    ("(:objects a b - cup) (:init (on a b))", SchemaError, "is of type cup", None),
+    ("(:objects a b - cup) (:init (on a b))", SchemaError, "'b' is of type cup", None),
     ("(:objects a - cup) (:init (cup a))", SchemaError, "say it in :objects", None),
     ("(:init (= (time) (+ 1 1)))", ParseError, "':init' has facts", None),
     ("(:init (and (quiet)))", ParseError, "':init' has facts", None),
@@ -162,7 +162,8 @@ def test_problems(text: str, kind: type[InputError], message: str, nearest: str 
         ("; nothing", "empty"),
         ("(domain d)", "begins with"),
         ("(define domain d)", "followed by"),
-        ("(define (problem p))", "this defines a 'problem'"),
+        ("(define (problem p))", "this defines a 'problem'$"),
+        ("(define (domian p))", "did you mean 'domain'"),
         ("(define (domain))", "one name"),
         ("(define (domain d)) )", "without a"),
         ("(define (domain d)) (define (domain e))", "holds one"),
@@ -185,6 +186,11 @@ def test_files_that_cannot_be_read(tmp_path) -> None:
         read_domain(tmp_path)
     with pytest.raises(InputError, match="cannot read"):
         read_domain("a\0b")
+
+
+def test_a_name_that_is_valid_twice_is_listed_once() -> None:
+    error = InputError("no such thing", found="x", valid=["home", "shelf", "home"])
+    assert str(error) == "no such thing; valid: home, shelf"
 
 
 TELLS = [

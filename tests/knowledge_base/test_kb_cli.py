@@ -77,6 +77,14 @@ def test_mistakes_are_input_errors(problem, tmp_path, file: str, expression: str
     assert message in str(caught.value)
 
 
+def test_without_a_domain_beside_it_the_option_is_named(tmp_path) -> None:
+    (tmp_path / "problem.pddl").write_text(PROBLEM, encoding="utf-8")
+    with pytest.raises(InputError, match="--domain"):
+        run("show", str(tmp_path / "problem.pddl"))
+    with pytest.raises(InputError, match=r"no file .*problm\.pddl'; did you mean 'problem\.pddl'"):
+        run("show", str(tmp_path / "problm.pddl"))
+
+
 def test_importing_the_package_and_the_command_loads_nothing_heavy() -> None:
     heavy = "{'networkx', 'pydantic', 'unified_planning', 'rich'} & set(sys.modules)"
     code = f"import sys, knowledge_base, knowledge_base.cli; print({heavy})"

@@ -97,6 +97,8 @@ def test_a_failed_engine_has_a_status_of_its_own(run, monkeypatch):
         ("- cup)", "- cop)", "did you mean 'cup'"),
         ("(lies-at cup1 table)", "(lies-at cup1 tabel)", "did you mean 'table'"),
         ("(:domain clean-up-table)", "(:domain clean-up-tables)", "is for the domain 'clean-up-tables'"),
+        ("(:domain clean-up-table)\n  (:objects", "(:domain ferry)\n  (:objects c - car", "for the domain 'ferry'"),
+        ("(:goal (forall (?i - item) (tidy ?i)))", "", "has no goal"),
     ],
 )
 def test_bad_input_names_file_and_what_was_meant(run, old, new, said):

@@ -9,7 +9,7 @@ from planning.domain import PlanningDomain
 from planning.plan import PlanStep
 
 ACTION = """(define (domain d)
-  (:types item place - object  cup - item)
+  (:types item place - object  cup - item) (:constants home - place)
   (:predicates (at ?i - item ?p - place) (held ?i - item))
   (:functions (weight ?i - item))
   (:action take
@@ -41,6 +41,8 @@ def test_the_domain_has_its_actions_in_order(clean_up):
         ({"parameters": "?i - itme ?p - place"}, 6, "item"),
         ({"parameters": "?i ?i - item ?p - place"}, 6, "twice"),
         ({"parameters": "?i - item ?p - number"}, 6, "number"),
+        ({"precondition": "(at ?i hoem)"}, 7, "'home'"),
+        ({"effect": "(at ?i hoem)"}, 8, "'home'"),
         ({"effect": "(hold ?i)"}, 8, "held"),
         ({"effect": "(cup ?i)"}, 8, "type"),
         ({"effect": "(or (held ?i))"}, 8, "or"),

@@ -66,3 +66,19 @@ def test_a_condition_that_cannot_change_is_named(world_of):
 def test_a_typo_in_the_goal_is_an_error(clean_up, table):
     with pytest.raises(UnknownNameError, match="'tidy'"):
         why_unsolvable(clean_up, table(1), parse_condition("(tidi cup1)"))
+
+
+def test_a_conditional_effect_needs_its_condition(world_of):
+    from planning.domain import PlanningDomain
+
+    domain = PlanningDomain.parse("""(define (domain lift) (:types person floor)
+      (:predicates (at ?f - floor) (boarded ?p - person) (served ?p - person) (bound ?p - person ?f - floor))
+      (:action stop :parameters (?f - floor) :precondition (at ?f) :effect
+        (forall (?p - person) (when (and (boarded ?p) (bound ?p ?f)) (served ?p)))))""")
+    world = world_of(domain.schema, {"ann": "person", "f1": "floor", "f2": "floor"})
+    world.apply(Delta(added=(fact("at", "f2"), fact("bound", "ann", "f2"))), author="test")
+    [why] = why_unsolvable(domain, world, parse_condition("(served ann)"))
+    assert why == (
+        "(served ann) needs (stop f2), which needs (boarded ann); "
+        "(boarded ann) does not hold, and no planning action makes it true"
+    )
