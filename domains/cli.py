@@ -31,6 +31,23 @@ app.command("plan")(plan_command)
 WORLDS = ("clean-up-table",)
 
 
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"dsc {version('dynamic-state-charts')}")
+        raise typer.Exit
+
+
+@app.callback()
+def dsc(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Dynamic State Charts: state charts for what you can foresee, a planner for what you cannot."""
+
+
 @app.command()
 def run(
     world: Annotated[str, typer.Argument(help="The ready world to run: clean-up-table.")],

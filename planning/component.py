@@ -56,8 +56,8 @@ class PlanningComponent(Component):
         planner: finds plans.
         clock: holds simulated time while the planner works.
         trace: hears `plan.asked`, `plan.found`, `plan.none`, `plan.broken`.
-        busy: names of the components that carry out a skill right now; what they observe is the running
-            step's own doing and is judged when the step ends (see the contract on monitoring).
+        working_for: names of the components that carry out skills for the state that started an action, by the
+            action's id; what they observe is the running step's own doing and is judged when the step ends.
     """
 
     name = "planner"
@@ -70,7 +70,7 @@ class PlanningComponent(Component):
         planner: Planner,
         clock: LoopClock,
         trace: Trace,
-        busy: Callable[[], frozenset[str]],
+        working_for: Callable[[str], frozenset[str]],
     ) -> None:
         super().__init__()
         self._domain = domain
@@ -79,7 +79,7 @@ class PlanningComponent(Component):
         self._planner = planner
         self._clock = clock
         self._trace = trace
-        self._busy = busy
+        self._working_for = working_for
         self._running: dict[str, _Running] = {}
         self._plans = 0
 
@@ -122,7 +122,7 @@ class PlanningComponent(Component):
         return Outcome("goal_holds") if why.truth else Outcome("goal_open", {"reason": str(why.deciding)})
 
     @skill(outcomes={"plan_invalid": {"reason": "text", "author": "symbol"}})
-    async def monitor(self, call: SkillCall, plan: str) -> Outcome:  # noqa: ARG002
+    async def monitor(self, call: SkillCall, plan: str) -> Outcome:
         """Watch the plan of that name being carried out; ends when the rest of it no longer leads to the goal.
 
         What somebody else changes is judged at once, what the running step changes when it has ended.
@@ -133,7 +133,7 @@ class PlanningComponent(Component):
         running.broken = asyncio.get_running_loop().create_future()
 
         def judge_change(change: Change) -> None:
-            if change.author != CHART and change.author not in self._busy():
+            if change.author != CHART and change.author not in self._working_for(call.action_id):
                 self._judge_plan(running, change.author)
 
         unsubscribe = self._knowledge.subscribe(judge_change)
@@ -147,11 +147,13 @@ class PlanningComponent(Component):
     async def _search(self, call: SkillCall, goal: Expression, holder: str, seconds: float) -> Outcome:
         for _ in range(MAX_ATTEMPTS):
             version = self._knowledge.version
-            problem = pose(self._domain, self._knowledge.snapshot(), goal)
-            with self._clock.hold():
+            snapshot = self._knowledge.snapshot()
+            with self._clock.hold():  # grounding takes its time as well: in a thread, so that a stop is obeyed
+                problem = await asyncio.to_thread(pose, self._domain, snapshot, goal)
                 answer = await self._planner.solve(problem, seconds)
             if isinstance(answer, ProvenUnsolvable):
-                missing = why_unsolvable(self._domain, self._knowledge, goal)
+                with self._clock.hold():
+                    missing = await asyncio.to_thread(why_unsolvable, self._domain, snapshot, goal)
                 return self._none("unsolvable", "; ".join(missing) or answer.reason)
             if isinstance(answer, TimedOut):
                 return self._none("timed_out", f"no plan within {answer.seconds:g} s")

@@ -17,6 +17,7 @@ from dsc.skills import Component, signatures
 from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
 from dsc.validation import raise_findings, validate_library
+from knowledge_base.errors import SchemaError
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.component import PlanningComponent
@@ -54,6 +55,7 @@ class Executive:
     ) -> None:
         self.domain = domain if isinstance(domain, PlanningDomain) else PlanningDomain.from_pddl(domain)
         self.components = tuple(components)
+        _refuse_namesakes(self.components)
         self.knowledge = knowledge if knowledge is not None else KnowledgeBase(self.domain.schema)
         self.library = Library(plots)
         if ACHIEVE not in self.library:
@@ -124,7 +126,7 @@ class Executive:
         sequencer = Sequencer(self.library, self.knowledge, components, clock, trace, open_ended=open_ended)
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner, clock, trace,
-            busy=lambda: sequencer.dispatcher.busy,
+            working_for=sequencer.working_for,
         )  # fmt: skip
         sequencer.dispatcher.deploy(planning)
         if prepare is not None:
@@ -149,3 +151,11 @@ def achieve_plot() -> ActionPlot:
     """The plot that stands in where no designed candidate fits."""
     resource = files("planning") / "plots" / "achieve.yaml"
     return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
+
+
+def _refuse_namesakes(components: Iterable[Component]) -> None:
+    names = {PlanningComponent.name}
+    for component in components:
+        if component.name in names:
+            raise SchemaError(f"two components are named '{component.name}'", found=component.name)
+        names.add(component.name)

@@ -16,17 +16,8 @@ from dsc.events import GAVE_UP
 from dsc.model.plot import ActionPlot, Rule
 from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import UnknownNameError
-from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
-from knowledge_base.language.expression import (
-    And,
-    Atom,
-    Call,
-    Expression,
-    Not,
-    substitute,
-    substitute_term,
-    unshadowed,
-)
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, substitute_effect
+from knowledge_base.language.expression import And, Atom, Expression, Not, substitute, substitute_term
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -101,7 +92,7 @@ def _step_states(
     after = f"after_{number}"
     done: dict[str, Any] = {"to": after}
     if not observed:
-        done["tell"] = with_arguments(effect, bindings)
+        done["tell"] = substitute_effect(effect, bindings)
     expected = expectation(effect, bindings) if observed else And(())
     confirm = max(plot.confirm for plot in candidates)
     late = {"seconds": confirm, "to": REPLAN_STATE, "assign": {"reason": f"not observed: {step}"}}
@@ -143,20 +134,6 @@ def expectation(effect: Effect, bindings: Mapping[str, Value]) -> Expression:
     added = [_ground(part.atom, bindings) for part in _literals(effect) if isinstance(part, Add)]
     deleted = [_ground(part.atom, bindings) for part in _literals(effect) if isinstance(part, Delete)]
     return And((*added, *(Not(atom) for atom in deleted if atom not in added)))
-
-
-def with_arguments(effect: Effect, bindings: Mapping[str, Value]) -> Effect:
-    """The whole effect with arguments in place of the action's parameters."""
-    if isinstance(effect, AllOf):
-        return AllOf(tuple(with_arguments(part, bindings) for part in effect.parts))
-    if isinstance(effect, ForEach):
-        return ForEach(effect.variables, with_arguments(effect.effect, unshadowed(effect.variables, bindings)))
-    if isinstance(effect, When):
-        return When(substitute(effect.condition, bindings), with_arguments(effect.effect, bindings))
-    if isinstance(effect, Assign):
-        call = Call(effect.call.function, tuple(substitute_term(arg, bindings) for arg in effect.call.args))
-        return Assign(effect.operator, call, substitute_term(effect.value, bindings))
-    return type(effect)(_ground(effect.atom, bindings))
 
 
 def _literals(effect: Effect) -> list[Add | Delete]:

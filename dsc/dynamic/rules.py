@@ -15,6 +15,7 @@ from typing import Any
 
 from dsc.dynamic.outcomes import Plots, outcomes_of
 from dsc.events import DONE, GAVE_UP, NO_CANDIDATE
+from dsc.model.actions import Assign, Emit, Tell
 from dsc.model.plot import ActionPlot, Rule, Variable
 from dsc.model.states import (
     AnyState,
@@ -27,6 +28,7 @@ from dsc.model.states import (
 )
 from knowledge_base.errors import SchemaError
 from knowledge_base.language import expression as lang
+from knowledge_base.language.effect import substitute_effect
 
 DEFAULT_RETRIES = 3
 """Bound on `retry` and `replan` responses that name none, so that no rule can go on for ever."""
@@ -141,7 +143,7 @@ class _Expansion:
         if then == "give_up":
             if self.plot.generated:
                 return [Transition.model_validate({"to": GAVE_UP_STATE, "assign": {"reason": rule.on}})]
-            return self._wired(rule, name, state, GAVE_UP)
+            return [_because(rule.on, one) for one in self._wired(rule, name, state, GAVE_UP)]
         return [Transition(target=name if then in {"retry", "replan"} else then)]
 
     def _wired(self, rule: Rule, name: str, state: State, event: str) -> list[Transition]:
@@ -151,6 +153,28 @@ class _Expansion:
                 place=self.plot.place(("rules", self.plot.rules.index(rule), "do", "then")),
             )
         return list(state.on[event])
+
+
+def _because(outcome: str, giving_up: Transition) -> Transition:
+    """A state's way out on `gave_up`, taken on another outcome: that outcome is the reason."""
+    reason = {"event.reason": outcome}
+    terms = {"assign": giving_up.assign, "arguments": giving_up.arguments}
+    done = {key: {name: lang.substitute_term(term, reason) for name, term in one.items()} for key, one in terms.items()}
+    return giving_up.model_copy(update={
+        **done,
+        "guard": None if giving_up.guard is None else lang.substitute(giving_up.guard, reason),
+        "tell": None if giving_up.tell is None else substitute_effect(giving_up.tell, reason),
+        "do": tuple(_action_because(action, reason) for action in giving_up.do),
+    })
+
+
+def _action_because(action: Assign | Tell | Emit, reason: Mapping[str, str]) -> Assign | Tell | Emit:
+    if isinstance(action, Tell):
+        return Tell(tell=substitute_effect(action.tell, reason))
+    if isinstance(action, Assign):
+        return Assign(assign={name: lang.substitute_term(term, reason) for name, term in action.assign.items()})
+    arguments = {name: lang.substitute_term(term, reason) for name, term in action.arguments.items()}
+    return Emit(emit=action.emit, arguments=arguments)
 
 
 def _unused(name: str, taken: Container[str]) -> str:

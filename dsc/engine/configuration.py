@@ -83,6 +83,15 @@ class MachineState:
         """Whether the state that was entered with this serial number is still active."""
         return self.root is not None and any(serial in frame.active.values() for frame in _frames(self.root))
 
+    def activations_inside(self, serial: int) -> frozenset[int]:
+        """The serial numbers of everything active inside that activation's content, and its own."""
+        for frame in _frames(self.root) if self.root else ():
+            for name, own in frame.active.items():
+                if own == serial:
+                    content = _frames(frame.children[name]) if name in frame.children else ()
+                    return frozenset({own, *(inner for one in content for inner in one.active.values())})
+        return frozenset()
+
     def is_active(self, state: str) -> bool:
         """Whether a state of that name or path is active."""
         return any(path == state or path.endswith("/" + state) for path in self.configuration())

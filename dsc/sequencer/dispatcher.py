@@ -61,10 +61,9 @@ class Dispatcher:
         """Add a component; it replaces one of the same name."""
         self._components[component.name] = component
 
-    @property
-    def busy(self) -> frozenset[str]:
-        """Names of the components that carry out a skill, or whose answer has not been taken yet."""
-        return frozenset(start.component for start, _ in self._running.values())
+    def started(self) -> tuple[Start, ...]:
+        """The skills that are being carried out, or whose answer has not been taken yet."""
+        return tuple(start for start, _ in self._running.values())
 
     @property
     def waiting(self) -> bool:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dsc.dynamic.library import Library
@@ -91,18 +92,31 @@ class Sequencer:
         self._open_ended = open_ended
         self._caused_by: dict[str, int] = {}
 
+    def working_for(self, action_id: str) -> frozenset[str]:
+        """Names of the components that carry out skills for the content of the state that started `action_id`."""
+        started = self.dispatcher.started()
+        owner = next((start.activation for start in started if start.action_id == action_id), None)
+        inside = frozenset() if owner is None else self.machine.state.activations_inside(owner)
+        return frozenset(start.component for start in started if start.activation in inside)
+
     def post(self, event: Event) -> None:
         """Hand in an event from outside, e.g. an operator's `stop`; from the loop's own thread.
 
         Raises:
-            InputError: the event is one that only the executive itself fires, e.g. `done`.
+            InputError: the event is one that only the executive itself fires, e.g. `done`, or an attribute is no
+                plain data.
         """
         if event.name in RESERVED:
             raise InputError(f"the event '{event.name}' is fired by the executive itself", found=event.name)
-        self._inbox.put_nowait(event)
+        self._inbox.put_nowait(replace(event, attributes=_plain_data(event)))
 
     def change(self, delta: Delta, author: str) -> None:
-        """Hand in a change of knowledge that somebody else made; from the loop's own thread."""
+        """Hand in a change of knowledge that somebody else made; from the loop's own thread.
+
+        Raises:
+            InputError: the change contradicts the schema; nothing was changed.
+        """
+        self.knowledge.overlay().apply(delta)
         self._inbox.put_nowait(KnowledgeMessage(delta, author))
 
     async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
@@ -215,3 +229,11 @@ class Sequencer:
             skill = f"{message.start.component}.{message.start.skill}"
             why = event.attributes.get("reason") if event.name in RESERVED else None
             progress.problem = f"nobody handles '{event.name}' of {skill}" + (f": {why}" if why else "")
+
+
+def _plain_data(event: Event) -> dict[str, Any]:
+    try:
+        attributes: dict[str, Any] = json.loads(json.dumps(dict(event.attributes), allow_nan=False))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the attributes of '{event.name}' are no plain data: {error}") from None
+    return attributes

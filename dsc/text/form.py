@@ -25,6 +25,7 @@ _PLAIN = {
     "model_attributes_type": "a mapping was expected",
     "tuple_type": "a list was expected",
     "too_short": "at least one entry is needed",
+    "string_pattern_mismatch": "'{key}' is not of the form expected here, e.g. arm.grasp or fetch_item",
 }
 
 
@@ -68,9 +69,15 @@ def _message(details: ErrorDetails) -> str:
     if kind == UNKNOWN_FORM:
         return f"{details['msg']}; found {details['input']!r}"
     if kind in _PLAIN:
-        found = "" if kind == "missing" else f"; found {details['input']!r}"
+        found = "" if kind == "missing" else f"; found {_in_yaml(details['input'])}"
         return _PLAIN[kind].format(key=details["loc"][-1]) + found
-    return f"{details['msg']}; found {details['input']!r}"
+    said = details["msg"].replace("Input should be", "it should be").replace("True", "true").replace("False", "false")
+    return f"{said}; found {_in_yaml(details['input'])}"
+
+
+def _in_yaml(value: Any) -> str:
+    """The value as people write it: `true` and `null`, not Python's words."""
+    return {True: "true", False: "false", None: "nothing"}[value] if isinstance(value, bool | None) else repr(value)
 
 
 def _said_by(error: ValueError) -> str:

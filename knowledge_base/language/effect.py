@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from knowledge_base.language.expression import Atom, Call, Expression, Located, Term, TypedVariable
+from knowledge_base.facts import Value
+from knowledge_base.language.expression import (
+    Atom,
+    Call,
+    Expression,
+    Located,
+    Term,
+    TypedVariable,
+    substitute,
+    substitute_term,
+    unshadowed,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,3 +73,18 @@ NO_EFFECT = AllOf(())
 ASSIGNMENTS = ("assign", "increase", "decrease", "scale-up", "scale-down")
 EFFECT_KEYWORDS = ("and", "not", "forall", "when", *ASSIGNMENTS)
 """The words that open an effect and are not predicates."""
+
+
+def substitute_effect(effect: Effect, bindings: Mapping[str, Value]) -> Effect:
+    """The effect with values in place of the variables that `bindings` names; inner variables shadow them."""
+    if isinstance(effect, AllOf):
+        return AllOf(tuple(substitute_effect(part, bindings) for part in effect.parts))
+    if isinstance(effect, ForEach):
+        return ForEach(effect.variables, substitute_effect(effect.effect, unshadowed(effect.variables, bindings)))
+    if isinstance(effect, When):
+        return When(substitute(effect.condition, bindings), substitute_effect(effect.effect, bindings))
+    if isinstance(effect, Assign):
+        call = Call(effect.call.function, tuple(substitute_term(arg, bindings) for arg in effect.call.args))
+        return Assign(effect.operator, call, substitute_term(effect.value, bindings))
+    atom = Atom(effect.atom.predicate, tuple(substitute_term(arg, bindings) for arg in effect.atom.args))
+    return type(effect)(atom)

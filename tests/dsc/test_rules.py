@@ -204,6 +204,32 @@ def test_give_up_takes_what_the_state_wires_for_it():
     assert run.active == ["given_up"]
 
 
+def test_what_give_up_takes_hears_the_outcome_as_its_reason():
+    text = """
+        plot: p
+        variables: {why: text}
+        receives: {go: }
+        states:
+          wait: {on: {go: do_it}}
+          do_it:
+            goal: (p)
+            dynamic: [step]
+            on:
+              done: fine
+              no_plan: fine
+              gave_up: {to: fine, assign: {why: ?event.reason}, do: [{emit: told, with: {why: ?event.reason}}]}
+          fine: {on: {told: heard}}
+          heard:
+        rules: [{on: failed, do: {then: give_up}}]
+    """
+    run = Run(plot(text), plot(STEP), choices={"step": Decision("step")})
+    run.start()
+    run.send("go")
+    run.send("bad")
+    assert run.active == ["heard"]
+    assert run.variables()["why"] == "failed"
+
+
 def test_a_rule_may_go_to_a_named_state():
     run = run_of(["{on: failed, do: {then: elsewhere}}"])
     run.send("bad")

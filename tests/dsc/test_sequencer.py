@@ -273,7 +273,7 @@ def test_a_component_counts_as_busy_until_its_answer_is_taken():
 
     class Watched(Arm):
         async def switch(self, mode):
-            seen.append(sorted(ran_holder[0].dispatcher.busy))
+            seen.append(sorted(start.component for start in ran_holder[0].dispatcher.started()))
 
     ran_holder = []
     Ran(

@@ -91,7 +91,7 @@ BROKEN = [
     (HEAD + "    regions:\n      left: {}", 5, "the key 'states' is missing"),
     (HEAD + "    final: true\n    on: {e: s}", 5, "unknown key 'on'"),
     (HEAD + "    final: perhaps", 4, "perhaps"),
-    (HEAD + "    final: false", 4, "found False"),
+    (HEAD + "    final: false", 4, "it should be true; found false"),
     # transitions
     (HEAD + "    on: [e]", 4, "a mapping of names was expected"),
     (HEAD + "    on:\n      e:", 5, "a mapping was expected"),

@@ -145,12 +145,14 @@ def test_replanning_is_bounded_by_the_budget():
 
 
 class Hanging:
-    """A planner that never answers, and remembers that it was cancelled."""
+    """A planner that never answers, and remembers that it was cancelled; `asked` is called when it begins."""
 
     def __init__(self):
         self.cancelled = False
+        self.asked = None
 
     async def solve(self, problem, seconds):
+        self.asked()
         try:
             await asyncio.get_running_loop().create_future()
         except asyncio.CancelledError:
@@ -163,15 +165,26 @@ def test_a_stop_is_obeyed_while_the_planner_hangs():
     robot, _ = executive(planner)
 
     def prepare(sequencer):
+        planner.asked = lambda: sequencer.post(Event("stop"))
+
+    end = robot.run("light_up", prepare=prepare)
+    assert how(end) == "stopped"
+    assert planner.cancelled
+
+
+def test_a_stop_is_obeyed_while_the_problem_is_still_being_posed():
+    planner = Answers(found("a", "b"))
+    robot, _ = executive(planner)
+
+    def prepare(sequencer):
         def stop_once_asked(record):
             if record.type == "plan.asked":
                 sequencer.post(Event("stop"))
 
         sequencer.trace.listen(stop_once_asked)
 
-    end = robot.run("light_up", prepare=prepare)
-    assert how(end) == "stopped"
-    assert planner.cancelled
+    assert how(robot.run("light_up", prepare=prepare)) == "stopped"
+    assert planner.asked == 0
 
 
 def test_what_somebody_else_breaks_is_noticed_while_a_step_runs():
@@ -190,6 +203,74 @@ def test_what_somebody_else_breaks_is_noticed_while_a_step_runs():
     assert set(lamps.switched) == {"a", "b", "c"}
     (change,) = [record for record in records if record.data.get("author") == "somebody" and record.type == "knowledge"]
     assert broken.cause == change.seq
+
+
+WATCHING = parse_plot(f"""
+plot: watching
+emits: {{ended: {{how: symbol}}}}
+states:
+  both:
+    on: {{done: over}}
+    regions:
+      light:
+        states:
+          lighting:
+            goal: {GOAL}
+            on: {{done: lit, no_plan: lit, gave_up: lit}}
+          lit: {{final: true}}
+      watch:
+        states:
+          watching: {{entry: {{trigger: watcher.look}}, on: {{seen: quiet}}}}
+          quiet: {{final: true}}
+  over: {{final: true}}
+""")
+
+
+class Watcher(Component):
+    name = "watcher"
+
+    @skill(outcomes={"seen": {}})
+    async def look(self, call: SkillCall) -> Outcome:
+        await call.clock.sleep(0.5)
+        return Outcome("seen", observed=Delta(removed=(fact("works", "b"),)))
+
+
+def test_a_skill_that_works_for_another_state_is_somebody_else_to_the_monitor():
+    lamps = Lamps()
+    plots = [WATCHING, primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")]
+    robot = Executive(DOMAIN, plots, [lamps, Watcher()], planner=Answers(found("a", "b"), TimedOut("fake", 1.0)))
+    robot.knowledge.apply(
+        Delta(nodes={"a": "lamp", "b": "lamp"}, added=(fact("works", "a"), fact("works", "b"))), "test"
+    )
+    records = []
+    robot.listen(records.append)
+    assert robot.run("watching").finished
+    (broken,) = [record for record in records if record.type == "plan.broken"]
+    assert (broken.t, broken.data["author"], broken.data["reason"]) == (0.5, "watcher", "(works b) is false")
+
+
+@pytest.mark.parametrize(
+    ("hand_in", "said"),
+    [
+        (lambda sequencer: sequencer.change(Delta(added=(fact("onn", "a"),)), "me"), "did you mean 'on'"),
+        (lambda sequencer: sequencer.post(Event("stop", {"at": float("nan")})), "no plain data"),
+        (lambda sequencer: sequencer.post(Event("stop", {"who": object()})), "no plain data"),
+    ],
+    ids=["change", "not_a_number", "no_data"],
+)
+def test_what_is_handed_in_wrongly_is_told_to_whoever_did_and_changes_nothing(hand_in, said):
+    robot, _ = executive(Answers(found("a", "b")))
+
+    def prepare(sequencer):
+        with pytest.raises(InputError, match=said):
+            hand_in(sequencer)
+
+    assert how(robot.run("light_up", prepare=prepare)) == "reached"
+
+
+def test_two_components_of_one_name_are_refused():
+    with pytest.raises(InputError, match="two components are named 'lamps'"):
+        Executive(DOMAIN, [], [Lamps(), Lamps()])
 
 
 def test_plots_and_domain_must_fit_before_anything_runs():
