@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from planning.domain import PlanningDomain
     from planning.planner import Planner
 
+_CUT_SHORT = {"reproducible": False}
+"""Said in the trace where a limit of real time had a part: the same seed may then give another run."""
+
 MAX_ATTEMPTS = 3
 """How often to plan anew because the world changed while the planner worked."""
 
@@ -175,11 +178,12 @@ class PlanningComponent(Component):
         plot = plot_from_plan(answer.plan, self._domain, self._library, rules, name)
         self._running[name] = _Running(answer.plan, goal)
         steps = [str(step) for step in answer.plan.steps]
-        self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine)
+        limit = {} if answer.reproducible else _CUT_SHORT
+        self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine, **limit)
         return Outcome("plan_found", {"plot": plot.to_form(), "name": name, "steps": len(steps)})
 
     def _none(self, kind: str, reason: str) -> Outcome:
-        self._trace.record("plan.none", kind=kind, reason=reason)
+        self._trace.record("plan.none", kind=kind, reason=reason, **(_CUT_SHORT if kind == "timed_out" else {}))
         return Outcome("no_plan", {"reason": reason, "kind": kind})
 
     def _judge_plan(self, running: _Running, author: str) -> None:

@@ -37,12 +37,14 @@ class PlanFound:
         engine: who found it.
         seconds: how long that took in real time; differs from run to run.
         simulated_seconds: how long it takes in simulated time; depends on the problem only.
+        reproducible: whether no limit of real time had a part in it, so that the same problem gives it again.
     """
 
     plan: Plan
     engine: str
     seconds: float
     simulated_seconds: float
+    reproducible: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ import contextlib
 import threading
 import time
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from planning.engines.process import COMMAND, EngineProcess, EngineStoppedError, OutOfTimeError
@@ -104,8 +105,11 @@ class PlannerProcess:
         outcome = await self._attempt(problem, seconds / 2)
         if isinstance(outcome, PlanFound | EngineFailed):
             return outcome
+        cut_short = isinstance(outcome, TimedOut)
         spent = min(time.monotonic() - started, seconds / 2)  # a new start is not planning time
         outcome = await self._attempt(problem.whole, seconds - spent)
+        if isinstance(outcome, PlanFound):
+            return replace(outcome, reproducible=not cut_short)
         return TimedOut(ENGINE, seconds) if isinstance(outcome, TimedOut) else outcome
 
     async def _attempt(self, problem: Problem, seconds: float) -> PlanningOutcome:

@@ -120,6 +120,8 @@ def test_the_ways_not_to_find_a_plan_are_told_apart(answer, said):
     assert lamps.switched == []
     assert said in how(end)
     (none,) = [record for record in records if record.type == "plan.none"]
+    # A limit of real time makes no claim to be reproducible.
+    assert none.data.get("reproducible", True) == (not isinstance(answer, TimedOut))
     assert none.data["kind"] == {"ProvenUnsolvable": "unsolvable", "TimedOut": "timed_out"}.get(
         type(answer).__name__, "failed"
     )
