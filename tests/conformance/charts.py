@@ -24,6 +24,7 @@ from dsc.engine.steps import SendLater, Step
 from dsc.events import Event
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.reader import parse_scxml
+from dsc.text.scxml.writer import to_scxml
 from dsc.validation import raise_findings, validate_plot
 from knowledge_base.errors import InputError
 from knowledge_base.schema import Schema
@@ -125,6 +126,7 @@ def run(file: Path) -> Result:
         return Result(name, "excluded", "no SCXML", AGAINST_THE_STANDARD[name])
     try:
         plot = parse_scxml(file.read_text(encoding="utf-8"), str(file))
+        plot = parse_scxml(to_scxml(plot), str(file))  # and what is read can be written
         library = Library([plot])
         raise_findings(validate_plot(plot, library))
         knowledge = KnowledgeBase(Schema.parse("(define (domain none))"))
