@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any, Protocol
 
 from dsc.model.actions import ExternalAction, Internal
@@ -19,7 +20,7 @@ from dsc.model.states import (
     State,
     Transition,
 )
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.language.expression import Expression
 
 
@@ -105,6 +106,7 @@ class CompiledPlot:
         index: state name -> node index.
         form: the plot as data if it was bound as a value, else `None`.
         defaults: history node -> what it stands for at first.
+        entries: what is entered, by domain and targets, as far as it was worked out; at most one for each edge.
     """
 
     plot: ActionPlot
@@ -112,6 +114,7 @@ class CompiledPlot:
     index: Mapping[str, int]
     form: Mapping[str, Any] | None = None
     defaults: Mapping[int, Default] = field(default_factory=dict)
+    entries: dict[tuple[int, tuple[int, ...]], Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def scxml(self) -> bool:
@@ -149,6 +152,7 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
 
     Raises:
         UnknownNameError: a transition or a scope names a state that is not there.
+        SchemaError: targets that cannot be active together, or a history that does not lead to a state beside it.
     """
     nodes = [Node(0, plot.name, -1, None)]
     initials: list[tuple[int, str]] = []
@@ -161,11 +165,28 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
             _add_edges(node, node.state, index, nodes)
         node.transparent = plot.profile == "scxml" and _stands_for_its_state(nodes, node)
     defaults = {
-        node.index: Default(_target(node, node.state.target, index), node.state.do)
+        node.index: _default(nodes, node, node.state, index)
         for node in nodes
         if isinstance(node.state, HistoryState)
     }
     return CompiledPlot(plot, tuple(nodes), index, form, defaults)
+
+
+def _default(nodes: list[Node], node: Node, history: HistoryState, index: Mapping[str, int]) -> Default:
+    target = _target(node, history.target, index)
+    if isinstance(nodes[target].state, HistoryState) or node.parent not in _ancestors(nodes, target):
+        raise SchemaError(f"the history '{node.name}' does not lead to a state beside it", found=node.name)
+    return Default(target, history.do)
+
+
+def _together(nodes: Sequence[Node], targets: Sequence[int]) -> bool:
+    """Whether all targets can be active at once: any two are in different regions (SCXML 3.11)."""
+    ways = [[*reversed(_ancestors(nodes, target)), target] for target in targets]
+    for first, second in combinations(ways, 2):
+        split = sum(1 for one, other in zip(first, second, strict=False) if one == other)
+        if split in {len(first), len(second)} or not nodes[first[split - 1]].orthogonal:
+            return False
+    return True
 
 
 def _initial(nodes: list[Node], parent: int, first: str, index: Mapping[str, int], *, deep: bool) -> int:
@@ -223,6 +244,8 @@ def _append(nodes: list[Node], name: str, parent: int, state: AnyState | None) -
 def _add_edges(node: Node, state: State, index: Mapping[str, int], nodes: Sequence[Node]) -> None:
     def edge(trigger: str, transition: Transition) -> Edge:
         targets = [_target(node, name, index) for name in transition.targets]
+        if not _together(nodes, targets):
+            raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
         within = isinstance(state, CompositeState) and all(node.index in _ancestors(nodes, at) for at in targets)
         return Edge(
             node.index, trigger, targets[0] if targets else None, transition.guard, transition.effect,

@@ -28,8 +28,17 @@ class Entry:
     after: dict[int, tuple[Internal, ...]] = field(default_factory=dict)
 
 
-def entry_set(compiled: CompiledPlot, domain: int, targets: Iterable[int], remembered: Remembered) -> Entry:
-    """Everything to enter inside `domain` to reach all targets."""
+def entry_set(compiled: CompiledPlot, domain: int, targets: tuple[int, ...], remembered: Remembered) -> Entry:
+    """Everything to enter inside `domain` to reach all targets; worked out once where nothing is remembered."""
+    if compiled.defaults:
+        return _entry_set(compiled, domain, targets, remembered)
+    if (domain, targets) not in compiled.entries:
+        compiled.entries[domain, targets] = _entry_set(compiled, domain, targets, remembered)
+    found: Entry = compiled.entries[domain, targets]
+    return found
+
+
+def _entry_set(compiled: CompiledPlot, domain: int, targets: tuple[int, ...], remembered: Remembered) -> Entry:
     work = _Work(compiled, remembered)
     reached = [real for target in targets for real in work.resolved(target)]
     for target in reached:
@@ -43,6 +52,8 @@ def entry_set(compiled: CompiledPlot, domain: int, targets: Iterable[int], remem
 
 def effective_targets(compiled: CompiledPlot, targets: Iterable[int], remembered: Remembered) -> list[int]:
     """The targets with histories replaced by what they stand for (getEffectiveTargetStates)."""
+    if not compiled.defaults:
+        return list(targets)
     work = _Work(compiled, remembered)
     return [real for target in targets for real in work.resolved(target)]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from dsc.dynamic.library import Library
+from dsc.engine.compiler import compile_plot
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import (
@@ -41,6 +42,19 @@ def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
         if isinstance(state, HistoryState):
             yield from _history(plot, state, path)
     yield from _rules(plot, names, library)
+    if plot.profile == "scxml":
+        yield from _tables(plot)
+
+
+def _tables(plot: ActionPlot) -> Iterator[Finding]:
+    """What only shows when all targets are known; names that are not there have findings of their own."""
+    try:
+        compile_plot(plot)
+    except UnknownNameError:
+        return
+    except SchemaError as error:
+        error.place = next((plot.place(path) for name, _, path in plot.walk() if name == error.found), None)
+        yield Finding(error, "target")
 
 
 def _scope(

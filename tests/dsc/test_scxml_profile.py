@@ -135,3 +135,17 @@ def test_the_dsc_profile_refuses_what_only_scxml_has(state):
     assert "p.yaml:3" in str(found[0])
     admitted = plot(text.replace("PROFILE", "profile: scxml\n"))
     assert validate_plot(admitted, Library([admitted])) == []
+
+
+@pytest.mark.parametrize(
+    ("states", "message"),
+    [
+        ("p: {states: {x: {}, h: {history: deep, to: g}, g: {history: deep, to: h}}}", "does not lead to a state"),
+        ("a: {on: {e: {to: b, also: [c]}}}\n  b: {}\n  c: {}", "exclude each other"),
+        ("a: {on: {e: {to: b, also: [c]}}}\n  b: {states: {c: {}}}", "exclude each other"),
+    ],
+)
+def test_targets_that_make_no_configuration_are_found(states, message):
+    broken = plot(f"plot: p\nprofile: scxml\nstates:\n  {states}\n", "p.yaml")
+    found = [str(finding) for finding in validate_plot(broken, Library([broken]))]
+    assert any(message in one and one.startswith("p.yaml:4") for one in found)
