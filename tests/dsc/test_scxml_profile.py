@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from dsc_charts import Run, plot
 
@@ -10,7 +12,12 @@ from dsc.engine.configuration import MachineState
 from dsc.engine.selection import matches
 from dsc.engine.steps import Note, SendLater
 from dsc.model.plot import ActionPlot
+from dsc.sequencer.clock import LoopClock, SimulatedEventLoop
+from dsc.sequencer.sequencer import Sequencer
+from dsc.trace import Trace
 from dsc.validation import validate_plot
+from knowledge_base.schema import Schema
+from knowledge_base.store import KnowledgeBase
 
 
 def chart(states, **keys):
@@ -149,3 +156,23 @@ def test_targets_that_make_no_configuration_are_found(states, message):
     broken = plot(f"plot: p\nprofile: scxml\nstates:\n  {states}\n", "p.yaml")
     found = [str(finding) for finding in validate_plot(broken, Library([broken]))]
     assert any(message in one and one.startswith("p.yaml:4") for one in found)
+
+
+def test_the_sequencer_delivers_delayed_events_and_writes_notes():
+    lines = []
+
+    async def played():
+        clock = LoopClock()
+        trace = Trace(clock.now)
+        trace.listen(lambda record: lines.append(record.to_line()))
+        sent = chart({"a": {"entry": [{"log": ["hi"]}, {"emit": "t", "delay": 2}], "on": {"t": "f"}}, "f": {"final": True}})
+        knowledge = KnowledgeBase(Schema.parse("(define (domain none))"))
+        end = await Sequencer(Library([sent]), knowledge, [], clock, trace).run("c")
+        return end.finished, clock.now()
+
+    loop = SimulatedEventLoop()
+    try:
+        assert loop.run_until_complete(played()) == (True, 2.0)
+    finally:
+        loop.close()
+    assert [json.loads(line)["text"] for line in lines if json.loads(line)["type"] == "log"] == ["hi"]
