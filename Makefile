@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check soak bench-startup pictures clean
+.PHONY: help demo test check conformance soak bench-startup pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -28,6 +28,9 @@ check: $(VENV)/.test   ## ruff, mypy strict, import contracts
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+
+conformance: $(VENV)/.test   ## SCION's SCXML charts, fetched with npm into .conformance/, on this engine (WRITE=1 writes the docs)
+	$(BIN)/python tests/conformance/charts.py $(if $(WRITE),--write)
 
 soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every report true? (SEEDS=N FAULTS=P)
 	$(BIN)/python benchmarks/clean_up_seeds.py --seeds $(or $(SEEDS),200) --faults $(or $(FAULTS),0.2)

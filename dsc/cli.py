@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from dsc.dynamic.library import Library
     from dsc.errors import Finding
     from dsc.model.plot import ActionPlot
@@ -89,6 +91,45 @@ def show(
         _print_tree(shown)
 
 
+@app.command("import")
+def import_(
+    file: Annotated[Path, typer.Argument(metavar="FILE.scxml", help="A chart in SCXML.")],
+    out: Annotated[
+        str, typer.Option("--out", metavar="FILE.yaml", help="Where the plot goes; - is standard output.")
+    ] = "-",
+) -> None:
+    """Read an SCXML chart as a plot of profile `scxml`; what plots cannot say is named."""
+    from dsc.text.plots import plot_to_yaml
+    from dsc.text.scxml.reader import parse_scxml
+    from dsc.text.yaml import read_file
+
+    _write(out, plot_to_yaml(parse_scxml(read_file(file), str(file))))
+
+
+@app.command()
+def export(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A plot file (YAML).")],
+    to: Annotated[str, typer.Option("--to", metavar="FORM", help="scxml, mermaid, plantuml or svg.")],
+    out: Annotated[str, typer.Option("--out", metavar="OUT", help="Where it goes; - is standard output.")] = "-",
+) -> None:
+    """Write a plot in another form; what that form cannot say is named."""
+    from dsc.text.diagram import draw
+    from dsc.text.plots import load_plot
+    from dsc.text.scxml.writer import to_scxml
+    from dsc.text.state_diagram import to_mermaid, to_plantuml
+    from knowledge_base.errors import InputError
+
+    forms: dict[str, Callable[[ActionPlot], str]] = {
+        "scxml": to_scxml,
+        "mermaid": to_mermaid,
+        "plantuml": to_plantuml,
+        "svg": lambda plot: draw(plot, _neighbours(file, plot)[0]),
+    }
+    if to not in forms:
+        raise InputError(f"there is no form '{to}'", found=to, valid=forms)
+    _write(out, forms[to](load_plot(file)))
+
+
 @app.command()
 def schema() -> None:
     """Print the JSON Schema of plot files, for editors."""
@@ -167,7 +208,7 @@ def _write(target: str, text: str) -> None:
     try:
         Path(target).write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(f"cannot write the drawing: {error.strerror}", place=Place(target)) from None
+        raise InputError(f"cannot write the file: {error.strerror}", place=Place(target)) from None
 
 
 def _print_json(data: object) -> None:

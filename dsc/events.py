@@ -22,6 +22,11 @@ SKILL_ERROR = "skill_error"
 """A skill raised instead of ending with one of its outcomes."""
 ERROR = "error"
 """An action or guard could not be evaluated."""
+DONE_STATE = "done.state."
+"""What `done` is called in profile `scxml`, with the state's name after it (SCXML 3.13)."""
+EXECUTION_ERROR = "error.execution"
+"""What `error` is called in profile `scxml` (SCXML 3.13)."""
+ERRORS = frozenset({ERROR, EXECUTION_ERROR})
 
 RESERVED = frozenset({DONE, AFTER, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR})
 """Events the executive fires itself. Nobody else declares any of them, except that plots and skills that plan may end

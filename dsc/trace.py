@@ -22,7 +22,7 @@ class Record:
     Attributes:
         seq: its number, from 1.
         t: seconds of run time.
-        type: `plot`, `event`, `step`, `rule`, `decision`, `knowledge`, `action`, `end`, or one that an upper room uses
+        type: `plot`, `event`, `step`, `rule`, `decision`, `knowledge`, `action`, `log`, `end`, or an upper room's
             (`plan.found`, `scene`, …).
         cause: seq of the record that led to it; `None` for the first.
         data: what there is to say, plain data.

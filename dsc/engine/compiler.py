@@ -2,36 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any, Protocol
 
-from dsc.model.actions import Assign, Emit, ExternalAction, Tell
+from dsc.model.actions import ExternalAction, Internal
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import (
     AnyState,
     CompositeState,
     FinalState,
+    HistoryState,
     OrthogonalState,
     Region,
     State,
     Transition,
 )
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.language.expression import Expression
 
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A transition between nodes, by their indices; no target means that nothing is left or entered."""
+    """A transition between nodes, by their indices; no target means that nothing is left or entered.
+
+    `internal` is only true where it makes a difference: a composite source with all targets inside it.
+    """
 
     source: int
     trigger: str
     target: int | None
     guard: Expression | None
-    effect: tuple[Assign | Tell | Emit, ...]
+    effect: tuple[Internal, ...]
     rule: str | None = None
+    also: tuple[int, ...] = ()
+    internal: bool = False
+
+    @property
+    def targets(self) -> tuple[int, ...]:
+        """All nodes to enter."""
+        return () if self.target is None else (self.target, *self.also)
+
+
+@dataclass(frozen=True, slots=True)
+class Default:
+    """Where a history leads that remembers nothing, and what happens on the way."""
+
+    target: int
+    effect: tuple[Internal, ...]
 
 
 @dataclass(slots=True)
@@ -47,6 +67,8 @@ class Node:
         edges: event name -> transitions in order.
         timeouts: delay and transition of each timeout.
         always: transitions without trigger.
+        histories: indices of the history nodes that remember what is inside.
+        transparent: a region that stands for its only state (profile `scxml`), no scope for transitions.
     """
 
     index: int
@@ -55,11 +77,13 @@ class Node:
     state: AnyState | None
     children: list[int] = field(default_factory=list)
     initial: int = -1
-    entry: tuple[ExternalAction, ...] = ()
-    exit: tuple[ExternalAction, ...] = ()
+    entry: tuple[ExternalAction | Internal, ...] = ()
+    exit: tuple[ExternalAction | Internal, ...] = ()
     edges: dict[str, tuple[Edge, ...]] = field(default_factory=dict)
     timeouts: tuple[tuple[TermField, Edge], ...] = ()
     always: tuple[Edge, ...] = ()
+    histories: list[int] = field(default_factory=list)
+    transparent: bool = False
 
     @property
     def final(self) -> bool:
@@ -81,19 +105,25 @@ class CompiledPlot:
         nodes: all nodes in document order; a node comes after the one around it.
         index: state name -> node index.
         form: the plot as data if it was bound as a value, else `None`.
+        defaults: history node -> what it stands for at first.
+        entries: what is entered, by domain and targets, as far as it was worked out; at most one for each edge.
     """
 
     plot: ActionPlot
     nodes: tuple[Node, ...]
     index: Mapping[str, int]
     form: Mapping[str, Any] | None = None
+    defaults: Mapping[int, Default] = field(default_factory=dict)
+    entries: dict[tuple[int, tuple[int, ...]], Any] = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def scxml(self) -> bool:
+        """Whether the plot is in profile `scxml`: events match by prefix and keep SCXML's names."""
+        return self.plot.profile == "scxml"
 
     def ancestors(self, index: int) -> list[int]:
         """The nodes around a node, innermost first, the plot last."""
-        found = []
-        while (index := self.nodes[index].parent) >= 0:
-            found.append(index)
-        return found
+        return _ancestors(self.nodes, index)
 
     def way(self, around: int, index: int) -> list[int]:
         """The nodes from one around it, which is not part of the way, down to a node."""
@@ -122,45 +152,105 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
 
     Raises:
         UnknownNameError: a transition or a scope names a state that is not there.
+        SchemaError: targets that cannot be active together, or a history that does not lead to a state beside it.
     """
     nodes = [Node(0, plot.name, -1, None)]
-    _add_states(nodes, 0, plot)
+    initials: list[tuple[int, str]] = []
+    _add_states(nodes, 0, plot, initials)
     index = {node.name: node.index for node in nodes if node.state is not None}
+    for parent, first in initials:
+        nodes[parent].initial = _initial(nodes, parent, first, index, deep=plot.profile == "scxml")
     for node in nodes:
         if isinstance(node.state, State):
-            _add_edges(node, node.state, index)
-    return CompiledPlot(plot, tuple(nodes), index, form)
+            _add_edges(node, node.state, index, nodes)
+        node.transparent = plot.profile == "scxml" and _stands_for_its_state(nodes, node)
+    defaults = {
+        node.index: _default(nodes, node, node.state, index)
+        for node in nodes
+        if isinstance(node.state, HistoryState)
+    }
+    return CompiledPlot(plot, tuple(nodes), index, form, defaults)
 
 
-def _add_states(nodes: list[Node], parent: int, scope: ActionPlot | CompositeState | Region) -> None:
-    first = initial_of(scope)
-    if first not in scope.states:
-        raise UnknownNameError(f"there is no state '{first}' to begin with", found=first, valid=scope.states)
+def _default(nodes: list[Node], node: Node, history: HistoryState, index: Mapping[str, int]) -> Default:
+    target = _target(node, history.target, index)
+    if isinstance(nodes[target].state, HistoryState) or node.parent not in _ancestors(nodes, target):
+        raise SchemaError(f"the history '{node.name}' does not lead to a state beside it", found=node.name)
+    return Default(target, history.do)
+
+
+def _together(nodes: Sequence[Node], targets: Sequence[int]) -> bool:
+    """Whether all targets can be active at once: any two are in different regions (SCXML 3.11)."""
+    ways = [[*reversed(_ancestors(nodes, target)), target] for target in targets]
+    for first, second in combinations(ways, 2):
+        split = sum(1 for one, other in zip(first, second, strict=False) if one == other)
+        if split in {len(first), len(second)} or not nodes[first[split - 1]].orthogonal:
+            return False
+    return True
+
+
+def _initial(nodes: list[Node], parent: int, first: str, index: Mapping[str, int], *, deep: bool) -> int:
+    found = index.get(first, -1)
+    around = [] if found < 0 else _ancestors(nodes, found)
+    if parent not in (around if deep else around[:1]):
+        valid = [name for name, at in index.items() if nodes[at].parent == parent]
+        raise UnknownNameError(f"there is no state '{first}' to begin with", found=first, valid=valid)
+    return found
+
+
+def _ancestors(nodes: Sequence[Node], index: int) -> list[int]:
+    found = []
+    while (index := nodes[index].parent) >= 0:
+        found.append(index)
+    return found
+
+
+def _stands_for_its_state(nodes: list[Node], node: Node) -> bool:
+    is_region = node.state is None and node.index > 0
+    return is_region and [nodes[child].name for child in node.children] == [node.name]
+
+
+def _add_states(
+    nodes: list[Node],
+    parent: int,
+    scope: ActionPlot | CompositeState | Region,
+    initials: list[tuple[int, str]],
+) -> None:
+    initials.append((parent, initial_of(scope)))
     for name, state in scope.states.items():
         node = _append(nodes, name, parent, state)
-        if name == first:
-            nodes[parent].initial = node.index
         if isinstance(state, CompositeState):
-            _add_states(nodes, node.index, state)
+            _add_states(nodes, node.index, state, initials)
         elif isinstance(state, OrthogonalState):
             for region_name, region in state.regions.items():
                 inner = _append(nodes, region_name, node.index, None)
-                _add_states(nodes, inner.index, region)
+                _add_states(nodes, inner.index, region, initials)
+            for history_name, history in state.connectors.items():
+                _append(nodes, history_name, node.index, history)
 
 
 def _append(nodes: list[Node], name: str, parent: int, state: AnyState | None) -> Node:
     node = Node(len(nodes), name, parent, state)
     if isinstance(state, State):
         node.entry, node.exit = state.entry, state.exit
+    elif isinstance(state, FinalState):
+        node.entry = state.entry
     nodes.append(node)
-    nodes[parent].children.append(node.index)
+    inside = nodes[parent].histories if isinstance(state, HistoryState) else nodes[parent].children
+    inside.append(node.index)
     return node
 
 
-def _add_edges(node: Node, state: State, index: Mapping[str, int]) -> None:
+def _add_edges(node: Node, state: State, index: Mapping[str, int], nodes: Sequence[Node]) -> None:
     def edge(trigger: str, transition: Transition) -> Edge:
-        target = None if transition.target is None else _target(node, transition.target, index)
-        return Edge(node.index, trigger, target, transition.guard, transition.effect, transition.rule)
+        targets = [_target(node, name, index) for name in transition.targets]
+        if not _together(nodes, targets):
+            raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
+        within = isinstance(state, CompositeState) and all(node.index in _ancestors(nodes, at) for at in targets)
+        return Edge(
+            node.index, trigger, targets[0] if targets else None, transition.guard, transition.effect,
+            transition.rule, tuple(targets[1:]), transition.internal and within,
+        )  # fmt: skip
 
     node.edges = {event: tuple(edge(event, t) for t in many) for event, many in state.on.items()}
     node.timeouts = tuple((t.seconds, edge("after", t)) for t in state.after)

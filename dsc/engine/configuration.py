@@ -18,6 +18,7 @@ class FrameState:
         variables: parameters and variables with their values.
         active: the configuration, state name -> activation serial, in document order.
         children: plots inside active submachine and dynamic states, by the state's name.
+        history: what the plot's history states remember: names of the states (or regions) that were active.
     """
 
     serial: int
@@ -26,6 +27,7 @@ class FrameState:
     variables: Mapping[str, Any]
     active: Mapping[str, int]
     children: Mapping[str, FrameState] = field(default_factory=dict)
+    history: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -36,14 +38,16 @@ class FrameState:
             "variables": dict(self.variables),
             "active": dict(self.active),
             "children": {name: child.to_json() for name, child in self.children.items()},
+            "history": {name: list(remembered) for name, remembered in self.history.items()},
         }
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> FrameState:
         """The inverse of `to_json`."""
         children = {name: FrameState.from_json(child) for name, child in data["children"].items()}
+        history = {name: tuple(remembered) for name, remembered in data["history"].items()}
         return FrameState(
-            data["serial"], data["plot"], data["form"], data["variables"], data["active"], children
+            data["serial"], data["plot"], data["form"], data["variables"], data["active"], children, history
         )
 
 

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Any
 
 from dsc.engine.actions import delay_of, evaluate, fill_parameters, output_of
 from dsc.engine.compiler import Chart, CompiledPlot, Edge
 from dsc.engine.configuration import MachineState
+from dsc.engine.entering import Entry, entry_set
 from dsc.engine.frames import Frame, freeze, thaw
+from dsc.engine.membership import settle
 from dsc.engine.selection import Enabled, everything, is_addressed, select
 from dsc.engine.situation import Decision, Situation
-from dsc.engine.steps import Cancel, DecisionMade, Microstep, Output, StartTimer, Step, Taken
+from dsc.engine.steps import Cancel, DecisionMade, Microstep, Note, Output, SendLater, StartTimer, Step, Taken
 from dsc.errors import RunawayError
-from dsc.events import DONE, ERROR, NO_CANDIDATE, Event
-from dsc.model.actions import Assign, Emit, ExternalAction, Tell, Trigger
+from dsc.events import DONE, DONE_STATE, ERROR, ERRORS, EXECUTION_ERROR, NO_CANDIDATE, Event
+from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Tell, Trigger
 from dsc.model.states import DynamicState, FinalState, State, SubmachineState
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
+from knowledge_base.language.expression import Expression
 
 MAX_MICROSTEPS = 1000
 """A macrostep that takes more is going round in circles."""
@@ -54,7 +58,7 @@ class Execution:
         """Enter the outermost plot."""
         compiled = self._chart.compiled(plot)
         self._root = self._new_frame(compiled, arguments, None, -1)
-        self._enter_children(self._root, 0)
+        self._enter_initial(self._root)
         self._record(None, ())
         self._rest()
 
@@ -73,7 +77,7 @@ class Execution:
         self._exit(everything(self._root))
         self._record(None, ())
         self._root = None
-        self._errors += [_reason(event) for event in self._internal if event.name == ERROR]
+        self._errors += [_reason(event) for event in self._internal if event.name in ERRORS]
 
     def finish(self, event: Event | None, *, handled: bool) -> Step:
         """The step as a value."""
@@ -99,7 +103,7 @@ class Execution:
             if not self._internal:
                 return
             event = self._internal.popleft()
-            if not self._microstep(event) and event.name == ERROR:
+            if not self._microstep(event) and event.name in ERRORS:
                 self._errors.append(_reason(event))
 
     def _microstep(self, event: Event | None) -> bool:
@@ -117,7 +121,7 @@ class Execution:
             self._perform(one.frame, one.edge.effect)
         for one in enabled:
             if one.edge.target is not None:
-                self._enter_along(one.frame, one.frame.compiled.way(one.domain, one.edge.target))
+                self._enter(one.frame, one.domain, one.edge.targets)
         self._record(event, taken)
         return True
 
@@ -125,13 +129,18 @@ class Execution:
         if edge.guard is None:
             return True
         try:
-            return self._situation.holds(edge.guard, self._bindings(frame, self._event))
+            return self._holds(frame, edge.guard)
         except InputError as error:
             # Once in a macrostep: a guard without trigger is looked at again after every microstep.
             if (frame.serial, id(edge)) not in self._broken_guards:
                 self._broken_guards.add((frame.serial, id(edge)))
                 self._fail(frame, f"guard of '{edge.trigger}' in {frame.path(edge.source)}: {error}")
             return False
+
+    def _holds(self, frame: Frame, condition: Expression) -> bool:
+        if frame.compiled.scxml:
+            condition = settle(condition, frame.is_active)
+        return self._situation.holds(condition, self._bindings(frame, self._event))
 
     def _bindings(self, frame: Frame, event: Event | None) -> dict[str, Any]:
         return {**frame.variables, **event.bindings()} if event else frame.variables
@@ -148,42 +157,38 @@ class Execution:
 
     def _exit(self, left: Iterable[tuple[Frame, int]]) -> None:
         """Inner before outer, later before earlier: the reverse of document order, through all plots."""
-        for frame, index in sorted(left, key=lambda at: at[0].position(at[1]), reverse=True):
+        leaving = sorted(left, key=lambda at: at[0].position(at[1]), reverse=True)
+        for frame, index in leaving:
+            frame.remember(index)
+        for frame, index in leaving:
             node = frame.node(index)
             if node.state is not None:
                 self._exited.append(frame.path(index))
             if node.timeouts or any(isinstance(action, Trigger) for action in node.entry):
                 self._output.append(Cancel(frame.active[index]))
-            self._external(frame, index, node.exit)
+            self._act(frame, index, node.exit)
             frame.children.pop(index, None)
             del frame.active[index]
 
     # -- entering ----------------------------------------------------------------------------------------
 
-    def _enter_along(self, frame: Frame, way: list[int]) -> None:
-        """Enter the states of the way down to a target, the other regions on it, and the target's inside."""
-        index, *rest = way
-        self._enter_one(frame, index)
-        if not rest:
+    def _enter_initial(self, frame: Frame) -> None:
+        self._enter(frame, 0, (frame.node(0).initial,))
+
+    def _enter(self, frame: Frame, domain: int, targets: tuple[int, ...]) -> None:
+        """Enter what leads to the targets, the other regions on the way, and what is inside, in document order."""
+        entry = entry_set(frame.compiled, domain, targets, frame.history)
+        for index in sorted(entry.nodes):
+            self._enter_one(frame, index, entry)
             self._enter_content(frame, index)
-            return
-        node = frame.node(index)
-        for child in node.children if node.orthogonal else rest[:1]:
-            if child == rest[0]:
-                self._enter_along(frame, rest)
-            else:
-                self._enter(frame, child)
 
-    def _enter(self, frame: Frame, index: int) -> None:
-        self._enter_one(frame, index)
-        self._enter_content(frame, index)
-
-    def _enter_one(self, frame: Frame, index: int) -> None:
+    def _enter_one(self, frame: Frame, index: int, entry: Entry) -> None:
         node = frame.node(index)
         frame.active[index] = self._next_serial()
         if node.state is not None:
             self._entered.append(frame.path(index))
-        self._external(frame, index, node.entry)
+        self._act(frame, index, node.entry)
+        self._perform(frame, entry.after.get(index, ()))
         for number, (seconds, _) in enumerate(node.timeouts):
             try:
                 delay = delay_of(self._value(frame, seconds))
@@ -198,19 +203,12 @@ class Execution:
             if state.emit is not None:
                 self._perform(frame, (Emit(emit=state.emit, arguments=state.arguments),))
             self._complete_around(frame, index)
-        elif frame.node(index).children:
-            self._enter_children(frame, index)
         elif isinstance(state, SubmachineState):
             self._bind_submachine(frame, index, state)
         elif isinstance(state, DynamicState):
             self._bind_dynamic(frame, index, state)
-        elif isinstance(state, State):
+        elif type(state) is State and not frame.compiled.scxml:
             self._done(frame, index)
-
-    def _enter_children(self, frame: Frame, index: int) -> None:
-        node = frame.node(index)
-        for child in node.children if node.orthogonal else (node.initial,):
-            self._enter(frame, child)
 
     def _bind_submachine(self, frame: Frame, index: int, state: SubmachineState) -> None:
         try:
@@ -223,7 +221,7 @@ class Execution:
         except InputError as error:
             self._fail(frame, f"{frame.path(index)}: {error}")
             return
-        self._enter_children(inner, 0)
+        self._enter_initial(inner)
 
     def _bind_dynamic(self, frame: Frame, index: int, state: DynamicState) -> None:
         bindings = self._bindings(frame, self._event)
@@ -242,7 +240,7 @@ class Execution:
         else:
             compiled = self._chart.compiled(decision.chosen)
             inner = self._new_frame(compiled, decision.arguments, frame, index)
-            self._enter_children(inner, 0)
+            self._enter_initial(inner)
 
     def _new_frame(
         self, compiled: CompiledPlot, arguments: Mapping[str, Any], parent: Frame | None, host: int
@@ -278,41 +276,57 @@ class Execution:
             self._done(frame.parent, frame.host)
 
     def _done(self, frame: Frame, index: int) -> None:
-        if DONE in frame.node(index).edges:
+        if frame.compiled.scxml:
+            self._internal.append(Event(DONE_STATE + frame.node(index).name, frame=frame.serial))
+        elif DONE in frame.node(index).edges:
             self._internal.append(Event(DONE, to=frame.active[index], exact=True))
 
     # -- actions -----------------------------------------------------------------------------------------
 
-    def _external(self, frame: Frame, index: int, actions: tuple[ExternalAction, ...]) -> None:
+    def _act(self, frame: Frame, index: int, actions: tuple[ExternalAction | Internal, ...]) -> None:
         activation = frame.active[index]
         for number, action in enumerate(actions):
             try:
-                output = output_of(action, activation, number, lambda term: self._value(frame, term))
+                if isinstance(action, Internal):
+                    self._internal_action(frame, action)
+                else:
+                    value = partial(self._value, frame)
+                    self._output.append(output_of(action, activation, number, value))
             except InputError as error:
                 self._fail(frame, f"{frame.path(index)}: {error}")
-            else:
-                self._output.append(output)
+                if frame.compiled.scxml:  # an error ends the block (SCXML 4.9)
+                    return
 
-    def _perform(self, frame: Frame, actions: Iterable[Assign | Tell | Emit]) -> None:
+    def _perform(self, frame: Frame, actions: Iterable[Internal]) -> None:
         for action in actions:
             try:
                 self._internal_action(frame, action)
             except InputError as error:
                 self._fail(frame, f"{frame.compiled.plot.name}: {error}")
+                if frame.compiled.scxml:
+                    return
 
-    def _internal_action(self, frame: Frame, action: Assign | Tell | Emit) -> None:
-        if isinstance(action, Assign):
-            values = {name: self._value(frame, term) for name, term in action.assign.items()}
-            frame.variables.update(values)
-        elif isinstance(action, Tell):
-            told = self._situation.tell(action.tell, self._bindings(frame, self._event))
-            self._knowledge = self._knowledge.then(told)
-        else:
-            attributes = {name: self._value(frame, term) for name, term in action.arguments.items()}
-            self._emit(frame, action.emit, attributes)
+    def _internal_action(self, frame: Frame, action: Internal) -> None:
+        match action:
+            case Assign(assign=terms):
+                frame.variables.update({name: self._value(frame, term) for name, term in terms.items()})
+            case Tell(tell=effect):
+                told = self._situation.tell(effect, self._bindings(frame, self._event))
+                self._knowledge = self._knowledge.then(told)
+            case Emit():
+                attributes = {name: self._value(frame, term) for name, term in action.arguments.items()}
+                delay = None if action.delay is None else delay_of(self._value(frame, action.delay))
+                self._emit(frame, action.emit, attributes, delay)
+            case Log(log=parts, label=label):
+                self._output.append(Note(label, "".join(str(self._value(frame, part)) for part in parts)))
+            case Choose():
+                for inner in action.then if self._holds(frame, action.condition) else action.otherwise:
+                    self._internal_action(frame, inner)
 
-    def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
-        if name not in frame.compiled.plot.emits:
+    def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any], delay: float | None = None) -> None:
+        if delay is not None:
+            self._output.append(SendLater(Event(name, attributes, frame=frame.serial), delay))
+        elif name not in frame.compiled.plot.emits:
             self._internal.append(Event(name, attributes, frame=frame.serial))
         elif frame.parent is None:
             self._emitted.append(Event(name, attributes))
@@ -324,7 +338,8 @@ class Execution:
         return evaluate(term, self._bindings(frame, self._event), self._situation)
 
     def _fail(self, frame: Frame, reason: str) -> None:
-        self._internal.append(Event(ERROR, {"reason": reason}, frame=frame.serial))
+        name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
+        self._internal.append(Event(name, {"reason": reason}, frame=frame.serial))
 
     def _next_serial(self) -> int:
         self._serials += 1

@@ -8,6 +8,7 @@ from typing import Any
 
 from dsc.engine.compiler import Chart, CompiledPlot, Node
 from dsc.engine.configuration import FrameState
+from dsc.model.states import HistoryState
 from knowledge_base.errors import UnknownNameError
 
 
@@ -22,6 +23,7 @@ class Frame:
     host: int = -1
     active: dict[int, int] = field(default_factory=dict)
     children: dict[int, Frame] = field(default_factory=dict)
+    history: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
     def node(self, index: int) -> Node:
         """The node of that index."""
@@ -45,6 +47,21 @@ class Frame:
         """The node and the nodes around it in this plot, innermost first, without the plot itself."""
         return [index, *self.compiled.ancestors(index)[:-1]]
 
+    def is_active(self, state: str) -> bool:
+        """Whether the state of that name is active in this plot."""
+        return self.compiled.index.get(state) in self.active
+
+    def remember(self, index: int) -> None:
+        """Record what is active inside a node that is about to be left, for its histories (SCXML 3.10)."""
+        for history in self.node(index).histories:
+            state = self.node(history).state
+            if isinstance(state, HistoryState) and state.history == "deep":
+                holders = {self.node(active).parent for active in self.active}
+                kept = [at for at in self.active if at not in holders and self.compiled.inside(at, index)]
+            else:
+                kept = [child for child in self.node(index).children if child in self.active]
+            self.history[history] = tuple(sorted(kept))
+
     def leaves(self) -> Iterator[tuple[Frame, int]]:
         """All active states, here and in plots inside, that have no active state inside; document order."""
         inner = {self.node(index).parent for index in self.active}
@@ -67,6 +84,8 @@ def thaw(state: FrameState, chart: Chart, parent: Frame | None = None, host: int
     index = compiled.index
     frame = Frame(state.serial, compiled, dict(state.variables), parent, host)
     frame.active = {_index(index, name, compiled): serial for name, serial in state.active.items()}
+    for name, remembered in state.history.items():
+        frame.history[_index(index, name, compiled)] = tuple(_index(index, one, compiled) for one in remembered)
     for name, child in state.children.items():
         at = _index(index, name, compiled)
         frame.children[at] = thaw(child, chart, frame, at)
@@ -92,6 +111,10 @@ def freeze(frame: Frame) -> FrameState:
         variables=dict(frame.variables),
         active={_name(frame, index): frame.active[index] for index in sorted(frame.active)},
         children={frame.node(index).name: freeze(frame.children[index]) for index in sorted(frame.children)},
+        history={
+            frame.node(index).name: tuple(_name(frame, one) for one in frame.history[index])
+            for index in sorted(frame.history)
+        },
     )
 
 

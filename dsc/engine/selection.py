@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from dsc.engine.compiler import Edge
+from dsc.engine.entering import effective_targets
 from dsc.engine.frames import Frame
 from dsc.events import AFTER, Event
 
@@ -26,14 +27,19 @@ class Enabled:
 
     @property
     def domain(self) -> int:
-        """Index of the innermost composite (or plot) around both source and target; -1 if nothing is left."""
+        """Index of the innermost composite (or plot) around source and targets; -1 if nothing is left.
+
+        SCXML appendix D: getTransitionDomain, findLCCA. A source that is only left internally is its own domain.
+        """
         if self.edge.target is None:
             return -1
-        target_around = set(self.frame.compiled.ancestors(self.edge.target))
+        if self.edge.internal:
+            return self.edge.source
+        compiled = self.frame.compiled
+        real = effective_targets(compiled, self.edge.targets, self.frame.history)
+        around = set.intersection(*(set(compiled.ancestors(target)) for target in real))
         return next(
-            index
-            for index in self.frame.compiled.ancestors(self.edge.source)
-            if index in target_around and not self.frame.node(index).orthogonal
+            index for index in compiled.ancestors(self.edge.source) if index in around and _is_scope(self.frame, index)
         )
 
     def left(self) -> set[tuple[Frame, int]]:
@@ -48,6 +54,11 @@ class Enabled:
                 if index in self.frame.children:
                     found.update(everything(self.frame.children[index]))
         return found
+
+
+def _is_scope(frame: Frame, index: int) -> bool:
+    node = frame.node(index)
+    return not node.orthogonal and not node.transparent
 
 
 def everything(frame: Frame) -> Iterable[tuple[Frame, int]]:
@@ -112,7 +123,18 @@ def _edges(frame: Frame, index: int, event: Event | None) -> tuple[Edge, ...]:
         return node.always
     if event.name == AFTER:
         return (node.timeouts[event.index][1],) if event.index is not None else ()
+    if frame.compiled.scxml:
+        return tuple(edge for name, edges in node.edges.items() if matches(name, event.name) for edge in edges)
     return node.edges.get(event.name, ())
+
+
+def matches(descriptors: str, event: str) -> bool:
+    """Whether one of the descriptors is the event's name or a prefix of its tokens (SCXML 3.12.1)."""
+    for descriptor in descriptors.split():
+        prefix = descriptor.removesuffix(".*").removesuffix(".")
+        if prefix in {"*", event} or event.startswith(prefix + "."):
+            return True
+    return False
 
 
 def _without_conflicts(enabled: list[Enabled]) -> list[Enabled]:

@@ -58,7 +58,23 @@ class StartTimer:
     seconds: float
 
 
-Output = Start | Cancel | SetParameter | SwitchMode | StartTimer
+@dataclass(frozen=True, slots=True)
+class SendLater:
+    """Hand the event in from outside after `seconds`; it is dropped if its plot is gone by then (SCXML 6.2)."""
+
+    event: Event
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Something to be written into the trace (SCXML 4.7)."""
+
+    label: str
+    text: str
+
+
+Output = Start | Cancel | SetParameter | SwitchMode | StartTimer | SendLater | Note
 """What leaves the machine, in order."""
 
 

@@ -1,12 +1,13 @@
-"""Actions. External ones reach components and stand in entry or exit; internal ones stay in the chart (S0.5)."""
+"""Actions. ExternalAction ones reach components and stand in entry or exit; internal ones stay in the chart (S0.5)."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Annotated
 
 from pydantic import Field, Tag
 
-from dsc.model.language import EffectField, Frozen, TermField, by_key
+from dsc.model.language import ConditionField, EffectField, Frozen, TermField, by_key
 
 
 class Trigger(Frozen):
@@ -39,11 +40,8 @@ class Switch(Frozen):
     to: str
 
 
-ExternalAction = Annotated[
-    Annotated[Trigger, Tag("trigger")] | Annotated[Configure, Tag("set")] | Annotated[Switch, Tag("switch")],
-    by_key("trigger", "set", "switch"),
-]
-"""What entry and exit may hold."""
+ExternalAction = Trigger | Configure | Switch
+"""What acts on components; the rest stays in the chart."""
 
 
 class Assign(Frozen):
@@ -59,14 +57,68 @@ class Tell(Frozen):
 
 
 class Emit(Frozen):
-    """Fire an event: a declared outcome goes to the state that holds this plot, any other stays inside."""
+    """Fire an event: a declared outcome goes to the state that holds this plot, any other stays inside.
+
+    With `delay` (seconds; only in profile `scxml`) it comes as an event from outside, after whatever comes before.
+    """
 
     emit: str
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
+    delay: TermField | None = None
+
+
+class Log(Frozen):
+    """Tell the trace: constants and variables, shown one after the other (SCXML 4.7; only in profile `scxml`)."""
+
+    log: tuple[TermField, ...]
+    label: str = ""
+
+
+class Choose(Frozen):
+    """The actions of one branch (SCXML 4.3; only in profile `scxml`).
+
+    Attributes:
+        condition: what decides (`if`).
+        then: what happens if it holds.
+        otherwise: what happens if it does not (`else`).
+    """
+
+    condition: ConditionField = Field(alias="if")
+    then: tuple[InternalAction, ...] = ()
+    otherwise: tuple[InternalAction, ...] = Field(default=(), alias="else")
 
 
 InternalAction = Annotated[
-    Annotated[Assign, Tag("assign")] | Annotated[Tell, Tag("tell")] | Annotated[Emit, Tag("emit")],
-    by_key("assign", "tell", "emit"),
+    Annotated[Assign, Tag("assign")]
+    | Annotated[Tell, Tag("tell")]
+    | Annotated[Emit, Tag("emit")]
+    | Annotated[Log, Tag("log")]
+    | Annotated[Choose, Tag("if")],
+    by_key("assign", "tell", "emit", "log", "if"),
 ]
 """What transitions may hold."""
+Choose.model_rebuild()
+
+Internal = Assign | Tell | Emit | Log | Choose
+"""The internal actions, to be told from the external ones."""
+
+Action = Annotated[
+    Annotated[Trigger, Tag("trigger")]
+    | Annotated[Configure, Tag("set")]
+    | Annotated[Switch, Tag("switch")]
+    | Annotated[Assign, Tag("assign")]
+    | Annotated[Tell, Tag("tell")]
+    | Annotated[Emit, Tag("emit")]
+    | Annotated[Log, Tag("log")]
+    | Annotated[Choose, Tag("if")],
+    by_key("trigger", "set", "switch", "assign", "tell", "emit", "log", "if"),
+]
+"""What entry and exit may hold; internal actions only in profile `scxml` (SCXML 3.8)."""
+
+
+def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalAction | Internal]:
+    """All actions, also those inside branches."""
+    for action in actions:
+        yield action
+        if isinstance(action, Choose):
+            yield from flat((*action.then, *action.otherwise))

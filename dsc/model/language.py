@@ -50,10 +50,15 @@ def kind_by_key(*keys: str) -> Callable[[Any], str | None]:
     """The first of the keys that the data have."""
 
     def kind(value: Any) -> str | None:
-        present = value if isinstance(value, Mapping) else getattr(type(value), "model_fields", ())
+        present = value if isinstance(value, Mapping) else _written_keys(type(value))
         return next((key for key in keys if key in present), None)
 
     return kind
+
+
+def _written_keys(kind: Any) -> set[str]:
+    fields = getattr(kind, "model_fields", {})
+    return {field.alias or name for name, field in fields.items()}
 
 
 def _condition(value: Any) -> Expression:

@@ -16,6 +16,7 @@ from dsc.model.states import (
     AnyState,
     CompositeState,
     DynamicState,
+    HistoryState,
     OrthogonalState,
     Region,
     SubmachineState,
@@ -111,6 +112,8 @@ class ActionPlot(Frozen):
         initial: the state to enter first; the first one if left out.
         rules: contingency rules, in order of priority.
         generated: whether it was made from a plan.
+        profile: `dsc`, or `scxml` for charts that use what only SCXML has: transitions across borders, history,
+            events matched by prefix, internal actions in entry and exit.
     """
 
     name: str = Field(alias="plot", pattern=r"^[a-zA-Z_][\w\-#.]*$")
@@ -127,6 +130,7 @@ class ActionPlot(Frozen):
     states: dict[str, AnyState] = Field(min_length=1)
     rules: tuple[Rule, ...] = ()
     generated: bool = False
+    profile: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
 
     def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
@@ -238,6 +242,7 @@ def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, Any
         elif isinstance(state, OrthogonalState):
             for region_name, region in state.regions.items():
                 yield from _walk(region.states, (*here, "regions", region_name, "states"))
+            yield from ((each, history, (*here, "connectors", each)) for each, history in state.connectors.items())
 
 
 Scope = ActionPlot | CompositeState | Region
@@ -245,6 +250,7 @@ Scope = ActionPlot | CompositeState | Region
 
 
 def initial_of(scope: Scope) -> str:
-    """The name of the state to enter first."""
-    return scope.initial or next(iter(scope.states))
+    """The name of the state to enter first; in profile `scxml` it may be deeper inside (SCXML 3.3)."""
+    proper = (name for name, state in scope.states.items() if not isinstance(state, HistoryState))
+    return scope.initial or next(proper, next(iter(scope.states)))
 

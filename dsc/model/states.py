@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator
 
-from dsc.model.actions import Assign, Emit, ExternalAction, InternalAction, Tell
+from dsc.model.actions import Action, Assign, Emit, Internal, InternalAction, Tell, flat
 from dsc.model.language import ConditionField, EffectField, Frozen, TermField
 from knowledge_base.language.expression import Constant, Term
 
@@ -22,21 +22,30 @@ class Transition(Frozen):
             are the attributes of the emitted event.
         do: more internal actions, before those.
         rule: label of the contingency rule that put the transition there.
+        also: more targets, in other regions (only in profile `scxml`).
+        internal: a composite source is not left if the target is inside it (SCXML 3.5; only in profile `scxml`).
     """
 
     target: str | None = Field(default=None, alias="to")
     guard: ConditionField | None = Field(default=None, alias="when")
     do: tuple[InternalAction, ...] = ()
     rule: str | None = None
+    also: tuple[str, ...] = ()
+    internal: bool = False
     assign: dict[str, TermField] = Field(default_factory=dict)
     tell: EffectField | None = None
     emit: str | None = None
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
 
     @property
-    def effect(self) -> tuple[Assign | Tell | Emit, ...]:
+    def targets(self) -> tuple[str, ...]:
+        """All states to enter."""
+        return () if self.target is None else (self.target, *self.also)
+
+    @property
+    def effect(self) -> tuple[Internal, ...]:
         """All internal actions in order of execution."""
-        actions: list[Assign | Tell | Emit] = list(self.do)
+        actions: list[Internal] = list(self.do)
         if self.assign:
             actions.append(Assign(assign=self.assign))
         if self.tell is not None:
@@ -48,7 +57,7 @@ class Transition(Frozen):
     @property
     def emitted(self) -> tuple[str, ...]:
         """The events its actions fire."""
-        return tuple(action.emit for action in self.effect if isinstance(action, Emit))
+        return tuple(action.emit for action in flat(self.effect) if isinstance(action, Emit))
 
 
 class TimedTransition(Transition):
@@ -75,14 +84,14 @@ def _as_tuple(value: Any) -> Any:
 
 Transitions = Annotated[tuple[Transition, ...], BeforeValidator(_as_transitions)]
 TimedTransitions = Annotated[tuple[TimedTransition, ...], BeforeValidator(_as_tuple)]
-Actions = Annotated[tuple[ExternalAction, ...], BeforeValidator(_as_tuple)]
+Actions = Annotated[tuple[Action, ...], BeforeValidator(_as_tuple)]
 
 
 class State(Frozen):
     """A simple state: a configuration of the skill layer, set in entry and reverted by exit (S0.15).
 
     Attributes:
-        entry, exit: external actions.
+        entry, exit: external actions; in profile `scxml` internal ones too.
         on: event -> transitions, tried in order; `done` is the completion of the state's content.
         after: timeouts.
         always: transitions without trigger, taken as soon as their guard holds.
@@ -126,9 +135,15 @@ class Region(Frozen):
 
 
 class OrthogonalState(State):
-    """Regions that are active together; done when each has reached its final state."""
+    """Regions that are active together; done when each has reached its final state.
+
+    Attributes:
+        regions: the regions by name.
+        connectors: histories of the whole (only in profile `scxml`).
+    """
 
     regions: dict[str, Region] = Field(min_length=1)
+    connectors: dict[str, HistoryState] = Field(default_factory=dict)
 
 
 class SubmachineState(State):
@@ -166,16 +181,36 @@ class DynamicState(State):
 
 
 class FinalState(Frozen):
-    """The end of its region or plot; entering it completes the state around (S0.11, S2.2)."""
+    """The end of its region or plot; entering it completes the state around (S0.11, S2.2).
+
+    `entry` holds internal actions, and only in profile `scxml`.
+    """
 
     about: str | None = None
     final: Literal[True]
+    entry: Annotated[tuple[InternalAction, ...], BeforeValidator(_as_tuple)] = ()
     emit: str | None = None
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
 
 
+class HistoryState(Frozen):
+    """Stands for what was active when the state around was last left (SCXML 3.10; only in profile `scxml`).
+
+    Attributes:
+        history: `shallow` remembers the states directly inside, `deep` the innermost ones. What ran inside a
+            submachine or dynamic state is not remembered: such a state begins anew.
+        target: the state to enter (`to`) if the state around was never left.
+        do: internal actions of that default.
+    """
+
+    about: str | None = None
+    history: Literal["shallow", "deep"]
+    target: str = Field(alias="to")
+    do: tuple[InternalAction, ...] = ()
+
+
 _KIND_OF_KEY = {"use": "submachine", "dynamic": "dynamic", "goal": "dynamic", "states": "composite",
-                "regions": "orthogonal", "final": "final"}  # fmt: skip
+                "regions": "orthogonal", "final": "final", "history": "history"}  # fmt: skip
 
 
 def _kind(value: Any) -> str:
@@ -193,7 +228,8 @@ AnyState = Annotated[
     | Annotated[OrthogonalState, Tag("orthogonal")]
     | Annotated[SubmachineState, Tag("submachine")]
     | Annotated[DynamicState, Tag("dynamic")]
-    | Annotated[FinalState, Tag("final")],
+    | Annotated[FinalState, Tag("final")]
+    | Annotated[HistoryState, Tag("history")],
     Discriminator(_kind),
     BeforeValidator(_as_state),
 ]

@@ -12,8 +12,8 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dsc.engine.steps import Cancel, Output, SetParameter, Start, StartTimer, SwitchMode
-from dsc.events import SKILL_ERROR, TIMED_OUT
+from dsc.engine.steps import Cancel, Output, SendLater, SetParameter, Start, StartTimer, SwitchMode
+from dsc.events import SKILL_ERROR, TIMED_OUT, Event
 from dsc.skills import Clock, Component, Outcome, SkillCall
 from knowledge_base.errors import UnknownNameError
 
@@ -47,7 +47,7 @@ class Dispatcher:
         self,
         components: Iterable[Component],
         clock: Clock,
-        post: Callable[[SkillMessage | TimerMessage], None],
+        post: Callable[[SkillMessage | TimerMessage | Event], None],
     ) -> None:
         self._components = {component.name: component for component in components}
         self._clock = clock
@@ -56,6 +56,8 @@ class Dispatcher:
         self._configuring: dict[str, asyncio.Task[None]] = {}
         self._ending: set[asyncio.Task[None]] = set()
         self._timers: dict[tuple[int, int], asyncio.TimerHandle] = {}
+        self._sent: dict[int, asyncio.TimerHandle] = {}
+        self._last_sent = 0
 
     def deploy(self, component: Component) -> None:
         """Add a component; it replaces one of the same name."""
@@ -68,7 +70,7 @@ class Dispatcher:
     @property
     def waiting(self) -> bool:
         """Whether any answer or timeout is still to come."""
-        return bool(self._running) or bool(self._timers)
+        return bool(self._running) or bool(self._timers) or bool(self._sent)
 
     def dispatch(self, output: Output) -> None:
         """Carry out one output of the machine.
@@ -82,11 +84,14 @@ class Dispatcher:
             self._cancel(output.activation)
         elif isinstance(output, StartTimer):
             self._start_timer(output)
+        elif isinstance(output, SendLater):
+            self._send_later(output)
         elif isinstance(output, SetParameter):
             component = self.component(output.component)
             self._configure(component, lambda: component.configure(output.parameter, _encoded(output.value)))
-        else:
+        elif isinstance(output, SwitchMode):
             self._switch(output)
+        # What is left is a note, which the trace has.
 
     def component(self, name: str) -> Component:
         """The component of that name; raises `UnknownNameError`."""
@@ -109,6 +114,9 @@ class Dispatcher:
         for handle in self._timers.values():
             handle.cancel()
         self._timers.clear()
+        for handle in self._sent.values():
+            handle.cancel()
+        self._sent.clear()
         tasks = [*self._ending, *self._configuring.values()]
         if tasks:
             stopped, late = await asyncio.wait(tasks, timeout=CLOSING)
@@ -179,6 +187,15 @@ class Dispatcher:
         message = TimerMessage(timer.activation, timer.index)
         handle = asyncio.get_running_loop().call_later(timer.seconds, self._timer_due, message)
         self._timers[timer.activation, timer.index] = handle
+
+    def _send_later(self, later: SendLater) -> None:
+        number = self._last_sent = self._last_sent + 1
+
+        def due() -> None:
+            del self._sent[number]
+            self._post(later.event)
+
+        self._sent[number] = asyncio.get_running_loop().call_later(later.seconds, due)
 
     def _timer_due(self, message: TimerMessage) -> None:
         del self._timers[message.activation, message.index]

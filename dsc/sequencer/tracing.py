@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dsc.dynamic.library import Library
-from dsc.engine.steps import Cancel, Output, SetParameter, Start, StartTimer, Step, SwitchMode
+from dsc.engine.steps import Cancel, Note, Output, SendLater, SetParameter, Start, StartTimer, Step, SwitchMode
 from dsc.events import Event
 from dsc.trace import Trace
 from knowledge_base.facts import Change
@@ -101,7 +101,9 @@ class StepTracer:
             return self._trace.record("action", action="set", port=port, value=output.value)
         if isinstance(output, SwitchMode):
             return self._trace.record("action", action="switch", component=output.component, mode=output.mode)
-        assert isinstance(output, Cancel | StartTimer)  # noqa: S101
+        if isinstance(output, Note):
+            return self._trace.record("log", label=output.label, text=output.text)
+        assert isinstance(output, Cancel | StartTimer | SendLater)  # noqa: S101
         return None
 
     def _plots(self, step: Step) -> None:

@@ -61,7 +61,8 @@ _ORDER = (
 )
 _SINGLE = frozenset({"entry", "exit", "after", "always", "event"})
 _NAMES = {
-    "on": "event", "states": "state", "regions": "region", "parameters": "declaration", "variables": "declaration",
+    "on": "event", "states": "state", "connectors": "state", "regions": "region",
+    "parameters": "declaration", "variables": "declaration",
     "emits": "attributes", "receives": "attributes", "with": "value", "as": "value", "assign": "value",
 }  # fmt: skip
 """Mappings whose keys are people's names, which keep their order, and what stands under such a name."""

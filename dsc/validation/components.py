@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from dsc.errors import Finding
-from dsc.model.actions import Configure, ExternalAction, Switch
+from dsc.model.actions import Configure, ExternalAction, Internal, Switch
 from dsc.model.plot import ActionPlot
 from dsc.model.states import State
 from knowledge_base.errors import UnknownNameError
@@ -27,7 +27,7 @@ def check_components(plot: ActionPlot, components: Collection[str]) -> Iterator[
                     yield Finding(error, "known component")
 
 
-def _addressed(action: ExternalAction) -> str | None:
+def _addressed(action: ExternalAction | Internal) -> str | None:
     if isinstance(action, Configure):
         return action.set.split(".")[0]
     return action.switch if isinstance(action, Switch) else None

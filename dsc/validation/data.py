@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import outcomes_of
+from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
-from dsc.model.actions import Assign, Emit, ExternalAction, Switch, Tell, Trigger
+from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
 from dsc.model.plot import ActionPlot, Parameter, Path, Variable
 from dsc.model.states import AnyState, DynamicState, FinalState, State, SubmachineState, TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
@@ -51,6 +52,9 @@ class _Data:
                 yield from self._state(state, path)
             elif isinstance(state, FinalState):
                 yield from self._terms(state.arguments.items(), None, (*path, "with"))
+                yield from self._internal(state.entry, None, (*path, "entry"))
+            else:
+                yield from self._internal(state.do, None, (*path, "do"))
         for number, rule in enumerate(self._plot.rules):
             path = ("rules", number)
             event = self._rule_event(rule.on)
@@ -85,7 +89,10 @@ class _Data:
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
         for key, actions in (("entry", state.entry), ("exit", state.exit)):
             for position, action in enumerate(actions):
-                yield from self._external(action, (*path, key, position))
+                if isinstance(action, Internal):
+                    yield from self._internal((action,), None, (*path, key, position))
+                else:
+                    yield from self._external(action, (*path, key, position))
         for inside, event, transition in state.placed_transitions():
             attributes = self._event_types(state, event) if event in state.on else None
             yield from self._transition(transition, attributes, (*path, *inside))
@@ -120,7 +127,10 @@ class _Data:
         scope = self._scope(attributes, transition.guard)
         if transition.guard is not None:
             yield from self._condition(transition.guard, scope, (*path, "when"))
-        for action in transition.effect:
+        yield from self._internal(transition.effect, attributes, path)
+
+    def _internal(self, actions: Iterable[Internal], attributes: Types | None, path: Path) -> Iterator[Finding]:
+        for action in actions:
             if isinstance(action, Tell):
                 yield from self._effect(action.tell, self._scope(attributes, action.tell), (*path, "tell"))
             elif isinstance(action, Assign):
@@ -128,6 +138,15 @@ class _Data:
                 yield from self._terms(action.assign.items(), attributes, (*path, "assign"))
             elif isinstance(action, Emit):
                 yield from self._terms(action.arguments.items(), attributes, (*path, "with"))
+                if action.delay is not None:
+                    yield from self._terms([("delay", action.delay)], attributes, path)
+            elif isinstance(action, Log):
+                yield from self._terms([("log", part) for part in action.log], attributes, path)
+            elif isinstance(action, Choose):
+                scope = self._scope(attributes, action.condition)
+                yield from self._condition(action.condition, scope, (*path, "if"))
+                yield from self._internal(action.then, attributes, (*path, "then"))
+                yield from self._internal(action.otherwise, attributes, (*path, "else"))
 
     def _assign(self, action: Assign, path: Path) -> Iterator[Finding]:
         for name in action.assign:
@@ -173,6 +192,15 @@ class _Data:
     # -- the language ------------------------------------------------------------------------------------
 
     def _condition(self, condition: Expression, scope: Types, path: Path) -> Iterator[Finding]:
+        states = {name for name, _, _ in self._plot.walk()}
+        for name in asked_states(condition):
+            if name not in states:
+                error = UnknownNameError(
+                    f"there is no state '{name}'", place=self._plot.place(path), found=name, valid=states
+                )
+                yield Finding(error, "condition")
+        if self._plot.profile == "scxml":
+            condition = settle(condition, lambda _: True)
         if self._schema is not None:
             try:
                 check(condition, self._schema, scope)

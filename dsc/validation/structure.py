@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from dsc.dynamic.library import Library
+from dsc.engine.compiler import compile_plot
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import (
     AnyState,
     CompositeState,
     DynamicState,
+    HistoryState,
     OrthogonalState,
     Region,
     State,
     SubmachineState,
 )
-from knowledge_base.errors import SchemaError, UnknownNameError
+from dsc.validation.profile import check_profile
+from knowledge_base.errors import Place, SchemaError, UnknownNameError
 
 RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 """What a rule may do besides going to a named state."""
@@ -24,6 +27,7 @@ RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 
 def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
+    yield from check_profile(plot)
     yield from _scope(plot, plot, ())
     names = {name for name, _, _ in plot.walk()}
     for name, state, path in plot.walk():
@@ -33,17 +37,34 @@ def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
             for key, region in state.regions.items():
                 yield from _scope(plot, region, (*path, "regions", key))
         yield from _uses(plot, state, path, library)
-        yield from _dead_end(plot, name, state, path)
+        if plot.profile == "dsc":
+            yield from _dead_end(plot, name, state, path)
+        if isinstance(state, HistoryState):
+            yield from _history(plot, state, path)
     yield from _rules(plot, names, library)
+    if plot.profile == "scxml":
+        yield from _tables(plot)
+
+
+def _tables(plot: ActionPlot) -> Iterator[Finding]:
+    """What only shows when all targets are known; names that are not there have findings of their own."""
+    try:
+        compile_plot(plot)
+    except UnknownNameError:
+        return
+    except SchemaError as error:
+        error.place = next((plot.place(path) for name, _, path in plot.walk() if name == error.found), None)
+        yield Finding(error, "target")
 
 
 def _scope(
     plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path
 ) -> Iterator[Finding]:
-    if scope.initial is not None and scope.initial not in scope.states:
+    valid = _within(plot, path) if plot.profile == "scxml" else set(scope.states)
+    if scope.initial is not None and scope.initial not in valid:
         error = UnknownNameError(
             f"there is no state '{scope.initial}' to begin with",
-            place=plot.place((*path, "initial")), found=scope.initial, valid=scope.states,
+            place=plot.place((*path, "initial")), found=scope.initial, valid=valid,
         )  # fmt: skip
         yield Finding(error, "initial")
     for name, state in scope.states.items():
@@ -54,18 +75,40 @@ def _scope(
 def _targets(plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState]) -> Iterator[Finding]:
     everywhere = {name for name, _, _ in plot.walk()}
     for inside, _, transition in state.placed_transitions():
-        target = transition.target
-        if target is None or target in siblings:
-            continue
         place = plot.place((*path, *inside, "to"))
+        for target in transition.targets:
+            yield from _target(plot, target, siblings, everywhere, place)
+
+
+def _target(
+    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: set[str], place: Place | None
+) -> Iterator[Finding]:
+    if target not in siblings and not (plot.profile == "scxml" and target in everywhere):
         if target in everywhere:
             error = SchemaError(f"the transition to '{target}' crosses a border", place=place, found=target)
             yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
         else:
             missing = UnknownNameError(
-                f"there is no state '{target}'", place=place, found=target, valid=siblings
+                f"there is no state '{target}'", place=place, found=target,
+                valid=siblings if plot.profile == "dsc" else everywhere,
             )
             yield Finding(missing, "target")
+
+
+def _within(plot: ActionPlot, path: Path) -> set[str]:
+    return {name for name, _, other in plot.walk() if other[: len(path)] == path and other != path}
+
+
+def _history(plot: ActionPlot, state: HistoryState, path: Path) -> Iterator[Finding]:
+    """What a history leads to is inside the state that the history belongs to (SCXML 3.10)."""
+    around = path[:-2]
+    valid = _within(plot, around)
+    if state.target not in valid:
+        error = UnknownNameError(
+            f"there is no state '{state.target}' beside the history", place=plot.place((*path, "to")),
+            found=state.target, valid=valid,
+        )  # fmt: skip
+        yield Finding(error, "target")
 
 
 def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> Iterator[Finding]:

@@ -42,13 +42,15 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
     for name, state, path in plot.walk():
         if isinstance(state, FinalState):
             yield from _final(plot, state, path)
+        if not isinstance(state, State):
             continue
         handled = _handled([wired[name], *around(plot, path)])
         yield from _outcomes(plot, name, outcomes_of(state, library), handled, path)
         yield from _skills(plot, name, state, path, handled, skills)
-        yield from _completion(plot, name, state, wired[name], path, library)
-        yield from _known_events(plot, state, path, library, skills)
-        yield from _emissions(plot, state, path)
+        if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
+            yield from _completion(plot, name, state, wired[name], path, library)
+            yield from _known_events(plot, state, path, library, skills)
+            yield from _emissions(plot, state, path)
 
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:

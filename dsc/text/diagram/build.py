@@ -12,11 +12,12 @@ from dsc.model.states import (
     CompositeState,
     DynamicState,
     FinalState,
+    HistoryState,
     OrthogonalState,
     Region,
     State,
 )
-from dsc.text.diagram.cards import action_rows, card, dot, final_card, leaf_card, name_beside
+from dsc.text.diagram.cards import action_rows, card, dot, final_card, history_card, leaf_card, name_beside
 from dsc.text.diagram.edges import Bundle, bundles, initial_bundle, loop, room_for_loop
 from dsc.text.diagram.header import header, rules_note
 from dsc.text.diagram.layered.arrange import arrange
@@ -113,6 +114,8 @@ class _Builder:
         here = (*path, "states", name)
         if isinstance(state, FinalState):
             return final_card(name, state)
+        if isinstance(state, HistoryState):
+            return history_card(name, state)
         if isinstance(state, CompositeState):
             return self._hull(BoxKind.COMPOSITE, name, state, self.scope(state, here))
         if isinstance(state, OrthogonalState):

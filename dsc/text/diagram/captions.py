@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dsc.events import AFTER
-from dsc.model.actions import Assign, Configure, Emit, ExternalAction, Switch, Tell, Trigger
+from dsc.model.actions import Assign, Choose, Configure, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
 from dsc.model.states import State, TimedTransition, Transition
 from dsc.text.diagram.layout import TextStyle
 from dsc.text.diagram.measure import pack
@@ -136,14 +136,15 @@ def _rule_guard(guard: Expression | None) -> str:
     return f"[{', '.join(words)}]" if words else ""
 
 
-def action_text(action: Assign | Tell | Emit | ExternalAction, *, brief: bool = False) -> str:
+def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> str:  # noqa: PLR0911  # a table by kind
     """An action in the notation of state charts: `^event`, `name := value`, `component.skill(…)`.
 
     If `brief`, the attributes of fired events are left out.
     """
     match action:
         case Emit(emit=event, arguments=arguments):
-            return f"^{event}" + (_values(arguments) if arguments and not brief else "")
+            later = "" if action.delay is None else f" after {to_text(action.delay)} s"
+            return f"^{event}" + (_values(arguments) if arguments and not brief else "") + later
         case Assign(assign=values):
             return ", ".join(f"{name} := {to_text(value)}" for name, value in values.items())
         case Tell(tell=effect):
@@ -154,6 +155,11 @@ def action_text(action: Assign | Tell | Emit | ExternalAction, *, brief: bool = 
             return f"{parameter} := {to_text(value)}"
         case Switch(switch=component, to=mode):
             return f"{component} → {mode}"
+        case Log(log=parts):
+            return f"log {' '.join(map(to_text, parts))}"
+        case Choose(condition=condition, then=then, otherwise=otherwise):
+            branches = [", ".join(map(action_text, branch)) for branch in (then, otherwise)]
+            return f"if {to_text(condition)} {{{branches[0]}}} else {{{branches[1]}}}"
 
 
 def _values(arguments: Mapping[str, Term]) -> str:

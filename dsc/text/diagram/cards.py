@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
-from dsc.model.states import DynamicState, FinalState, State, SubmachineState
+from dsc.model.states import DynamicState, FinalState, HistoryState, State, SubmachineState
 from dsc.text.diagram.captions import action_text, captions, content_text, labelled
 from dsc.text.diagram.layout import Box, BoxKind, Text, TextStyle
 from dsc.text.diagram.measure import LINE_HEIGHT, shorten, text_width
@@ -71,6 +71,12 @@ def final_card(name: str, state: FinalState) -> Box:
     eye = Box(BoxKind.BULLSEYE, "", (width - FINAL_SIZE) / 2, 0, FINAL_SIZE, FINAL_SIZE)
     height = FINAL_SIZE + 4 + LINE_HEIGHT * len(rows)
     return Box(BoxKind.FINAL, name, 0, 0, width, height, texts, title=title, boxes=(eye,))
+
+
+def history_card(name: str, state: HistoryState) -> Box:
+    """A history: H or H*, as UML writes it, and the state it begins with."""
+    mark = "H*" if state.history == "deep" else "H"
+    return card(BoxKind.SIMPLE, name, [_row(f"{mark} → {state.target}")], about=state.about or "")
 
 
 def name_beside(final: Box) -> Box:

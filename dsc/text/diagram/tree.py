@@ -8,7 +8,16 @@ from rich.text import Text
 from rich.tree import Tree
 
 from dsc.model.plot import ActionPlot, initial_of
-from dsc.model.states import AnyState, CompositeState, DynamicState, FinalState, OrthogonalState, State, SubmachineState
+from dsc.model.states import (
+    AnyState,
+    CompositeState,
+    DynamicState,
+    FinalState,
+    HistoryState,
+    OrthogonalState,
+    State,
+    SubmachineState,
+)
 from dsc.text.diagram.captions import action_text, content_text, full_text, labelled
 from dsc.text.diagram.header import facts, rule_text, signature
 from knowledge_base.language.printer import to_text
@@ -59,6 +68,8 @@ def _kind(state: AnyState) -> str:
     match state:
         case FinalState(emit=event):
             return "final" + (f" ^{event}" if event is not None else "")
+        case HistoryState(history=depth, target=target):
+            return f"{depth} history → {target}"
         case SubmachineState():
             return f"use {content_text(state.use, state.arguments)}"
         case DynamicState():

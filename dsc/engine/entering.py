@@ -1,0 +1,107 @@
+"""What is entered on the way to targets, as a pure function of the tables and of what histories remember.
+
+SCXML 1.0, appendix D: computeEntrySet, addDescendantStatesToEnter, addAncestorStatesToEnter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from dsc.engine.compiler import CompiledPlot
+from dsc.model.actions import Internal
+
+Remembered = Mapping[int, tuple[int, ...]]
+"""History node -> the nodes that were active when the node around it was last left."""
+
+
+@dataclass(slots=True)
+class Entry:
+    """What will be entered.
+
+    Attributes:
+        nodes: indices; in document order they are the order of entry.
+        after: internal actions that follow the entry of a node: those of a history's default (appendix D).
+    """
+
+    nodes: set[int] = field(default_factory=set)
+    after: dict[int, tuple[Internal, ...]] = field(default_factory=dict)
+
+
+def entry_set(compiled: CompiledPlot, domain: int, targets: tuple[int, ...], remembered: Remembered) -> Entry:
+    """Everything to enter inside `domain` to reach all targets; worked out once where nothing is remembered."""
+    if compiled.defaults:
+        return _entry_set(compiled, domain, targets, remembered)
+    if (domain, targets) not in compiled.entries:
+        compiled.entries[domain, targets] = _entry_set(compiled, domain, targets, remembered)
+    found: Entry = compiled.entries[domain, targets]
+    return found
+
+
+def _entry_set(compiled: CompiledPlot, domain: int, targets: tuple[int, ...], remembered: Remembered) -> Entry:
+    work = _Work(compiled, remembered)
+    reached = [real for target in targets for real in work.resolved(target)]
+    for target in reached:
+        work.way(domain, target)
+    for target in reached:
+        work.inside(target)
+    for index in sorted(work.entry.nodes):  # what a default brings has its regions already
+        work.regions(index)
+    return work.entry
+
+
+def effective_targets(compiled: CompiledPlot, targets: Iterable[int], remembered: Remembered) -> list[int]:
+    """The targets with histories replaced by what they stand for (getEffectiveTargetStates)."""
+    if not compiled.defaults:
+        return list(targets)
+    work = _Work(compiled, remembered)
+    return [real for target in targets for real in work.resolved(target)]
+
+
+class _Work:
+    def __init__(self, compiled: CompiledPlot, remembered: Remembered) -> None:
+        self._compiled = compiled
+        self._remembered = remembered
+        self.entry = Entry()
+
+    def resolved(self, target: int) -> list[int]:
+        """What a target stands for; other histories in a history's default are looked up too."""
+        default = self._compiled.defaults.get(target)
+        if default is None:
+            return [target]
+        if target in self._remembered:
+            return list(self._remembered[target])
+        self.entry.after[self._compiled.nodes[target].parent] = default.effect
+        return self.resolved(default.target)
+
+    def way(self, around: int, index: int) -> None:
+        self.entry.nodes.update(self._compiled.way(around, index))
+
+    def inside(self, index: int) -> None:
+        """The default content of a target, unless another target is inside it."""
+        node = self._compiled.nodes[index]
+        if node.orthogonal or any(child in self.entry.nodes for child in node.children):
+            return
+        if node.initial >= 0:
+            reached = self.resolved(node.initial)
+            for target in reached:
+                self.way(index, target)
+            for target in reached:
+                self.inside(target)
+            for inner in {inner for target in reached for inner in self._compiled.way(index, target)}:
+                self.regions(inner)
+
+    def regions(self, index: int) -> None:
+        """The regions of an orthogonal state that no target has reached."""
+        node = self._compiled.nodes[index]
+        if node.orthogonal:
+            for child in node.children:
+                if child not in self.entry.nodes:
+                    self._default(child)
+
+    def _default(self, index: int) -> None:
+        self.entry.nodes.add(index)
+        node = self._compiled.nodes[index]
+        if node.orthogonal:
+            self.regions(index)
+        self.inside(index)

@@ -1,0 +1,222 @@
+"""SCXML read into an action plot of profile `scxml`.
+
+| SCXML | plot |
+|---|---|
+| `state`, `final`, `history` | state of the same name |
+| `parallel` | state with a region for each child, named as the child and holding only it |
+| `transition` | under `on` by its descriptors, or under `always` |
+| `onentry`, `onexit` | internal actions in `entry` and `exit` |
+| `data` | variable, in lower case |
+| `raise`; `send`, with or without a delay | `emit`; `emit` with a `delay` |
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import PurePath
+from typing import Any
+
+from dsc.events import AFTER, RESERVED
+from dsc.model.plot import ActionPlot, Path
+from dsc.text.form import read_model
+from dsc.text.scxml.content import Form, actions, needed
+from dsc.text.scxml.document import Element, read_xml
+from dsc.text.scxml.ecmascript import condition, term
+from dsc.text.scxml.errors import NotExpressibleError
+from dsc.text.scxml.vocabulary import STATES, check
+from dsc.text.yaml import Document
+from knowledge_base.errors import InputError, Place
+from knowledge_base.language.expression import Arithmetic, Constant, Term
+
+
+def parse_scxml(text: str, source: str | None = None) -> ActionPlot:
+    """Read an SCXML document.
+
+    Raises:
+        ParseError: it is not XML, has a document type, or is too large or deep.
+        NotExpressibleError: something in it has no counterpart in action plots.
+        InputError: it is no SCXML; the message has file, line and the nearest valid name.
+    """
+    root = read_xml(text, source)
+    if root.name != "scxml" or root.foreign:
+        raise InputError(f"<scxml> was expected; found <{root.name}>", place=root.place)
+    return _Reader(root, source).plot()
+
+
+class _Reader:
+    def __init__(self, root: Element, source: str | None) -> None:
+        check(root)
+        self._root, self._source = root, source
+        self._names: dict[str, str] = {}
+        self._places: dict[Path, Place] = {(): root.place}
+        self._unnamed = 0
+
+    def plot(self) -> ActionPlot:
+        root = self._root
+        if root.attributes.get("datamodel", "ecmascript") not in {"ecmascript", "null"}:
+            raise NotExpressibleError("scxml/@datamodel", "only ecmascript is read", place=root.place)
+        if root.attributes.get("binding", "early") != "early":
+            raise NotExpressibleError("scxml/@binding", "data are bound early", place=root.place)
+        form: Form = {"plot": self._name(), "profile": "scxml", "variables": self._variables()}
+        form |= self._scope(root, ())
+        form["receives"] = dict.fromkeys(self._received())
+        return read_model(ActionPlot, Document(form, self._places)).written_at(self._places)
+
+    def _name(self) -> str:
+        given = self._root.attributes.get("name") or (PurePath(self._source).stem if self._source else "chart")
+        name = re.sub(r"[^\w\-.]", "_", given)
+        return name if re.match(r"[a-zA-Z_]", name) else f"_{name}"
+
+    # -- data ----------------------------------------------------------------------------------------------
+
+    def _variables(self) -> Form:
+        data = [element for element in self._root.walk() if element.name == "data"]
+        for element in data:
+            name = needed(element, "id")
+            if name.lower() in self._names.values():
+                raise InputError(f"two data are named '{name}', in lower case", place=element.place, found=name)
+            self._names[name] = name.lower()
+            self._places["variables", name.lower()] = element.place
+        return {self._names[element.attributes["id"]]: self._variable(element) for element in data}
+
+    def _variable(self, element: Element) -> Form:
+        text = element.attributes.get("expr") or element.text.strip()
+        if not text:
+            return {"type": "text"}
+        initial = term(text, self._names, element.place)
+        return {"type": _type(initial), "initial": initial}
+
+    def _received(self) -> list[str]:
+        """The events that the chart listens to and does not itself fire."""
+        inside = list(self._root.walk())
+        own = {element.attributes.get("event") for element in inside if element.name in {"raise", "send"}}
+        heard = [e for element in inside if element.name == "transition" for e in _descriptors(element)]
+        plain = dict.fromkeys(event.removesuffix(".*").removesuffix(".") for event in heard)
+        nobodys = own | RESERVED | {"*"}
+        return [event for event in plain if event not in nobodys and not event.startswith(("done.", "error."))]
+
+    # -- states --------------------------------------------------------------------------------------------
+
+    def _scope(self, element: Element, path: Path) -> Form:
+        """`states` and `initial` of the chart or of a composite state."""
+        states: Form = {}
+        for child in element.children:
+            if child.name in STATES or child.name == "history":
+                name, form = self._state(child, (*path, "states"))
+                if name in states:
+                    raise InputError(f"two states are named '{name}'", place=child.place, found=name)
+                states[name] = form
+        form = {"states": states}
+        first = self._initial(element)
+        return form if first is None else {**form, "initial": first}
+
+    def _initial(self, element: Element) -> str | None:
+        targets = element.attributes.get("initial", "").split()
+        for child in (child for child in element.children if child.name == "initial"):
+            transition = _only(child)
+            if transition.children:
+                raise NotExpressibleError("initial", "its transition cannot act", place=child.place)
+            targets += transition.attributes.get("target", "").split()
+        if len(targets) > 1:
+            raise NotExpressibleError("initial", "only one state can be the first", place=element.place)
+        return targets[0] if targets else None
+
+    def _state(self, element: Element, around: Path) -> tuple[str, Form]:
+        self._unnamed += 1
+        name = element.attributes.get("id") or f"{element.name}_{self._unnamed}"
+        path = (*around, name)
+        self._places[path] = element.place
+        if element.name == "history":
+            return name, self._history(element)
+        form: Form = {"final": True} if element.name == "final" else {}
+        for key, tag in (("entry", "onentry"), ("exit", "onexit")):
+            blocks = [child for child in element.children if child.name == tag]
+            if blocks:
+                form[key] = [action for block in blocks for action in actions(block.children, self._names)]
+        self._transitions(element, form, path)
+        return name, form | self._inside(element, path)
+
+    def _inside(self, element: Element, path: Path) -> Form:
+        if not any(child.name in STATES for child in element.children):
+            for child in (child for child in element.children if child.name == "history"):
+                raise InputError("a history needs states beside it", place=child.place)
+            return {}
+        if element.name == "state":
+            return self._scope(element, path)
+        regions: Form = {}
+        connectors: Form = {}
+        for child in element.children:
+            if child.name == "history":
+                name, connectors[name] = self._state(child, (*path, "connectors"))
+            elif child.name in STATES:
+                key = child.attributes.get("id") or f"{child.name}_{self._unnamed + 1}"
+                name, form = self._state(child, (*path, "regions", key, "states"))
+                regions[name] = {"states": {name: form}}
+        return {"regions": regions, "connectors": connectors}
+
+    def _history(self, element: Element) -> Form:
+        default = _only(element)
+        targets = default.attributes.get("target", "").split()
+        depth = element.attributes.get("type", "shallow")
+        if depth not in {"shallow", "deep"}:
+            valid = ("shallow", "deep")
+            raise InputError("a history is shallow or deep", place=element.place, found=depth, valid=valid)
+        if len(targets) != 1:
+            raise NotExpressibleError("history", "its default is one state", place=element.place)
+        return {"history": depth, "to": targets[0], "do": actions(default.children, self._names)}
+
+    # -- transitions ---------------------------------------------------------------------------------------
+
+    def _transitions(self, element: Element, form: Form, path: Path) -> None:
+        """Document order is kept also where transitions with the same descriptors have others between them."""
+        on: dict[str, list[Form]] = {}
+        always: list[Form] = []
+        for child in (child for child in element.children if child.name == "transition"):
+            words = _descriptors(child)
+            if not words:
+                self._places[(*path, "always", len(always))] = child.place
+                always.append(self._transition(child))
+                continue
+            if AFTER in words:
+                raise NotExpressibleError("transition/@event", f"'{AFTER}' is the name of timeouts", place=child.place)
+            key = _key(" ".join(words), on)
+            self._places[(*path, "on", key, len(on.setdefault(key, [])))] = child.place
+            on[key].append(self._transition(child))
+        form |= {key: value for key, value in (("on", on), ("always", always)) if value}
+
+    def _transition(self, element: Element) -> Form:
+        targets: list[Any] = element.attributes.get("target", "").split()
+        kind = element.attributes.get("type", "external")
+        if kind not in {"internal", "external"}:
+            valid = ("internal", "external")
+            raise InputError("a transition is internal or external", place=element.place, found=kind, valid=valid)
+        form: Form = {"do": actions(element.children, self._names), "internal": kind == "internal"}
+        if targets:
+            form |= {"to": targets[0], "also": targets[1:]}
+        if "cond" in element.attributes:
+            form["when"] = condition(element.attributes["cond"], self._names, element.place)
+        return form
+
+
+def _descriptors(transition: Element) -> list[str]:
+    return transition.attributes.get("event", "").split()
+
+
+def _key(event: str, on: dict[str, list[Form]]) -> str:
+    # A list of descriptors means the same with one of them repeated, and is another key.
+    while event in on and event != next(reversed(on)):
+        event = f"{event} {event.split(maxsplit=1)[0]}"
+    return event
+
+
+def _only(element: Element) -> Element:
+    if len(element.children) != 1:
+        raise InputError(f"<{element.name}> needs exactly one <transition>", place=element.place)
+    return element.children[0]
+
+
+def _type(initial: Term) -> str:
+    value = initial.value if isinstance(initial, Constant) else None
+    if isinstance(value, bool):
+        return "boolean"
+    return "number" if isinstance(value, int | float) or isinstance(initial, Arithmetic) else "text"

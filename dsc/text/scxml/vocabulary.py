@@ -1,0 +1,83 @@
+"""The elements and attributes of SCXML that are read, and the refusal of all others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from dsc.text.scxml.document import Element
+from dsc.text.scxml.errors import NotExpressibleError
+from knowledge_base.errors import UnknownNameError
+
+ATTRIBUTES: Mapping[str, frozenset[str]] = {
+    name: frozenset(words.split())
+    for name, words in {
+        "scxml": "initial name version datamodel binding exmode",
+        "state": "id initial",
+        "parallel": "id",
+        "initial": "",
+        "final": "id",
+        "history": "id type",
+        "transition": "event cond target type",
+        "onentry": "",
+        "onexit": "",
+        "datamodel": "",
+        "data": "id expr",
+        "raise": "event",
+        "assign": "location expr",
+        "send": "event eventexpr target type id delay delayexpr namelist",
+        "param": "name expr location",
+        "content": "expr",
+        "log": "label expr",
+        "if": "cond",
+        "elseif": "cond",
+        "else": "",
+    }.items()
+}
+"""Elements that are read -> their attributes."""
+STATES = frozenset({"state", "parallel", "final"})
+
+_CHART = frozenset({"transition", "onentry", "onexit", "datamodel", "history"})
+_ACTIONS = frozenset({"raise", "assign", "send", "log", "if"})
+CHILDREN: Mapping[str, frozenset[str]] = {
+    "scxml": STATES | {"datamodel"},
+    "state": STATES | _CHART | {"initial"},
+    "parallel": frozenset({"state", "parallel"}) | _CHART,
+    "initial": frozenset({"transition"}),
+    "final": frozenset({"onentry"}),
+    "history": frozenset({"transition"}),
+    "transition": _ACTIONS,
+    "onentry": _ACTIONS,
+    "onexit": _ACTIONS,
+    "datamodel": frozenset({"data"}),
+    "send": frozenset({"param", "content"}),
+    "if": _ACTIONS | {"elseif", "else"},
+}
+"""Elements -> what may stand directly inside them."""
+_KNOWN_TO_SCXML = frozenset({"script", "foreach", "invoke", "finalize", "donedata", "cancel", "onexit"})
+_KNOWN_ATTRIBUTES = frozenset({"src", "idlocation", "targetexpr", "typeexpr", "srcexpr", "autoforward", "sendid"})
+
+
+def check(element: Element) -> None:
+    """Refuse what is unknown, misplaced, or known to SCXML but without counterpart, here and inside.
+
+    Raises:
+        NotExpressibleError: an element or attribute of SCXML that action plots have nothing for.
+        UnknownNameError: no element or attribute of SCXML, or not in this place.
+    """
+    known = ATTRIBUTES[element.name]
+    for name in element.attributes:
+        if name in _KNOWN_ATTRIBUTES:
+            raise NotExpressibleError(f"{element.name}/@{name}", "has no counterpart", place=element.place)
+        if name not in known:
+            raise UnknownNameError(
+                f"<{element.name}> has no attribute '{name}'", place=element.place, found=name, valid=known
+            )
+    valid = CHILDREN.get(element.name, frozenset())
+    for child in element.children:
+        if child.foreign or (child.name in _KNOWN_TO_SCXML and child.name not in valid):
+            raise NotExpressibleError(child.name, "has no counterpart", place=child.place)
+        if child.name not in valid:
+            raise UnknownNameError(
+                f"<{child.name}> cannot stand in <{element.name}>", place=child.place, found=child.name, valid=valid
+            )
+        check(child)

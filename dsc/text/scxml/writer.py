@@ -1,0 +1,175 @@
+"""Action plots as SCXML; what it has nothing for (skills, knowledge, dynamic states, timeouts) is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from xml.etree import ElementTree as ET
+
+from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log
+from dsc.model.plot import ActionPlot, Scope, initial_of
+from dsc.model.states import (
+    AnyState,
+    CompositeState,
+    DynamicState,
+    FinalState,
+    HistoryState,
+    OrthogonalState,
+    Region,
+    State,
+    SubmachineState,
+    Transition,
+)
+from dsc.text.scxml.document import NAMESPACE
+from dsc.text.scxml.errors import NotExpressibleError
+from dsc.text.scxml.expressions import expression_text, identifier, term_text
+from knowledge_base.language.expression import Constant, Term, free_variables
+
+
+def to_scxml(plot: ActionPlot) -> str:
+    """The plot as an SCXML document; `parse_scxml` reads it back as an equivalent chart.
+
+    Raises:
+        NotExpressibleError: the plot uses something that SCXML has nothing for.
+    """
+    for what, there in (("parameters", plot.parameters), ("rules", plot.rules), ("outcome events", plot.emits),
+                        ("condition", plot.when), ("planning action", plot.implements)):  # fmt: skip
+        if there:
+            raise NotExpressibleError(what, "SCXML has no counterpart", place=plot.place(()))
+    root = ET.Element("scxml", {"xmlns": NAMESPACE, "version": "1.0", "name": plot.name, "datamodel": "ecmascript"})
+    if plot.variables:
+        data = ET.SubElement(root, "datamodel")
+        for name, variable in plot.variables.items():
+            initial = {} if variable.initial is None else {"expr": term_text(variable.initial)}
+            ET.SubElement(data, "data", {"id": identifier(name), **initial})
+    _Writer(plot).scope(root, plot)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+class _Writer:
+    def __init__(self, plot: ActionPlot) -> None:
+        self._plot = plot
+
+    def scope(self, around: ET.Element, scope: Scope) -> None:
+        around.set("initial", initial_of(scope))
+        self._states(around, scope.states)
+
+    def _states(self, around: ET.Element, states: Mapping[str, AnyState]) -> None:
+        for name, state in states.items():
+            self._state(around, name, state)
+
+    def _state(self, around: ET.Element, name: str, state: AnyState) -> None:
+        if any(blank in name for blank in " \t\n"):
+            raise NotExpressibleError("state", f"the name '{name}' has a blank")
+        if isinstance(state, HistoryState):
+            self._history(around, name, state)
+        elif isinstance(state, FinalState) and state.emit is not None:
+            raise NotExpressibleError("outcome event", f"'{name}' fires one")
+        elif isinstance(state, FinalState):
+            final = ET.SubElement(around, "final", {"id": name})
+            self._block(final, "onentry", state.entry)
+        else:
+            self._proper(around, name, state)
+
+    def _history(self, around: ET.Element, name: str, state: HistoryState) -> None:
+        history = ET.SubElement(around, "history", {"id": name, "type": state.history})
+        default = ET.SubElement(history, "transition", {"target": state.target})
+        _actions(default, state.do)
+
+    def _proper(self, around: ET.Element, name: str, state: State) -> None:
+        if isinstance(state, SubmachineState | DynamicState):
+            raise NotExpressibleError("submachine or dynamic state", f"'{name}' is filled by other plots")
+        if type(state) is State and "done" in state.on and self._plot.profile == "dsc":
+            raise NotExpressibleError("completion", f"'{name}' has no content and is done at once")
+        if state.after:
+            raise NotExpressibleError("timeout", f"'{name}' has one; SCXML sends delayed events instead")
+        element = ET.SubElement(around, "parallel" if isinstance(state, OrthogonalState) else "state", {"id": name})
+        self._block(element, "onentry", state.entry)
+        self._block(element, "onexit", state.exit)
+        for event, transitions in state.on.items():
+            for transition in transitions:
+                self._transition(element, name, self._event(name, event), transition)
+        for transition in state.always:
+            self._transition(element, name, None, transition)
+        if isinstance(state, CompositeState):
+            self.scope(element, state)
+        elif isinstance(state, OrthogonalState):
+            self._states(element, state.connectors)
+            for key, region in state.regions.items():
+                self._region(element, key, region)
+
+    def _event(self, name: str, event: str) -> str:
+        return f"done.state.{name}" if event == "done" and self._plot.profile == "dsc" else event
+
+    def _region(self, around: ET.Element, key: str, region: Region) -> None:
+        if list(region.states) == [key] and self._plot.profile == "scxml":
+            self._states(around, region.states)
+            return
+        if any(name == key for name, _, _ in self._plot.walk()):
+            raise NotExpressibleError("region", f"'{key}' is also the name of a state")
+        self.scope(ET.SubElement(around, "state", {"id": key}), region)
+
+    def _transition(self, around: ET.Element, source: str, event: str | None, transition: Transition) -> None:
+        element = ET.SubElement(around, "transition")
+        if event is not None:
+            element.set("event", event)
+        if transition.guard is not None:
+            element.set("cond", expression_text(transition.guard))
+        if transition.targets:
+            element.set("target", " ".join(transition.targets))
+        if transition.internal:
+            element.set("type", "internal")
+        if transition.rule is not None:
+            raise NotExpressibleError("rule", f"'{source}' is answered by one")
+        _actions(element, transition.effect)
+
+    def _block(self, around: ET.Element, tag: str, actions: Iterable[ExternalAction | Internal]) -> None:
+        if actions:
+            _actions(ET.SubElement(around, tag), actions)
+
+
+def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -> None:
+    for action in actions:
+        match action:
+            case Assign(assign=terms):
+                for number, (name, term) in enumerate(terms.items()):
+                    if free_variables(term) & set(list(terms)[:number]):
+                        raise NotExpressibleError("assign", f"the value of '{name}' reads what is assigned with it")
+                    ET.SubElement(around, "assign", {"location": identifier(name), "expr": term_text(term)})
+            case Log(log=parts, label=label):
+                labelled = {"label": label} if label else {}
+                shown = {"expr": " + ".join(map(term_text, parts))} if parts else {}
+                ET.SubElement(around, "log", {**labelled, **shown})
+            case Emit():
+                _send(around, action)
+            case Choose():
+                _if(around, action)
+            case _:
+                raise NotExpressibleError(type(action).__name__.lower(), "SCXML knows no skills and no knowledge base")
+
+
+def _send(around: ET.Element, action: Emit) -> None:
+    if action.delay is None and not action.arguments:
+        ET.SubElement(around, "raise", {"event": action.emit})
+        return
+    element = ET.SubElement(around, "send", {"event": action.emit})
+    if action.delay is None:
+        element.set("target", "#_internal")
+    elif action.delay != Constant(0):
+        element.set("delay", f"{_seconds(action.delay):g}s")
+    for name, term in action.arguments.items():
+        ET.SubElement(element, "param", {"name": name, "expr": term_text(term)})
+
+
+def _seconds(delay: Term) -> float:
+    if isinstance(delay, Constant) and isinstance(delay.value, int | float):
+        return float(delay.value)
+    raise NotExpressibleError("delay", "only a number of seconds can be written")
+
+
+def _if(around: ET.Element, action: Choose) -> None:
+    element = ET.SubElement(around, "if", {"cond": expression_text(action.condition)})
+    _actions(element, action.then)
+    if action.otherwise:
+        ET.SubElement(element, "else")
+        _actions(element, action.otherwise)

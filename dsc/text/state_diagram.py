@@ -1,0 +1,102 @@
+"""Plots in the text forms of Mermaid (stateDiagram-v2) and PlantUML, which agree in nearly everything."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from dsc.model.plot import ActionPlot, Scope, initial_of
+from dsc.model.states import (
+    AnyState,
+    CompositeState,
+    DynamicState,
+    FinalState,
+    HistoryState,
+    OrthogonalState,
+    State,
+    SubmachineState,
+)
+from dsc.text.diagram.captions import action_text, full_text, labelled
+
+
+def to_mermaid(plot: ActionPlot) -> str:
+    """The plot as a Mermaid state diagram."""
+    return "\n".join(["stateDiagram-v2", *_Writer(plot).lines()]) + "\n"
+
+
+def to_plantuml(plot: ActionPlot) -> str:
+    """The plot as a PlantUML state diagram."""
+    return "\n".join(["@startuml", f"title {plot.name}", *_Writer(plot).lines(), "@enduml"]) + "\n"
+
+
+class _Writer:
+    """States get short names of their own, since theirs may hold anything."""
+
+    def __init__(self, plot: ActionPlot) -> None:
+        self._plot = plot
+        self._alias = {name: f"s{number}" for number, (name, _, _) in enumerate(plot.walk(), start=1)}
+
+    def lines(self) -> Iterator[str]:
+        yield from self._scope(self._plot, "  ")
+        for name, state, _ in self._plot.walk():
+            yield from self._edges(name, state)
+
+    def _scope(self, scope: Scope, indent: str) -> Iterator[str]:
+        yield from self._states(scope.states, indent)
+        yield f"{indent}[*] --> {self._alias[initial_of(scope)]}"
+
+    def _states(self, states: Mapping[str, AnyState], indent: str) -> Iterator[str]:
+        for name, state in states.items():
+            yield f'{indent}state "{_safe(_title(name, state))}" as {self._alias[name]}'
+            if isinstance(state, CompositeState | OrthogonalState):
+                yield f"{indent}state {self._alias[name]} {{"
+                yield from self._inside(state, indent + "  ")
+                yield f"{indent}}}"
+            if isinstance(state, FinalState):
+                yield f"{indent}{self._alias[name]} --> [*]"
+            if isinstance(state, State):
+                for word, actions in (("entry", state.entry), ("exit", state.exit)):
+                    for action in actions:
+                        yield f"{indent}{self._alias[name]} : {word} / {_safe(action_text(action))}"
+
+    def _inside(self, state: CompositeState | OrthogonalState, indent: str) -> Iterator[str]:
+        if isinstance(state, CompositeState):
+            yield from self._scope(state, indent)
+            return
+        for number, region in enumerate(state.regions.values()):
+            if number:
+                yield f"{indent}--"
+            else:
+                yield from self._states(state.connectors, indent)
+            yield from self._scope(region, indent)
+
+    def _edges(self, name: str, state: AnyState) -> Iterator[str]:
+        if isinstance(state, HistoryState):
+            yield f"  {self._alias[name]} --> {self._alias[state.target]}"
+        if not isinstance(state, State):
+            return
+        for one in labelled(state):
+            text = _safe(full_text(one))
+            label = f" : {text}" if text else ""
+            if one.transition.target is None:
+                yield f"  {self._alias[name]}{label}"
+            for target in one.transition.targets:
+                yield f"  {self._alias[name]} --> {self._alias[target]}{label}"
+
+
+def _title(name: str, state: AnyState) -> str:
+    match state:
+        case HistoryState(history=depth):
+            return f"{name} (H{'*' if depth == 'deep' else ''})"
+        case FinalState(emit=str(event)):
+            return f"{name} ^{event}"
+        case SubmachineState(use=use):
+            return f"{name} = {use}"
+        case DynamicState(dynamic=candidates):
+            return f"{name} = one of {', '.join(candidates) or 'what is planned'}"
+        case _:
+            return name
+
+
+def _safe(text: str) -> str:
+    """What means something in these forms, spelled so that it does not: quotes, colons, line ends."""
+    return " ".join(text.split()).replace('"', "'").replace(":=", "=").replace(":", ".").replace(";", ",")

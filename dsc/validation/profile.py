@@ -1,0 +1,62 @@
+"""What a plot may use only in profile `scxml`: everything that would break the black box or the skill layer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from dsc.engine.membership import asked_states
+from dsc.errors import Finding
+from dsc.model.actions import Choose, Emit, ExternalAction, Internal, Log, flat
+from dsc.model.plot import ActionPlot, Path
+from dsc.model.states import AnyState, FinalState, HistoryState, OrthogonalState, State, Transition
+from knowledge_base.errors import SchemaError
+
+FIX = "write `profile: scxml` if the plot is to be an SCXML chart"
+
+
+def check_profile(plot: ActionPlot) -> Iterator[Finding]:
+    """Findings about what the plot's profile does not have."""
+    if plot.profile == "scxml":
+        return
+    for name, state, path in plot.walk():
+        if isinstance(state, HistoryState):
+            yield _finding(plot, f"'{name}' is a history state", path)
+        elif isinstance(state, FinalState):
+            yield from _inside(plot, name, state.entry, (*path, "entry"))
+        else:
+            yield from _state(plot, name, state, path)
+
+
+def _state(plot: ActionPlot, name: str, state: AnyState, path: Path) -> Iterator[Finding]:
+    if isinstance(state, OrthogonalState) and state.connectors:
+        yield _finding(plot, f"'{name}' has connectors", (*path, "connectors"))
+    if not isinstance(state, State):
+        return
+    for key, actions in (("entry", state.entry), ("exit", state.exit)):
+        yield from _inside(plot, name, actions, (*path, key))
+    for inside, _, transition in state.placed_transitions():
+        yield from _transition(plot, name, transition, (*path, *inside))
+
+
+def _inside(
+    plot: ActionPlot, name: str, actions: Iterable[ExternalAction | Internal], path: Path
+) -> Iterator[Finding]:
+    if any(isinstance(action, Internal) for action in actions):
+        yield _finding(plot, f"'{name}' has an internal action in its entry or exit", path)
+
+
+def _transition(plot: ActionPlot, name: str, transition: Transition, path: Path) -> Iterator[Finding]:
+    if transition.also or transition.internal:
+        yield _finding(plot, f"a transition of '{name}' is internal or has several targets", path)
+    if transition.guard is not None and asked_states(transition.guard):
+        yield _finding(plot, f"a guard of '{name}' asks which states are active", (*path, "when"))
+    if any(_is_foreign(action) for action in flat(transition.effect)):
+        yield _finding(plot, f"a transition of '{name}' branches, logs or sends with a delay", path)
+
+
+def _is_foreign(action: ExternalAction | Internal) -> bool:
+    return isinstance(action, Choose | Log) or (isinstance(action, Emit) and action.delay is not None)
+
+
+def _finding(plot: ActionPlot, what: str, path: Path) -> Finding:
+    return Finding(SchemaError(f"{what}, which only profile scxml has", place=plot.place(path)), "profile", FIX)

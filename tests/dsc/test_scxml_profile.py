@@ -1,0 +1,178 @@
+"""Profile `scxml`: borders crossed, history, events by prefix, actions in entry and exit; profile `dsc` refuses them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from dsc_charts import Run, plot
+
+from dsc.dynamic.library import Library
+from dsc.engine.configuration import MachineState
+from dsc.engine.selection import matches
+from dsc.engine.steps import Note, SendLater
+from dsc.model.plot import ActionPlot
+from dsc.sequencer.clock import LoopClock, SimulatedEventLoop
+from dsc.sequencer.sequencer import Sequencer
+from dsc.trace import Trace
+from dsc.validation import validate_plot
+from knowledge_base.schema import Schema
+from knowledge_base.store import KnowledgeBase
+
+
+def chart(states, **keys):
+    return ActionPlot.model_validate({"plot": "c", "profile": "scxml", "states": states, **keys})
+
+
+def test_a_transition_may_cross_borders_and_leaves_everything_up_to_the_common_composite():
+    states = {
+        "a": {"states": {"a1": {"on": {"go": "b2"}}}},
+        "b": {"states": {"b1": {}, "b2": {}}},
+    }
+    run = Run(chart(states))
+    run.start()
+    step = run.send("go")
+    assert step.microsteps[0].exited == ("a1", "a")
+    assert run.active == ["b", "b2"]
+
+
+def test_an_internal_transition_does_not_leave_its_source():
+    inner = {"a1": {}, "a2": {}}
+    for internal, exited in ((True, ("a1",)), (False, ("a1", "a"))):
+        run = Run(chart({"a": {"states": inner, "on": {"go": {"to": "a2", "internal": internal}}}}))
+        run.start()
+        assert run.send("go").microsteps[0].exited == exited
+
+
+@pytest.mark.parametrize(("depth", "restored"), [("shallow", ["p", "q", "q1"]), ("deep", ["p", "q", "q2"])])
+def test_history_restores_what_was_left(depth, restored):
+    states = {
+        "p": {
+            "on": {"out": "away"},
+            "states": {
+                "o": {"on": {"next": "q"}},
+                "q": {"states": {"q1": {"on": {"next": "q2"}}, "q2": {}}},
+                "h": {"history": depth, "to": "o"},
+            },
+        },
+        "away": {"on": {"back": "h"}},
+    }
+    run = Run(chart(states, initial="away"))
+    run.start()
+    run.send("back")
+    assert run.active == ["p", "o"]
+    for event in ("next", "next", "out"):
+        run.send(event)
+    run.machine.state = MachineState.from_json(run.machine.state.to_json())
+    run.send("back")
+    assert run.active == restored
+
+
+def test_deep_history_of_an_orthogonal_state_remembers_every_region():
+    def region(name):
+        return {"states": {f"{name}1": {"on": {"next": f"{name}2"}}, f"{name}2": {}}}
+
+    states = {
+        "o": {"on": {"out": "away"}, "regions": {"r": region("r"), "s": region("s")},
+              "connectors": {"h": {"history": "deep", "to": "r1"}}},
+        "away": {"on": {"back": "h"}},
+    }  # fmt: skip
+    run = Run(chart(states))
+    for event in ("next", "out", "back"):
+        run.send(event) if run.machine.state.root else (run.start(), run.send(event))
+    assert run.active == ["o", "r2", "s2"]
+
+
+def test_entry_may_assign_branch_and_log():
+    states = {"a": {"entry": [{"assign": {"x": 2}}, {"if": "(> ?x 1)", "then": [{"log": ["x is ", "?x"]}]}]}}
+    run = Run(chart(states, variables={"x": "number"}))
+    assert run.start().output == (Note("", "x is 2"),)
+
+
+def test_a_delayed_event_leaves_the_machine_with_its_delay():
+    step = Run(chart({"a": {"entry": {"emit": "e", "delay": 0.5}}})).start()
+    [sent] = step.output
+    assert isinstance(sent, SendLater)
+    assert (sent.event.name, sent.seconds) == ("e", 0.5)
+
+
+def test_completion_is_an_event_that_anybody_may_take():
+    states = {"a": {"states": {"f": {"final": True}}}, "b": {}}
+    run = Run(chart({"outer": {"on": {"done.state.a": "b"}, "states": {"a": states["a"]}}, "b": {}}))
+    run.start()
+    assert run.active == ["b"]
+
+
+def test_guards_may_ask_which_states_are_active():
+    regions = {"r": {"states": {"r1": {"on": {"go": {"to": "r2", "when": "(in-state s2)"}}}, "r2": {}}},
+               "s": {"states": {"s1": {"on": {"next": "s2"}}, "s2": {}}}}  # fmt: skip
+    run = Run(chart({"o": {"regions": regions}}))
+    run.start()
+    run.send("go")
+    assert run.active == ["o", "r1", "s1"]
+    run.send("next")
+    run.send("go")
+    assert run.active == ["o", "r2", "s2"]
+
+
+@pytest.mark.parametrize(
+    ("descriptors", "event", "matched"),
+    [("a", "a", True), ("a", "a.b", True), ("a", "ab", False), ("a.*", "a.b", True), ("b *", "a", True), ("a.b", "a", False)],
+)
+def test_events_match_by_prefix(descriptors, event, matched):
+    assert matches(descriptors, event) is matched
+
+
+FOREIGN = [
+    "a: {entry: {emit: e}, on: {e: b}}",
+    "a: {on: {e: {to: b, internal: true}}}",
+    "a: {on: {e: {to: b, when: (in-state a)}}}",
+    "a: {on: {e: {to: b, do: [{log: [x]}]}}}",
+    "a: {on: {e: {to: b, do: [{emit: f, delay: 1}]}}}",
+    "a: {states: {h: {history: deep, to: c}, c: {}}, on: {e: b}}",
+]
+
+
+@pytest.mark.parametrize("state", FOREIGN)
+def test_the_dsc_profile_refuses_what_only_scxml_has(state):
+    text = f"plot: p\nPROFILEstates:\n  {state}\n  b: {{final: true}}\nreceives: {{e: {{}}}}\n"
+    refused = plot(text.replace("PROFILE", ""), "p.yaml")
+    found = validate_plot(refused, Library([refused]))
+    assert found[0].rule == "profile"
+    assert "p.yaml:3" in str(found[0])
+    admitted = plot(text.replace("PROFILE", "profile: scxml\n"))
+    assert validate_plot(admitted, Library([admitted])) == []
+
+
+@pytest.mark.parametrize(
+    ("states", "message"),
+    [
+        ("p: {states: {x: {}, h: {history: deep, to: g}, g: {history: deep, to: h}}}", "does not lead to a state"),
+        ("a: {on: {e: {to: b, also: [c]}}}\n  b: {}\n  c: {}", "exclude each other"),
+        ("a: {on: {e: {to: b, also: [c]}}}\n  b: {states: {c: {}}}", "exclude each other"),
+    ],
+)
+def test_targets_that_make_no_configuration_are_found(states, message):
+    broken = plot(f"plot: p\nprofile: scxml\nstates:\n  {states}\n", "p.yaml")
+    found = [str(finding) for finding in validate_plot(broken, Library([broken]))]
+    assert any(message in one and one.startswith("p.yaml:4") for one in found)
+
+
+def test_the_sequencer_delivers_delayed_events_and_writes_notes():
+    lines = []
+
+    async def played():
+        clock = LoopClock()
+        trace = Trace(clock.now)
+        trace.listen(lambda record: lines.append(record.to_line()))
+        sent = chart({"a": {"entry": [{"log": ["hi"]}, {"emit": "t", "delay": 2}], "on": {"t": "f"}}, "f": {"final": True}})
+        knowledge = KnowledgeBase(Schema.parse("(define (domain none))"))
+        end = await Sequencer(Library([sent]), knowledge, [], clock, trace).run("c")
+        return end.finished, clock.now()
+
+    loop = SimulatedEventLoop()
+    try:
+        assert loop.run_until_complete(played()) == (True, 2.0)
+    finally:
+        loop.close()
+    assert [json.loads(line)["text"] for line in lines if json.loads(line)["type"] == "log"] == ["hi"]

@@ -1,0 +1,105 @@
+"""SCXML out, the other text forms, and the commands for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsc_charts import plot
+from typer.testing import CliRunner
+
+from dsc.cli import app
+from dsc.text.scxml.errors import NotExpressibleError
+from dsc.text.scxml.reader import parse_scxml
+from dsc.text.scxml.writer import to_scxml
+from dsc.text.state_diagram import to_mermaid, to_plantuml
+from knowledge_base.errors import InputError
+
+SHIPPED = sorted((Path(__file__).parents[2] / "domains" / "clean_up_table" / "plots").glob("*.yaml"))
+
+CHART = """<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" name="c">
+<datamodel><data id="x" expr="0"/></datamodel>
+<parallel id="p">
+  <history id="h" type="deep"><transition target="a2"><log expr="'back ' + x"/></transition></history>
+  <state id="a" initial="a1">
+    <state id="a1"><transition event="go *" cond="!(x &lt; 1) || In('b')" target="a2" type="internal"/></state>
+    <state id="a2"><onentry><if cond="x === 1"><raise event="e"/><elseif cond="x === 2"/><send event="f" delay="10ms"/><else/><send event="g"><param name="n" expr="x * 2"/></send></if></onentry></state>
+  </state>
+  <state id="b"/>
+</parallel>
+<final id="end"/>
+</scxml>"""
+
+
+def test_what_is_read_can_be_written_and_read_again():
+    written = to_scxml(parse_scxml(CHART))
+    assert to_scxml(parse_scxml(written)) == written
+    assert "'back ' + x" not in written
+    assert '"back " + x' in written.replace("&quot;", '"')
+
+
+def test_a_plain_dsc_plot_can_be_written():
+    text = """
+    plot: p
+    receives: {go: {}}
+    states:
+      a:
+        states: {a1: {on: {go: a2}}, a2: {final: true}}
+        on: {done: b}
+      b: {final: true}
+    """
+    assert 'event="done.state.a" target="b"' in to_scxml(plot(text))
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        "{entry: {trigger: arm.grasp}}",
+        "{use: other}",
+        "{dynamic: [other]}",
+        "{after: {seconds: 1, to: end}}",
+        "{on: {go: {to: end, tell: (seen)}}}",
+        "{on: {go: {to: end, when: (seen)}}}",
+        "{on: {done: end}}",
+        "{on: {go: {assign: {x: 1, y: ?x}}}}",
+    ],
+)
+def test_what_scxml_cannot_say_is_named(state):
+    with pytest.raises(NotExpressibleError):
+        to_scxml(plot(f"plot: p\nvariables: {{x: number, y: number}}\nstates: {{a: {state}, end: {{final: true}}}}"))
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
+@pytest.mark.parametrize("form", ["mermaid", "plantuml", "svg"])
+def test_shipped_plots_are_exported(file, form):
+    result = CliRunner().invoke(app, ["export", str(file), "--to", form])
+    assert result.exit_code == 0
+    assert file.stem in result.output or form == "mermaid"
+
+
+def test_text_diagrams_show_states_edges_and_regions():
+    read = parse_scxml(CHART)
+    mermaid, plantuml = to_mermaid(read), to_plantuml(read)
+    assert mermaid.startswith("stateDiagram-v2\n")
+    assert plantuml.endswith("@enduml\n")
+    for text in (mermaid, plantuml):
+        assert 'state "h (H*)" as' in text
+        assert "\n    --\n" in text
+        assert "[*] --> s1" in text
+
+
+def test_a_chart_goes_to_yaml_and_back_by_command(tmp_path):
+    source, yaml, back = (tmp_path / name for name in ("c.scxml", "c.yaml", "back.scxml"))
+    source.write_text(CHART)
+    assert CliRunner().invoke(app, ["import", str(source), "--out", str(yaml)]).exit_code == 0
+    assert CliRunner().invoke(app, ["check", str(yaml)]).exit_code == 0
+    assert CliRunner().invoke(app, ["export", str(yaml), "--to", "scxml", "--out", str(back)]).exit_code == 0
+    assert back.read_text() == to_scxml(parse_scxml(CHART))
+
+
+def test_an_unknown_form_is_an_error_with_the_nearest(tmp_path):
+    file = tmp_path / "p.yaml"
+    file.write_text("plot: p\nstates: {a: {final: true}}\n")
+    result = CliRunner().invoke(app, ["export", str(file), "--to", "mermade"])
+    assert isinstance(result.exception, InputError)
+    assert "did you mean 'mermaid'" in str(result.exception)
