@@ -15,7 +15,7 @@ from typing import Any
 
 from dsc.dynamic.outcomes import Plots, outcomes_of
 from dsc.events import DONE, GAVE_UP, NO_CANDIDATE
-from dsc.model.actions import Assign, Emit, Tell
+from dsc.model.actions import Assign, Choose, Emit, Log, Tell
 from dsc.model.plot import ActionPlot, Rule, Variable
 from dsc.model.states import (
     AnyState,
@@ -29,6 +29,8 @@ from dsc.model.states import (
 from knowledge_base.errors import SchemaError
 from knowledge_base.language import expression as lang
 from knowledge_base.language.effect import substitute_effect
+
+AnyInternal = Assign | Tell | Emit | Log | Choose
 
 DEFAULT_RETRIES = 3
 """Bound on `retry` and `replan` responses that name none, so that no rule can go on for ever."""
@@ -158,23 +160,29 @@ class _Expansion:
 def _because(outcome: str, giving_up: Transition) -> Transition:
     """A state's way out on `gave_up`, taken on another outcome: that outcome is the reason."""
     reason = {"event.reason": outcome}
-    terms = {"assign": giving_up.assign, "arguments": giving_up.arguments}
-    done = {key: {name: lang.substitute_term(term, reason) for name, term in one.items()} for key, one in terms.items()}
     return giving_up.model_copy(update={
-        **done,
         "guard": None if giving_up.guard is None else lang.substitute(giving_up.guard, reason),
+        "assign": _filled(giving_up.assign, reason),
+        "arguments": _filled(giving_up.arguments, reason),
         "tell": None if giving_up.tell is None else substitute_effect(giving_up.tell, reason),
         "do": tuple(_action_because(action, reason) for action in giving_up.do),
     })
 
 
-def _action_because(action: Assign | Tell | Emit, reason: Mapping[str, str]) -> Assign | Tell | Emit:
-    if isinstance(action, Tell):
-        return Tell(tell=substitute_effect(action.tell, reason))
-    if isinstance(action, Assign):
-        return Assign(assign={name: lang.substitute_term(term, reason) for name, term in action.assign.items()})
-    arguments = {name: lang.substitute_term(term, reason) for name, term in action.arguments.items()}
-    return Emit(emit=action.emit, arguments=arguments)
+def _action_because(action: AnyInternal, reason: Mapping[str, str]) -> AnyInternal:
+    match action:
+        case Tell():
+            return Tell(tell=substitute_effect(action.tell, reason))
+        case Assign():
+            return Assign(assign=_filled(action.assign, reason))
+        case Emit():
+            return action.model_copy(update={"arguments": _filled(action.arguments, reason)})
+        case _:  # a log or a branch of profile scxml stays as it is
+            return action
+
+
+def _filled(terms: Mapping[str, lang.Term], reason: Mapping[str, str]) -> dict[str, lang.Term]:
+    return {name: lang.substitute_term(term, reason) for name, term in terms.items()}
 
 
 def _unused(name: str, taken: Container[str]) -> str:
