@@ -16,6 +16,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Protocol, TypeVar
 
 from knowledge_base.errors import InputError, UnknownNameError
@@ -121,7 +122,7 @@ class Component:
 
     def skills(self) -> dict[str, SkillSignature]:
         """The signatures of all decorated methods, by skill name."""
-        return signatures(type(self), self.name)
+        return dict(signatures(type(self), self.name))  # type: ignore[arg-type]  # mypy: classes are hashable
 
     def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Awaitable[Outcome]:
         """Start the named skill; the sequencer's dispatcher awaits and may cancel it.
@@ -149,8 +150,12 @@ class Component:
         self.mode = mode
 
 
-def signatures(kind: type[Component], name: str) -> dict[str, SkillSignature]:
-    """The signatures of a component class's decorated methods, for a component of that name."""
+@cache
+def signatures(kind: type[Component], name: str) -> Mapping[str, SkillSignature]:
+    """The signatures of a component class's decorated methods, for a component of that name.
+
+    Found once for a class and name: every skill call asks for them.
+    """
     found = {}
     for attribute, body in inspect.getmembers(kind, inspect.isfunction):
         declared: _Declared | None = getattr(body, _DECLARED, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Self
@@ -147,8 +148,9 @@ class Executive:
         self.close()
 
 
+@cache
 def achieve_plot() -> ActionPlot:
-    """The plot that stands in where no designed candidate fits."""
+    """The plot that stands in where no designed candidate fits; read once, since plots never change."""
     resource = files("planning") / "plots" / "achieve.yaml"
     return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
 
