@@ -29,6 +29,7 @@ class Edge:
     """A transition between nodes, by their indices; no target means that nothing is left or entered.
 
     `internal` is only true where it makes a difference: a composite source with all targets inside it.
+    `place` is where it stands in its source, e.g. `("on", "grasped", 0)`.
     """
 
     source: int
@@ -39,6 +40,7 @@ class Edge:
     rule: str | None = None
     also: tuple[int, ...] = ()
     internal: bool = False
+    place: tuple[str | int, ...] = ()
 
     @property
     def targets(self) -> tuple[int, ...]:
@@ -242,19 +244,20 @@ def _append(nodes: list[Node], name: str, parent: int, state: AnyState | None) -
 
 
 def _add_edges(node: Node, state: State, index: Mapping[str, int], nodes: Sequence[Node]) -> None:
-    def edge(trigger: str, transition: Transition) -> Edge:
+    def edge(place: tuple[str | int, ...], trigger: str, transition: Transition) -> Edge:
         targets = [_target(node, name, index) for name in transition.targets]
         if not _together(nodes, targets):
             raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
         within = isinstance(state, CompositeState) and all(node.index in _ancestors(nodes, at) for at in targets)
         return Edge(
             node.index, trigger, targets[0] if targets else None, transition.guard, transition.effect,
-            transition.rule, tuple(targets[1:]), transition.internal and within,
+            transition.rule, tuple(targets[1:]), transition.internal and within, place,
         )  # fmt: skip
 
-    node.edges = {event: tuple(edge(event, t) for t in many) for event, many in state.on.items()}
-    node.timeouts = tuple((t.seconds, edge("after", t)) for t in state.after)
-    node.always = tuple(edge("always", t) for t in state.always)
+    edges = {place: edge(place, trigger, transition) for place, trigger, transition in state.placed_transitions()}
+    node.edges = {event: tuple(edges["on", event, n] for n in range(len(many))) for event, many in state.on.items()}
+    node.timeouts = tuple((timed.seconds, edges["after", n]) for n, timed in enumerate(state.after))
+    node.always = tuple(edges["always", n] for n in range(len(state.always)))
 
 
 def _target(source: Node, name: str, index: Mapping[str, int]) -> int:

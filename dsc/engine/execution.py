@@ -15,7 +15,7 @@ from dsc.engine.frames import Frame, freeze, thaw
 from dsc.engine.membership import settle
 from dsc.engine.selection import Enabled, everything, is_addressed, select
 from dsc.engine.situation import Decision, Situation
-from dsc.engine.steps import Cancel, DecisionMade, Microstep, Note, Output, SendLater, StartTimer, Step, Taken
+from dsc.engine.steps import Bound, Cancel, DecisionMade, Microstep, Note, Output, SendLater, StartTimer, Step, Taken
 from dsc.errors import RunawayError
 from dsc.events import DONE, DONE_STATE, ERROR, ERRORS, EXECUTION_ERROR, NO_CANDIDATE, Event
 from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Tell, Trigger
@@ -51,6 +51,7 @@ class Execution:
         self._knowledge = Delta()
         self._exited: list[str] = []
         self._entered: list[str] = []
+        self._bound: list[Bound] = []
 
     # -- the macrostep -----------------------------------------------------------------------------------
 
@@ -147,11 +148,13 @@ class Execution:
 
     def _taken(self, one: Enabled) -> Taken:
         target = None if one.edge.target is None else one.frame.path(one.edge.target)
-        return Taken(one.frame.path(one.edge.source), one.edge.trigger, target, one.edge.rule)
+        source, edge = one.frame.path(one.edge.source), one.edge
+        return Taken(source, edge.trigger, target, edge.rule, one.frame.compiled.plot.name, edge.place)
 
     def _record(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
-        self._microsteps.append(Microstep(event, taken, tuple(self._exited), tuple(self._entered)))
-        self._exited, self._entered = [], []
+        happened = Microstep(event, taken, tuple(self._exited), tuple(self._entered), tuple(self._bound))
+        self._microsteps.append(happened)
+        self._exited, self._entered, self._bound = [], [], []
 
     # -- leaving -----------------------------------------------------------------------------------------
 
@@ -251,6 +254,7 @@ class Execution:
             if parent.depth >= MAX_NESTING:
                 raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [parent.path(host)])
             parent.children[host] = frame
+        self._bound.append(Bound(parent.path(host) if parent else "", compiled.plot))
         return frame
 
     # -- completion --------------------------------------------------------------------------------------

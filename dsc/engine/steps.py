@@ -9,6 +9,7 @@ from typing import Any
 from dsc.engine.configuration import MachineState
 from dsc.engine.situation import Decision
 from dsc.events import Event
+from dsc.model.plot import ActionPlot
 from knowledge_base.facts import Delta
 
 
@@ -80,12 +81,30 @@ Output = Start | Cancel | SetParameter | SwitchMode | StartTimer | SendLater | N
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A transition that was taken: its source and target as paths, its trigger, and the rule it comes from."""
+    """A transition that was taken.
+
+    Attributes:
+        source, target: paths of its states.
+        trigger: the event, `after` or `always`.
+        rule: label of the contingency rule it comes from.
+        plot: name of the plot that has it.
+        place: where it stands in its source state, e.g. `("on", "grasped", 0)`.
+    """
 
     source: str
     trigger: str
     target: str | None
     rule: str | None = None
+    plot: str = ""
+    place: tuple[str | int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """A plot that became the content of a state (named by its path; empty for the outermost plot), as it runs."""
+
+    state: str
+    plot: ActionPlot
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +115,7 @@ class Microstep:
     taken: tuple[Taken, ...]
     exited: tuple[str, ...]
     entered: tuple[str, ...]
+    bound: tuple[Bound, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

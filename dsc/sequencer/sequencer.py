@@ -86,7 +86,7 @@ class Sequencer:
         self.knowledge = knowledge
         self.machine = Machine(library)
         self.trace = trace or Trace(clock.now)
-        self._tracer = StepTracer(self.trace, library)
+        self._tracer = StepTracer(self.trace)
         self._inbox: asyncio.Queue[Message] = asyncio.Queue()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait)
         self._open_ended = open_ended

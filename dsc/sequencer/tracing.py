@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from dsc.dynamic.library import Library
 from dsc.engine.steps import Cancel, Note, Output, SendLater, SetParameter, Start, StartTimer, Step, SwitchMode
 from dsc.events import Event
 from dsc.trace import Trace
@@ -14,11 +13,9 @@ from knowledge_base.facts import Change
 class StepTracer:
     """Writes what the sequencer does into a trace."""
 
-    def __init__(self, trace: Trace, library: Library) -> None:
+    def __init__(self, trace: Trace) -> None:
         self._trace = trace
-        self._library = library
         self._known_plots: set[str] = set()
-        self._known_frames: set[int] = set()
 
     def event(self, event: Event, source: str, original: str | None = None) -> int:
         """An event that came in; `original` is the skill's own name for it where the chart uses another."""
@@ -107,20 +104,11 @@ class StepTracer:
         return None
 
     def _plots(self, step: Step) -> None:
-        stack = [step.state.root] if step.state.root else []
-        while stack:
-            frame = stack.pop()
-            stack.extend(frame.children.values())
-            if frame.serial in self._known_frames:
-                continue
-            self._known_frames.add(frame.serial)
-            compiled = (
-                self._library.compiled(frame.plot) if frame.form is None else self._library.bind(frame.form)
-            )
-            digest = compiled.plot.digest
+        for bound in (bound for micro in step.microsteps for bound in micro.bound):
+            digest = bound.plot.digest
             if digest not in self._known_plots:
                 self._known_plots.add(digest)
-                self._trace.record("plot", name=frame.plot, hash=digest, plot=compiled.plot.to_form())
+                self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
 
 
 def _told_once(value: Any) -> Any:

@@ -70,7 +70,7 @@ def traced():
     library = Library([plot(PLOTS), plot(INNER)])
     trace, heard = Trace(lambda: 0.0), []
     trace.listen(heard.append)
-    tracer, machine = StepTracer(trace, library), Machine(library)
+    tracer, machine = StepTracer(trace), Machine(library)
     for step in (
         machine.start("p", {}, KnowledgeSituation(kb, library)),
         machine.send(Event("nothing"), KnowledgeSituation(kb, library)),
