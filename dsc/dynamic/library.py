@@ -9,7 +9,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from dsc.dynamic.rules import expand_rules
-from dsc.engine.compiler import CompiledPlot, compile_plot
+from dsc.engine.compiler import compile_plot
+from dsc.engine.tables import CompiledPlot
 from dsc.model.plot import ActionPlot
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 

@@ -13,7 +13,7 @@ from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Start, Step
 from dsc.errors import RunawayError
-from dsc.events import AFTER, RESERVED, Event
+from dsc.events import RESERVED, Event
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.dispatcher import Dispatcher, SkillMessage, TimerMessage
 from dsc.sequencer.tracing import StepTracer
@@ -192,7 +192,8 @@ class Sequencer:
             return message
         if isinstance(message, TimerMessage):
             self.trace.cause = None
-            event = Event(AFTER, to=message.activation, exact=True, index=message.index)
+            timer = message.timer
+            event = Event(timer.event, to=timer.activation, exact=True, index=timer.index)
             self.trace.cause = self._tracer.event(event, "timer")
             return event
         start, outcome = message.start, message.outcome

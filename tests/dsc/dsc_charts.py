@@ -116,8 +116,10 @@ class Run:
         return self._commit(self.machine.send(None, self.situation()))
 
     def serial(self, path):
-        """The activation of a state, by its path or name."""
-        return next(serial for name, serial in activations(self.machine.state.root) if named(name, path))
+        """The activation of a state that somebody may send events to, by its path or name."""
+        found = next(serial for name, serial in activations(self.machine.state.root) if named(name, path))
+        assert found, f"nobody sends events to '{path}'"
+        return found
 
     @property
     def active(self):

@@ -8,7 +8,7 @@ import pytest
 from dsc_charts import Run, plot
 
 from dsc.dynamic.library import Library
-from dsc.engine.configuration import MachineState
+from dsc.engine.state import MachineState
 from dsc.engine.selection import matches
 from dsc.engine.steps import Note, SendLater
 from dsc.model.plot import ActionPlot
@@ -63,7 +63,7 @@ def test_history_restores_what_was_left(depth, restored):
     assert run.active == ["p", "o"]
     for event in ("next", "next", "out"):
         run.send(event)
-    run.machine.state = MachineState.from_json(run.machine.state.to_json())
+    run.machine.state = MachineState.from_json(run.machine.state.to_json(), run.library)
     run.send("back")
     assert run.active == restored
 
