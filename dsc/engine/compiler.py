@@ -135,6 +135,8 @@ class _Layout:
     def _cleared(self, source: Node, transition: Transition) -> Iterator[int]:
         """The histories that forget: of the state, with `*` also those of all states inside it."""
         for name in transition.clear:
-            at = self._target(source, name.removesuffix("*"))
-            for node in self.nodes[at : self.nodes[at].last + 1 if name.endswith("*") else at + 1]:
-                yield from node.histories
+            node = self.nodes[self._target(source, name.removesuffix("*"))]
+            regions = [self.nodes[child] for child in node.children] if node.orthogonal else []
+            everything = self.nodes[node.index : node.last + 1]
+            for one in everything if name.endswith("*") else [node, *regions]:
+                yield from one.histories

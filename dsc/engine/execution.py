@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from dsc.engine.actions import fill_parameters
@@ -11,12 +11,12 @@ from dsc.engine.performing import Performer
 from dsc.engine.reaction import Entrance, Exit, Part, Reaction, initial_reaction, leaving_reaction
 from dsc.engine.record import Record
 from dsc.engine.situation import Decision, Situation
+from dsc.engine.state import NOTHING
 from dsc.engine.steps import Bound, Cancel, DecisionMade
-from dsc.engine.tables import Chart, CompiledPlot
+from dsc.engine.tables import Chart, CompiledPlot, Node
 from dsc.errors import RunawayError
 from dsc.events import DONE, DONE_STATE, NO_CANDIDATE, Event
-from dsc.model.actions import Emit
-from dsc.model.states import DynamicState, FinalState, SubmachineState
+from dsc.model.states import DynamicState, SubmachineState
 from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Variable
 
@@ -41,32 +41,38 @@ class Execution:
     def enter_plot(self, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> Frame:
         """A plot as the outermost one; raises `InputError` if the arguments do not fit."""
         frame = self._new_frame(compiled, arguments)
-        self._enter_initial(frame)
+        self._enter_initial(frame, initial_reaction(compiled))
         return frame
 
     def leave_plot(self, frame: Frame) -> None:
         """Leave all states of a plot and of the plots inside."""
         self.exit(frame, leaving_reaction(frame.configuration).exits)
 
-    def take(self, reactions: Mapping[Frame, Reaction], parts: Iterable[tuple[Frame, Part]]) -> None:
-        """Leave, act and enter; `parts` are those of all the reactions, in the order in which they act."""
-        parts = list(parts)
-        self._exit_all(reactions)
+    def take(self, frame: Frame, reaction: Reaction) -> None:
+        """Leave, act and enter as a reaction of one plot says."""
+        if reaction.exits:
+            self.exit(frame, reaction.exits)
+        frame.configuration = reaction.following
+        passed = [self._act(frame, part) if part.acts else NOTHING for part in reaction.parts]
+        for part, arguments in zip(reaction.parts, passed, strict=True):
+            self._enter_part(frame, part, arguments)
+
+    def take_together(self, reactions: Mapping[Frame, Reaction], parts: Sequence[tuple[Frame, Part]]) -> None:
+        """The same for several plots at once; `parts` are those of all of them, in the order in which they act."""
+        leaving = [(frame, one) for frame, reaction in reactions.items() for one in reaction.exits]
+        for frame, one in sorted(leaving, key=lambda at: at[0].position(at[1].node.index), reverse=True):
+            self.exit(frame, (one,))
         for frame, reaction in reactions.items():
             frame.configuration = reaction.following
-        passed = [self._act(frame, part) for frame, part in parts]
+        passed = [self._act(frame, part) if part.acts else NOTHING for frame, part in parts]
         for (frame, part), arguments in zip(parts, passed, strict=True):
-            for entrance in part.entrances:
-                self._enter(frame, entrance, arguments)
+            self._enter_part(frame, part, arguments)
 
     def _act(self, frame: Frame, part: Part) -> Mapping[str, Any]:
         """The internal actions of a transition; returns what it passes to its target."""
-        if part.edge is None:
-            return {}
+        assert part.edge is not None  # noqa: S101  # what has no transition does not act
         source = frame.compiled.nodes[part.edge.source].name
         self._performer.act(frame, source, part.effect)
-        if not part.edge.passed:
-            return {}
         try:
             return self._performer.values(frame, part.edge.passed)
         except InputError as error:
@@ -74,15 +80,6 @@ class Execution:
             return {}
 
     # -- leaving -----------------------------------------------------------------------------------------
-
-    def _exit_all(self, reactions: Mapping[Frame, Reaction]) -> None:
-        if len(reactions) == 1:
-            for frame, reaction in reactions.items():
-                self.exit(frame, reaction.exits)
-            return
-        leaving = [(frame.position(one.node.index), frame, one) for frame, its in reactions.items() for one in its.exits]
-        for _, frame, one in sorted(leaving, key=lambda at: at[0], reverse=True):
-            self.exit(frame, (one,))
 
     def exit(self, frame: Frame, exits: Iterable[Exit]) -> None:
         """Leave nodes in this order; what runs inside one is left just before it."""
@@ -111,11 +108,19 @@ class Execution:
 
     # -- entering ----------------------------------------------------------------------------------------
 
-    def _enter_initial(self, frame: Frame) -> None:
-        reaction = initial_reaction(frame.compiled)
+    def _enter_initial(self, frame: Frame, reaction: Reaction) -> None:
         frame.configuration = reaction.following
-        for entrance in reaction.parts[0].entrances:
-            self._enter(frame, entrance, {})
+        for part in reaction.parts:
+            self._enter_part(frame, part, NOTHING)
+
+    def _enter_part(self, frame: Frame, part: Part, passed: Mapping[str, Any]) -> None:
+        if not passed:
+            for entrance in part.entrances:
+                self._enter(frame, entrance, NOTHING)
+        elif part.edge is not None:
+            target = part.edge.targets[0]
+            for entrance in part.entrances:
+                self._enter(frame, entrance, passed if entrance.node.index == target else NOTHING)
 
     def _enter(self, frame: Frame, entrance: Entrance, passed: Mapping[str, Any]) -> None:
         node, state = entrance.node, entrance.node.state
@@ -131,18 +136,23 @@ class Execution:
             self._performer.act(frame, node.name, entrance.after)
         if node.timed:
             self._performer.start_timers(frame, node, activation)
-        if isinstance(state, SubmachineState):
-            self._bind_submachine(frame, node.name, state, passed)
-        elif isinstance(state, DynamicState):
-            self._bind_dynamic(frame, node.name, state, passed)
-        elif isinstance(state, FinalState) and state.emit is not None:
-            self._performer.act(frame, node.name, (Emit(emit=state.emit, arguments=state.arguments),))
+        if node.holds_plot:
+            self._fill(frame, node, passed)
+        if entrance.emits is not None:
+            self._performer.act(frame, node.name, (entrance.emits,))
         if entrance.completes is not None:
             self._complete(frame, entrance.completes)
 
+    def _fill(self, frame: Frame, node: Node, passed: Mapping[str, Any]) -> None:
+        if isinstance(node.state, SubmachineState):
+            self._bind_submachine(frame, node.name, node.state, passed)
+        elif isinstance(node.state, DynamicState):
+            self._bind_dynamic(frame, node.name, node.state, passed)
+
     def _bind_submachine(self, frame: Frame, name: str, state: SubmachineState, passed: Mapping[str, Any]) -> None:
         try:
-            arguments = {**self._performer.values(frame, _without(state.arguments, passed)), **passed}
+            own = {key: term for key, term in state.arguments.items() if key not in passed}
+            arguments = {**self._performer.values(frame, own), **passed}
             if state.use.startswith("?"):
                 compiled = self._chart.bind(frame.variables[state.use[1:]])
             else:
@@ -177,7 +187,7 @@ class Execution:
             raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [frame.prefix + name])
         inner = self._new_frame(compiled, arguments, frame.prefix + name)
         inner.put_into(frame, name)
-        self._enter_initial(inner)
+        self._enter_initial(inner, initial_reaction(compiled))
 
     def _new_frame(self, compiled: CompiledPlot, arguments: Mapping[str, Any], path: str = "") -> Frame:
         variables = fill_parameters(compiled.plot, arguments, self._situation)
@@ -201,7 +211,3 @@ class Execution:
             self._record.internal.append(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
         elif DONE in node.edges:
             self._record.internal.append(Event(DONE, outputs, to=frame.activations[node.name], exact=True))
-
-
-def _without(arguments: Mapping[str, Any], passed: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: term for name, term in arguments.items() if name not in passed}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from dsc.engine.configuration import Configuration
@@ -62,17 +62,20 @@ class Frame:
             return (index,)
         return (*self.parent.position(self.parent.compiled.index[self.host]), index)
 
-    def inner(self) -> list[tuple[str, Frame]]:
-        """The frames directly inside with the names of their states, in document order."""
-        if len(self.children) < 2:  # noqa: PLR2004  # nothing to be put in order
-            return list(self.children.items())
-        return sorted(self.children.items(), key=lambda item: self.compiled.index[item[0]])
+    def inner(self) -> list[Frame]:
+        """The frames directly inside, in document order."""
+        found = list(self.children.values())
+        if len(found) > 1:
+            found.sort(key=lambda frame: self.compiled.index[frame.host])
+        return found
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> list[Frame]:
         """This frame and all inside it, in document order."""
-        yield self
-        for _, child in self.inner():
-            yield from child.frames()
+        found = [self]
+        if self.children:
+            for child in self.inner():
+                found += child.frames()
+        return found
 
 
 def thaw(state: FrameState, parent: Frame | None = None, host: str = "") -> Frame:
@@ -92,7 +95,7 @@ def freeze(frame: Frame) -> FrameState:
     """The frame as a value: the very one it was made from, if nothing has changed."""
     children: Mapping[str, FrameState] = NOTHING
     if frame.children:
-        children = {name: freeze(child) for name, child in frame.inner()}
+        children = {child.host: freeze(child) for child in frame.inner()}
     was = frame.was
     if (
         was is not None

@@ -80,7 +80,7 @@ class Macrostep:
 
     def _rest(self) -> None:
         while not self._execution.finished:
-            if self._take(None):
+            if self._take_spontaneous():
                 continue
             if not self._record.internal:
                 return
@@ -90,42 +90,44 @@ class Macrostep:
 
     # -- one event ---------------------------------------------------------------------------------------
 
-    def _take(self, event: Event | None) -> bool:
-        """One microstep, if the event (or, with `None`, a change of the world) enables any transition."""
-        assert self._root is not None  # noqa: S101  # `step` answers for a machine that has ended
-        if event is not None:
-            self._performer.event = event
-            if event.name == AT_LEAST:
-                return self._least_time_passed(event)
-        concerned = self._concerned(event)
-        if not concerned:
-            return False
-        if len(concerned) == 1:
-            frame, trigger = concerned[0]
-            return self._take_alone(frame, trigger, event)
-        return self._take_together(None if event is None else event.name, event)
-
-    def _concerned(self, event: Event | None) -> list[tuple[Frame, Trigger]]:
-        """The frames that see the event and listen to it, with what it is to them."""
-        assert self._root is not None  # noqa: S101
-        if event is None:
-            return [(frame, None) for frame in self._root.frames() if frame.configuration.spontaneous]
+    def _take(self, event: Event) -> bool:
+        """One microstep, if anybody listens to the event and can take it; or somebody keeps it for later."""
+        self._performer.event = event
         if event.to is not None:
-            found = self._find(event.to)
-            if found is None:
-                return []
-            frame, state = found
-            return [(frame, Addressed(event.name, frame.compiled.index[state], event.exact, event.index))]
-        return [
-            (frame, event.name)
-            for frame in self._root.frames()
+            return self._take_addressed(event, event.to)
+        listeners = [
+            frame
+            for frame in self._frames()
             if event.frame in (None, frame.serial) and choice_of(frame.configuration, event.name) is not None
         ]
+        if len(listeners) == 1:
+            return self._take_alone(listeners[0], event.name, event)
+        return bool(listeners) and self._take_together(event.name, event)
+
+    def _take_addressed(self, event: Event, activation: int) -> bool:
+        found = self._find(activation)
+        if found is None:
+            return False
+        frame, state = found
+        if event.name == AT_LEAST:
+            return self._least_time_passed(frame, state)
+        trigger = Addressed(event.name, frame.compiled.index[state], event.exact, event.number)
+        return self._take_alone(frame, trigger, event)
+
+    def _take_spontaneous(self) -> bool:
+        """One microstep, if a change of the world enables any transition."""
+        concerned = [frame for frame in self._frames() if frame.configuration.spontaneous]
+        if len(concerned) == 1:
+            return self._take_alone(concerned[0], None, None)
+        return bool(concerned) and self._take_together(None, None)
+
+    def _frames(self) -> list[Frame]:
+        assert self._root is not None  # noqa: S101  # `step` answers for a machine that has ended
+        return self._root.frames()
 
     def _find(self, activation: int) -> tuple[Frame, str] | None:
         """The frame and state that were given this number, if they are still active."""
-        assert self._root is not None  # noqa: S101
-        for frame in self._root.frames():
+        for frame in self._frames():
             for state, serial in frame.activations.items():
                 if serial == activation:
                     return frame, state
@@ -137,34 +139,38 @@ class Macrostep:
             choice = choice.follow(self._holds(frame, choice.edge, choice.condition))
         if choice is None:
             return False
-        keeps = self._keep(frame, choice.keeps, event)
+        if choice.keeps:
+            self._keep(frame, choice.keeps, event)
         if not choice.parts:
-            return keeps
-        self._microstep(event, {frame: choice}, [(frame, part) for part in choice.parts])
+            return bool(choice.keeps) and event is not None
+        self._check_progress()
+        self._execution.take(frame, choice)
+        self._record.end_microstep(event, choice.taken_in(frame.compiled, frame.prefix))
         return True
 
     def _take_together(self, trigger: Trigger, event: Event | None) -> bool:
         """Several plots listen: what is enabled in one may preempt what is enabled in another (SCXML 3.13)."""
         assert self._root is not None  # noqa: S101
         taken, late = select(self._root, trigger, self._guard)
+        for one in late:
+            self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event)
+        if not taken:
+            return bool(late) and event is not None
+        self._check_progress()
         by_frame: dict[Frame, list[Edge]] = {}
         for one in taken:
             by_frame.setdefault(one.frame, []).append(one.edge)
-        keeps = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
-        if not taken:
-            return any(keeps)
         reactions = {frame: reaction_of(frame.configuration, tuple(edges)) for frame, edges in by_frame.items()}
         parts = [(one.frame, _part_of(one, reactions[one.frame])) for one in taken]
-        self._microstep(event, reactions, parts)
+        reports = tuple([report(one.edge, one.frame.compiled, one.frame.prefix) for one in taken])
+        self._execution.take_together(reactions, parts)
+        self._record.end_microstep(event, reports)
         return True
 
-    def _microstep(self, event: Event | None, reactions: Mapping[Frame, Reaction], parts: Iterable[Any]) -> None:
+    def _check_progress(self) -> None:
         if len(self._record.microsteps) >= MAX_MICROSTEPS:
             trail = [path for micro in self._record.microsteps[-6:] for path in micro.entered]
             raise RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
-        taken = tuple([report(part.edge, frame.compiled, frame.prefix) for frame, part in parts])
-        self._execution.take(reactions, parts)
-        self._record.end_microstep(event, taken)
 
     # -- guards ------------------------------------------------------------------------------------------
 
@@ -187,19 +193,13 @@ class Macrostep:
 
     # -- time --------------------------------------------------------------------------------------------
 
-    def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> bool:
+    def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> None:
         """An event that a state would take if it could be left already waits with it; a period comes again."""
-        if event is None or event.name == EVERY:
-            return False
-        frame.kept = (*frame.kept, *((state, event) for state in states))
-        return any(True for _ in states)
+        if event is not None and event.name != EVERY:
+            frame.kept = (*frame.kept, *((state, event) for state in states))
 
-    def _least_time_passed(self, event: Event) -> bool:
+    def _least_time_passed(self, frame: Frame, state: str) -> bool:
         """The state can be left from now on; what it kept is offered again, before anything new."""
-        found = self._find(event.to or 0)
-        if found is None:
-            return False
-        frame, state = found
         before = frame.configuration
         waiting = before.waiting - {frame.compiled.index[state]}
         frame.configuration = configuration_of(frame.compiled, before.active, waiting, before.history)
@@ -209,11 +209,11 @@ class Macrostep:
 
     def _next_period(self, event: Event) -> None:
         found = self._find(event.to or 0)
-        if found is not None and event.index is not None:
+        if found is not None and event.number is not None:
             frame, state = found
             node = frame.compiled.nodes[frame.compiled.index[state]]
-            seconds = node.cycles[event.index].seconds
-            self._performer.start_timer(frame, node, event.to or 0, EVERY, event.index, seconds)
+            seconds = node.cycles[event.number].seconds
+            self._performer.start_timer(frame, node, event.to or 0, EVERY, event.number, seconds)
 
 
 def _part_of(one: Enabled, reaction: Reaction) -> Part:

@@ -18,6 +18,10 @@ from dsc.model.language import TermField
 from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Expression
 
+Action = ExternalAction | Internal
+SHORTEST_PERIOD = 0.001
+"""Seconds; a period of nothing would leave no time for anything else."""
+
 
 class Performer:
     """Carries out actions; `event` is the last one taken, whose attributes they read."""
@@ -51,7 +55,7 @@ class Performer:
         self._record.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
 
     def act(
-        self, frame: Frame, state: str, actions: Iterable[ExternalAction | Internal], activation: int = 0, first: int = 0
+        self, frame: Frame, state: str, actions: Iterable[Action], activation: int = 0, first: int = 0
     ) -> None:
         """Carry out a block of actions of a state, numbered from `first` within its activation.
 
@@ -79,14 +83,12 @@ class Performer:
         for index, timed in enumerate(node.cycles):
             self.start_timer(frame, node, activation, EVERY, index, timed.seconds)
 
-    def start_timer(  # noqa: PLR0913  # all that names a timer
+    def start_timer(  # all that names a timer
         self, frame: Frame, node: Node, activation: int, event: str, index: int, seconds: TermField
     ) -> None:
         """Ask for one timer of a state; a delay that cannot be worked out is a failure like others."""
         try:
-            delay = delay_of(self.value(frame, seconds))
-            if event == EVERY and delay == 0:
-                raise InputError("a period is longer than 0 seconds")
+            delay = delay_of(self.value(frame, seconds), least=SHORTEST_PERIOD if event == EVERY else 0)
         except InputError as error:
             self.fail(frame, f"{frame.prefix}{node.name}: {error}")
         else:

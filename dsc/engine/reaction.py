@@ -17,7 +17,7 @@ from dsc.engine.selection import domain, left_by
 from dsc.engine.steps import Taken
 from dsc.engine.tables import CompiledPlot, Edge, Node
 from dsc.events import DONE
-from dsc.model.actions import Choose, ExternalAction, Internal, Trigger
+from dsc.model.actions import Choose, Emit, ExternalAction, Internal, Trigger
 from dsc.model.states import FinalState, HistoryState, State
 
 Action = ExternalAction | Internal
@@ -45,21 +45,28 @@ class Entrance:
         actions: those of its entry.
         after: those of a history's default that leads to it (a block of its own, appendix D).
         completes: index of the node whose content is complete with it; 0 for the plot itself.
+        emits: the outcome of a final state.
     """
 
     node: Node
     actions: tuple[Action, ...]
     after: tuple[Action, ...]
     completes: int | None
+    emits: Emit | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """What one transition contributes: its internal actions, and what is entered because of it, in order."""
+    """What one transition contributes: its internal actions, and what is entered because of it, in order.
+
+    Attributes:
+        acts: whether it has actions, or arguments to pass.
+    """
 
     edge: Edge | None
     effect: tuple[Action, ...]
     entrances: tuple[Entrance, ...]
+    acts: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +80,7 @@ class Reaction:
         keeps: names of states that keep the event until their least time has passed.
         taken, exited, entered: how it is reported for the outermost plot.
         still: whether nothing but the configuration changes.
+        reports: what was taken, for plots inside, by the path of the state that holds them.
     """
 
     parts: tuple[Part, ...]
@@ -83,6 +91,22 @@ class Reaction:
     exited: tuple[str, ...] = ()
     entered: tuple[str, ...] = ()
     still: bool = False
+    reports: dict[str, tuple[Taken, ...]] = field(default_factory=dict)
+
+    def taken_in(self, compiled: CompiledPlot, prefix: str) -> tuple[Taken, ...]:
+        """How the transitions are reported in a plot whose states' paths begin with the prefix."""
+        if not prefix:
+            return self.taken
+        found = self.reports.get(prefix)
+        if found is None:
+            if len(self.reports) >= MOST_REPORTS:
+                self.reports.clear()
+            found = self.reports[prefix] = tuple([report(p.edge, compiled, prefix) for p in self.parts if p.edge])
+        return found
+
+
+MOST_REPORTS = 64
+"""Places kept for which a reaction is reported."""
 
 
 def reaction_of(configuration: Configuration, edges: tuple[Edge, ...], keeps: tuple[str, ...] = ()) -> Reaction:
@@ -95,10 +119,10 @@ def reaction_of(configuration: Configuration, edges: tuple[Edge, ...], keeps: tu
 
 def initial_reaction(compiled: CompiledPlot) -> Reaction:
     """How a plot is entered."""
-    nowhere = configuration_of(compiled, ())
-    found: Reaction | None = nowhere.reactions.get(None)
+    found: Reaction | None = compiled.cache.get(None)
     if found is None:
-        found = nowhere.reactions[None] = _Work(nowhere).entering()
+        found = _Work(configuration_of(compiled, ())).entering()
+        compiled.cache[None] = found
     return found
 
 
@@ -126,14 +150,19 @@ def _leaves_quietly(one: Exit) -> bool:
 
 
 def _moves_quietly(part: Part) -> bool:
-    silent = not part.effect and (part.edge is None or not part.edge.passed)
-    return silent and all(map(_is_entered_quietly, part.entrances))
+    return not part.acts and all(map(_is_entered_quietly, part.entrances))
 
 
 def _is_entered_quietly(one: Entrance) -> bool:
-    emits = isinstance(one.node.state, FinalState) and one.node.state.emit is not None
-    acts = one.actions or one.after
-    return not acts and one.completes is None and not one.node.addressed and not emits
+    acts = one.actions or one.after or one.emits
+    return not acts and one.completes is None and not one.node.addressed
+
+
+def _outcome(node: Node) -> Emit | None:
+    final = node.state
+    if not isinstance(final, FinalState) or final.emit is None:
+        return None
+    return Emit(emit=final.emit, arguments=final.arguments)
 
 
 @dataclass(slots=True)
@@ -162,16 +191,14 @@ class _Work:
             for history in edge.cleared:
                 self.remembered.pop(history, None)
         parts = [
-            Part(edge, effect, self._entrances(domain(self.compiled, edge, self.remembered), edge.targets))
-            if edge.targets
-            else Part(edge, effect, ())
+            Part(edge, effect, self._reached(edge), bool(effect or edge.passed))
             for edge, effect in zip(edges, effects, strict=True)
         ]
         return self._reaction(tuple(parts), exits, keeps, tuple([report(edge, self.compiled) for edge in edges]))
 
     def entering(self) -> Reaction:
         entrances = self._entrances(0, (self.compiled.nodes[0].initial,))
-        return self._reaction((Part(None, (), entrances),), (), (), ())
+        return self._reaction((Part(None, (), entrances, acts=False),), (), (), ())
 
     def leaving(self) -> Reaction:
         return self._reaction((), self._exits(self.present, set()), (), ())
@@ -221,6 +248,11 @@ class _Work:
                 kept = tuple([child for child in nodes[index].children if child in configuration.members])
             self.remembered[history] = kept
 
+    def _reached(self, edge: Edge) -> tuple[Entrance, ...]:
+        if not edge.targets:
+            return ()
+        return self._entrances(domain(self.compiled, edge, self.remembered), edge.targets)
+
     def _entrances(self, around: int, targets: tuple[int, ...]) -> tuple[Entrance, ...]:
         entry = entry_set(self.compiled, around, targets, self.remembered)
         entrances = []
@@ -230,7 +262,8 @@ class _Work:
             if node.at_least is not None:
                 self.waiting.add(index)
             actions, after = self._settled(node.entry), self._settled(entry.after.get(index, ()))
-            entrances.append(Entrance(node, tuple(actions), tuple(after), self._completed(node)))
+            completes = self._completed(node)
+            entrances.append(Entrance(node, tuple(actions), tuple(after), completes, _outcome(node)))
         return tuple(entrances)
 
     def _settled(self, actions: Iterable[_AnyAction]) -> Iterator[_AnyAction]:

@@ -3,33 +3,37 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
 
-from dsc.engine.steps import Bound, DecisionMade, Microstep, Output, Taken
+from dsc.engine.steps import NO_CHANGE, Bound, DecisionMade, Microstep, Output, Taken
 from dsc.events import Event
-from knowledge_base.facts import Delta
 
 
-@dataclass(slots=True)
 class Record:
-    """Collects what will be the step; `internal` are the events that the chart has still to take.
+    """Collects what will be the step.
 
     Attributes:
         serials: the last serial number given out.
+        internal: events that the chart has still to take.
         exited, entered, bound: of the microstep that is going on.
     """
 
-    serials: int = 0
-    internal: deque[Event] = field(default_factory=deque)
-    microsteps: list[Microstep] = field(default_factory=list)
-    decisions: list[DecisionMade] = field(default_factory=list)
-    output: list[Output] = field(default_factory=list)
-    emitted: list[Event] = field(default_factory=list)
-    errors: list[str] = field(default_factory=list)
-    knowledge: Delta = field(default_factory=Delta)
-    exited: list[str] = field(default_factory=list)
-    entered: list[str] = field(default_factory=list)
-    bound: list[Bound] = field(default_factory=list)
+    __slots__ = (
+        "bound", "decisions", "emitted", "entered", "errors", "exited", "internal", "knowledge", "microsteps",
+        "output", "serials",
+    )  # fmt: skip
+
+    def __init__(self, serials: int) -> None:
+        self.serials = serials
+        self.internal: deque[Event] = deque()
+        self.microsteps: list[Microstep] = []
+        self.decisions: list[DecisionMade] = []
+        self.output: list[Output] = []
+        self.emitted: list[Event] = []
+        self.errors: list[str] = []
+        self.knowledge = NO_CHANGE
+        self.exited: list[str] = []
+        self.entered: list[str] = []
+        self.bound: list[Bound] = []
 
     def next_serial(self) -> int:
         """A number never given out before in this run."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -16,7 +15,7 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class FrameState(NamedTuple):
-    """One running plot. (A named tuple: steps make many, and a frozen dataclass takes four times as long.)
+    """One running plot; a named tuple, since steps make many and a frozen dataclass takes four times as long.
 
     Attributes:
         serial: number of this instance, never used again in the same run.
@@ -61,7 +60,7 @@ class FrameState(NamedTuple):
             "variables": dict(self.variables),
             "activations": dict(self.activations),
             "children": {name: child.to_json() for name, child in self.children.items()},
-            "kept": [[name, asdict(event)] for name, event in self.kept],
+            "kept": [[name, {**event._asdict(), "attributes": dict(event.attributes)}] for name, event in self.kept],
         }
 
     @staticmethod

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from dsc.engine.state import MachineState
 from dsc.engine.situation import Decision
+from dsc.engine.state import MachineState
 from dsc.events import AFTER, Event
 from dsc.model.plot import ActionPlot
 from knowledge_base.facts import Delta
@@ -103,8 +103,7 @@ class Taken:
     place: tuple[str | int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Bound:
+class Bound(NamedTuple):
     """A plot that became the content of a state (named by its path; empty for the outermost plot), as it runs."""
 
     state: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from dsc.dynamic.library import Library
@@ -108,7 +108,7 @@ class Sequencer:
         """
         if event.name in RESERVED:
             raise InputError(f"the event '{event.name}' is fired by the executive itself", found=event.name)
-        self._inbox.put_nowait(replace(event, attributes=_plain_data(event)))
+        self._inbox.put_nowait(event._replace(attributes=_plain_data(event)))
 
     def change(self, delta: Delta, author: str) -> None:
         """Hand in a change of knowledge that somebody else made; from the loop's own thread.
@@ -193,7 +193,7 @@ class Sequencer:
         if isinstance(message, TimerMessage):
             self.trace.cause = None
             timer = message.timer
-            event = Event(timer.event, to=timer.activation, exact=True, index=timer.index)
+            event = Event(timer.event, to=timer.activation, exact=True, number=timer.index)
             self.trace.cause = self._tracer.event(event, "timer")
             return event
         start, outcome = message.start, message.outcome

@@ -104,12 +104,12 @@ class Run:
     def start(self, **arguments):
         return self._commit(self.machine.start(self.first, arguments, self.situation()))
 
-    def send(self, name, *, to=None, exact=False, index=None, **attributes):
-        event = Event(name, attributes, to=self.serial(to) if to else None, exact=exact, index=index)
+    def send(self, name, *, to=None, exact=False, number=None, **attributes):
+        event = Event(name, attributes, to=self.serial(to) if to else None, exact=exact, number=number)
         return self._commit(self.machine.send(event, self.situation()))
 
-    def time_out(self, state, index=0):
-        return self.send("after", to=state, exact=True, index=index)
+    def time_out(self, state, number=0):
+        return self.send("after", to=state, exact=True, number=number)
 
     def look(self):
         """The world may have changed."""

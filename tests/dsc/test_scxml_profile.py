@@ -8,8 +8,8 @@ import pytest
 from dsc_charts import Run, plot
 
 from dsc.dynamic.library import Library
-from dsc.engine.state import MachineState
 from dsc.engine.selection import matches
+from dsc.engine.state import MachineState
 from dsc.engine.steps import Note, SendLater
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, SimulatedEventLoop
