@@ -10,6 +10,10 @@ DONE = "done"
 """Completion of a state's content (S0.11)."""
 AFTER = "after"
 """A timeout of a state; `index` says which."""
+EVERY = "every"
+"""A period of a state has passed again; `index` says which of its cyclic transitions."""
+AT_LEAST = "at_least"
+"""The time that a state stays at least has passed."""
 NO_CANDIDATE = "no_candidate"
 """A dynamic state without goal found no candidate that fits (S0.4)."""
 NO_PLAN = "no_plan"
@@ -28,7 +32,9 @@ EXECUTION_ERROR = "error.execution"
 """What `error` is called in profile `scxml` (SCXML 3.13)."""
 ERRORS = frozenset({ERROR, EXECUTION_ERROR})
 
-RESERVED = frozenset({DONE, AFTER, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR})
+TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
+"""What the executive's clock says to one state; no transition has them under `on`."""
+RESERVED = TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR}
 """Events the executive fires itself. Nobody else declares any of them, except that plots and skills that plan may end
 with `no_plan` and `gave_up`."""
 
@@ -44,7 +50,7 @@ class Event:
             around it in the same plot see it, nobody else. An event for a state that was left is dropped.
         exact: with `to`: that state alone may take it.
         frame: the plot instance inside which it is visible; with neither, everybody sees it.
-        index: which of the state's timeouts.
+        index: which of the state's timeouts or periods.
     """
 
     name: str

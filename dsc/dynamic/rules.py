@@ -24,8 +24,8 @@ from dsc.model.states import (
     OrthogonalState,
     State,
     SubmachineState,
-    Transition,
 )
+from dsc.model.transitions import Transition
 from knowledge_base.errors import SchemaError
 from knowledge_base.language import expression as lang
 from knowledge_base.language.effect import substitute_effect

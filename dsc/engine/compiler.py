@@ -18,8 +18,8 @@ from dsc.model.states import (
     OrthogonalState,
     Region,
     State,
-    Transition,
 )
+from dsc.model.transitions import Transition
 from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.language.expression import Expression
 

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from dsc.model.language import MISNAMED, UNKNOWN_FORM
+from dsc.model.language import LOCATED, UNKNOWN_FORM
 from dsc.text.yaml import Document, FormPath
 from knowledge_base.errors import InputError, UnknownNameError
 
@@ -64,7 +64,7 @@ def _message(details: ErrorDetails) -> str:
     kind = details["type"]
     if kind == "value_error":
         return _said_by(details["ctx"]["error"])
-    if kind == MISNAMED:
+    if kind == LOCATED:
         return details["msg"]
     if kind == UNKNOWN_FORM:
         return f"{details['msg']}; found {details['input']!r}"

@@ -10,7 +10,8 @@ from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
 from dsc.model.plot import ActionPlot, Parameter, Path, Variable
-from dsc.model.states import AnyState, DynamicState, FinalState, State, SubmachineState, TimedTransition, Transition
+from dsc.model.states import AnyState, DynamicState, FinalState, HistoryState, State, SubmachineState
+from dsc.model.transitions import TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.wiring import Skills
 from knowledge_base.errors import InputError, UnknownNameError
@@ -53,7 +54,7 @@ class _Data:
             elif isinstance(state, FinalState):
                 yield from self._terms(state.arguments.items(), None, (*path, "with"))
                 yield from self._internal(state.entry, None, (*path, "entry"))
-            else:
+            elif isinstance(state, HistoryState):
                 yield from self._internal(state.do, None, (*path, "do"))
         for number, rule in enumerate(self._plot.rules):
             path = ("rules", number)

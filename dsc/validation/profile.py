@@ -8,7 +8,8 @@ from dsc.engine.membership import asked_states
 from dsc.errors import Finding
 from dsc.model.actions import Choose, Emit, ExternalAction, Internal, Log, flat
 from dsc.model.plot import ActionPlot, Path
-from dsc.model.states import AnyState, FinalState, HistoryState, OrthogonalState, State, Transition
+from dsc.model.states import AnyState, FinalState, HistoryState, OrthogonalState, State
+from dsc.model.transitions import Transition
 from knowledge_base.errors import SchemaError
 
 FIX = "write `profile: scxml` if the plot is to be an SCXML chart"

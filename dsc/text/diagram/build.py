@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from dsc.dynamic.library import Library
+from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path, Scope, initial_of
 from dsc.model.states import (
     AnyState,
@@ -121,6 +122,8 @@ class _Builder:
         if isinstance(state, OrthogonalState):
             regions = [self._region(key, one, (*here, "regions", key)) for key, one in state.regions.items()]
             return self._hull(BoxKind.ORTHOGONAL, name, state, _side_by_side(regions))
+        if isinstance(state, Connector):
+            return card(BoxKind.SIMPLE, name, (), about=state.about or "")
         return leaf_card(name, state, self._library, rule=name in self._added, told=self._plot.generated)
 
     def _hull(self, kind: BoxKind, name: str, state: State, inside: _Inside) -> Box:

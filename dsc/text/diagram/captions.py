@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from dsc.events import AFTER
 from dsc.model.actions import Assign, Choose, Configure, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
-from dsc.model.states import State, TimedTransition, Transition
+from dsc.model.states import State
+from dsc.model.transitions import TimedTransition, Transition
 from dsc.text.diagram.layout import TextStyle
 from dsc.text.diagram.measure import pack
 from knowledge_base.language.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable

@@ -17,8 +17,8 @@ from dsc.model.states import (
     Region,
     State,
     SubmachineState,
-    Transition,
 )
+from dsc.model.transitions import Transition
 from dsc.text.scxml.document import NAMESPACE
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.expressions import expression_text, identifier, term_text
@@ -68,7 +68,7 @@ class _Writer:
         elif isinstance(state, FinalState):
             final = ET.SubElement(around, "final", {"id": name})
             self._block(final, "onentry", state.entry)
-        else:
+        elif isinstance(state, State):
             self._proper(around, name, state)
 
     def _history(self, around: ET.Element, name: str, state: HistoryState) -> None:
