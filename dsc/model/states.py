@@ -48,6 +48,12 @@ class State(Source):
     every: CyclicTransitions = ()
     always: Transitions = ()
 
+    def blocks(self) -> Iterator[tuple[str, Actions]]:
+        """Its actions, by the keys under which they stand."""
+        yield "entry", self.entry
+        yield "exit", self.exit
+        yield "on_break", self.on_break
+
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
         """Every outgoing transition, with its path such as `("on", "grasped", 0)` and the label of its trigger."""
         for event, transitions in self.on.items():
