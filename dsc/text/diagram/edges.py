@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from dsc.model.states import AnyState, State
-from dsc.text.diagram.captions import Caption, Labelled, captions, labelled
+from dsc.model.states import AnyState
+from dsc.model.transitions import Source
+from dsc.text.diagram.captions import Caption, Labelled, captions, labelled_by_value
 from dsc.text.diagram.layered.graph import Route
 from dsc.text.diagram.layout import Box, Edge, Point, Text
 from dsc.text.diagram.measure import LINE_HEIGHT, text_width
@@ -67,7 +68,7 @@ def bundles(states: Mapping[str, AnyState], recoveries: frozenset[str], *, terse
     """
     groups: dict[tuple[str, str], list[Labelled]] = {}
     for name, state in states.items():
-        for one in labelled(state) if isinstance(state, State) else ():
+        for one in labelled_by_value(state) if isinstance(state, Source) else ():
             if one.transition.target is not None:
                 groups.setdefault((name, one.transition.target), []).append(one)
     return [
