@@ -172,8 +172,10 @@ def _link(source: int, target: int, bundle: Bundle) -> Link:
 
 def _node(box: Box, own: Bundle | None, *, sideways: bool) -> Node:
     beside = room_for_loop(own, sideways=sideways) if own is not None else 0.0
-    pointed = box.kind in {BoxKind.INITIAL, BoxKind.FINAL, BoxKind.CHOICE}
-    return Node(box.width, box.height, beside, pointed=pointed, last=box.kind is BoxKind.FINAL)
+    pointed, diamond = box.kind in {BoxKind.INITIAL, BoxKind.FINAL}, box.kind is BoxKind.CHOICE
+    return Node(
+        box.width, box.height, beside, pointed=pointed, diamond=diamond, last=box.kind is BoxKind.FINAL
+    )
 
 
 def _roomy(box: Box, own: Bundle | None, *, sideways: bool) -> Box:

@@ -90,14 +90,14 @@ def diamond(name: str, connector: Connector) -> Box:
     block = LINE_HEIGHT * len(rows)
     height = DIAMOND_HEIGHT + 2 * LINE_HEIGHT * (len(rows) - 1)
     # A text fits where its share of the width and the lines' share of the height are 1 together.
-    width = max(text_width(row.text, row.style) for row in rows) / (1 - block / height)
+    width = (max(text_width(row.text, row.style) for row in rows) + SIDE) / (1 - block / height)
     first = (height - block) / 2 + 11.5
     texts = tuple(
         Text(width / 2, first + LINE_HEIGHT * number, row.text, row.style, centred=True)
         for number, row in enumerate(rows)
     )
     title = "\n".join(filter(None, [name, connector.about, *(row.full for row in rows[1:])]))
-    return Box(BoxKind.CHOICE, name, 0, 0, max(width, DIAMOND_HEIGHT), height, texts, title=title)
+    return Box(BoxKind.CHOICE, name, 0, 0, width, height, texts, title=title)
 
 
 def name_beside(final: Box) -> Box:
