@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 from dsc_charts import plot
 
-from dsc.text.plots import json_schema, load_library, load_plot, parse_plot, plot_to_yaml
+from dsc.text.plots import load_library, load_plot, parse_plot, plot_to_yaml
 from dsc.text.yaml import MAX_BYTES, load_document
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.expression import Variable
@@ -216,10 +215,3 @@ def test_two_plots_of_one_name_and_an_empty_folder_are_refused(tmp_path):
 def test_shipped_plots_survive_reading_and_writing(file):
     made = load_plot(file)
     assert parse_plot(plot_to_yaml(made)) == made
-
-
-def test_editors_get_a_json_schema():
-    schema = json_schema()
-    assert json.loads(json.dumps(schema)) == schema
-    assert set(schema["required"]) == {"plot", "states"}
-    assert "with" in schema["$defs"]["Trigger"]["properties"]
