@@ -180,7 +180,7 @@ class ActionPlot(Frozen):
             for other, declared in others.items():
                 if name in declared:
                     context = {"name": name, "other": other, "kind": kind, "path": (f"{kind}s", name)}
-                    raise PydanticCustomError(LOCATED, "'{name}' is a {other} and a {kind}", context)
+                    raise PydanticCustomError(LOCATED, "'{name}' is declared twice: as {other} and as {kind}", context)
 
     def _variable_paths(self) -> Iterator[Path]:
         """Everything that conditions and terms can only read as `?name` or `?event.name`."""

@@ -128,7 +128,7 @@ def _ways_in(plot: ActionPlot, library: Library) -> Iterator[_WayIn]:
 def _given(plot: ActionPlot, name: str, path: Path, need: _Need, ways_in: Iterable[_WayIn]) -> Iterator[Finding]:
     """A parameter that `with` leaves open is passed on every way into the state."""
     leading = [way for way in ways_in if name in way.transition.targets]
-    passing = [way for way in leading if need.parameter in way.transition.passed]
+    passing = [way for way in leading if way.transition.target == name and need.parameter in way.transition.passed]
     if not passing:
         yield _missing(plot, need, (*path, "with"))
         return
@@ -150,9 +150,9 @@ def _missing(plot: ActionPlot, need: _Need, path: Path) -> Finding:
 
 def _not_passed(plot: ActionPlot, name: str, path: Path, need: _Need, way: _WayIn) -> Finding:
     rule = way.transition.rule
-    by = "a transition" if way.path else f"the rule '{rule}' leads" if rule else "a rule's recovery leads"
+    by = "a transition" if way.path else f"the rule '{rule}'" if rule else "a rule's recovery"
     error = InputError(
-        f"{by} to '{name}' does not pass '{need.parameter}', which plot '{need.plot}' needs",
+        f"{by} leads to '{name}' and does not pass '{need.parameter}', which plot '{need.plot}' needs",
         place=plot.place(way.path or path),
     )
     fix = f"add `{need.parameter}: …` under its `pass`" if way.path else f"add `{need.parameter}: …` under `with`"

@@ -347,7 +347,21 @@ WRONG = [
     (
         "parameters are given",
         ITEM + "  a:\n    on:\n      done: {to: s, pass: {item: ?item}}\n      error: s\n" + FOUND.format(""),
-        7, "does not pass 'item', which plot 'search' needs", "`pass`",
+        7, "a transition leads to 's' and does not pass 'item', which plot 'search' needs", "`pass`",
+    ),
+    (
+        "parameters are given",
+        H.replace("states:", "parameters: {item: item}\nstates:") + "  a:\n    on: {out: h}\n    states:\n"
+        "      b: {on: {go: {to: s, pass: {item: ?item}}}}\n      s: {use: search}\n      h: {history: deep, to: b}\n",
+        9, "entered without a transition", "`with`",
+    ),
+    (
+        "parameters are given",
+        H.replace("states:", "parameters: {item: item}\nstates:") + "  a: {on: {go: o}}\n  o:\n    regions:\n"
+        "      r: {states: {b: {on: {go: {to: s, pass: {item: ?item}}}}, s: {use: search}}}\n"
+        "      q: {states: {c: {}, d: {use: ask, with: {item: ?item}, on: {nobody: a,\n"
+        "        go: {to: d, also: [s], pass: {item: ?item}}}}}}\n",
+        10, "a transition leads to 's' and does not pass", "`pass`",
     ),
     (
         "parameters are given",
@@ -359,6 +373,12 @@ WRONG = [
         ITEM + "  a: {on: {done: {to: s, pass: {item: ?item}}}}\n  s: {use: ask, on: {done: e}}\n" + E
         + "rules:\n  - {on: nobody, do: {then: retry}}\n  - {on: nobody, do: {then: e}}\n",
         5, "the rule 'nobody: retry' leads to 's'", "`with`",
+    ),
+    (
+        "parameters are given",
+        ITEM + "  a: {on: {done: {to: s, pass: {item: ?item}}}}\n  s: {use: ask, on: {done: e}}\n" + E
+        + "rules:\n  - {on: nobody, do: {use: wait, then: retry}}\n  - {on: nobody, do: {then: e}}\n",
+        5, "a rule's recovery leads to 's'", "`with`",
     ),
     # -- what is handed back
     ("outputs are given", "plot: p\noutputs: {n: number}\nstates:\n  a: {on: {done: e}}\n" + E, 2, "never gets a value", "initial"),
@@ -379,6 +399,13 @@ WRONG = [
         ITEM + "  s:\n    dynamic: [search, ask]\n    with: {item: ?item}\n    on:\n"
         "      done: {to: s, assign: {n: ?event.tries}}\n      no_candidate: e\n      nobody: e\n" + E + "variables: {n: text}\n",
         8, "?event.tries", "",
+    ),
+    # a goal that is reached, by a candidate or a plan, hands nothing back
+    (
+        "declared variable",
+        ITEM + "  s:\n    dynamic: [search]\n    goal: (free)\n    with: {item: ?item}\n    on:\n"
+        "      done: {to: e, assign: {n: ?event.where}}\n      no_plan: e\n      gave_up: e\n" + E + "variables: {n: place}\n",
+        9, "?event.where", "",
     ),
     ("declared variable", S + "  a:\n    on:\n      done: [{to: e, when: (free), emit: x, with: {w: ?event.where}}, e]\n      x: e\n" + E, 5, "?event.where", ""),
     (
