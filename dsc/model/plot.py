@@ -180,7 +180,7 @@ class ActionPlot(Frozen):
             for other, declared in others.items():
                 if name in declared:
                     context = {"name": name, "other": other, "kind": kind, "path": (f"{kind}s", name)}
-                    raise PydanticCustomError(LOCATED, "'{name}' is a {other} and a {kind}", context)
+                    raise PydanticCustomError(LOCATED, "'{name}' is declared twice: as {other} and as {kind}", context)
 
     def _variable_paths(self) -> Iterator[Path]:
         """Everything that conditions and terms can only read as `?name` or `?event.name`."""
@@ -194,15 +194,18 @@ class ActionPlot(Frozen):
         """All states in document order, with their names and paths."""
         yield from _walk(self.states, ("states",))
 
-    def scopes(self) -> Iterator[Mapping[str, AnyState]]:
-        """The states that stand side by side: of the plot, of each composite and region; transitions stay in one."""
-        yield self.states
+    def scopes(self) -> Iterator[Scope]:
+        """What holds states side by side: the plot, each composite and region; transitions stay in one."""
+        yield self
         for _, state, _ in self.walk():
             if isinstance(state, CompositeState):
-                yield state.states
+                yield state
             elif isinstance(state, OrthogonalState):
-                for region in state.regions.values():
-                    yield region.states
+                yield from state.regions.values()
+
+    def within(self, path: Path) -> set[str]:
+        """The names of the states below the part at `path`."""
+        return {name for name, _, other in self.walk() if other[: len(path)] == path and other != path}
 
     def state(self, name: str) -> AnyState:
         """The state of that name anywhere in the plot.

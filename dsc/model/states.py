@@ -28,9 +28,9 @@ class State(Source):
     """A simple state: a configuration of the skill layer, set in entry and reverted by exit (S0.15).
 
     Attributes:
-        entry, exit: external actions; in profile `scxml` internal ones too.
-        on_break: run in place of `exit` when the state is interrupted: left by a transition that is not its own
-            (S2.3). None means that `exit` runs then too.
+        entry, exit, on_break: external actions; in profile `scxml` internal ones too. `on_break` runs in place of
+            `exit` when the state is interrupted: left by a transition that is not its own (S2.3). If it is empty,
+            `exit` runs then too.
         at_least: seconds for which the state's own transitions wait (S3.1); an event that one of them would take
             is kept and offered again when the time has passed. The upper bound is `after`.
         on: event -> transitions, tried in order; `done` is the completion of the state's content.
@@ -47,6 +47,12 @@ class State(Source):
     after: TimedTransitions = ()
     every: CyclicTransitions = ()
     always: Transitions = ()
+
+    def blocks(self) -> Iterator[tuple[str, Actions]]:
+        """Its actions, by the keys under which they stand."""
+        yield "entry", self.entry
+        yield "exit", self.exit
+        yield "on_break", self.on_break
 
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
         """Every outgoing transition, with its path such as `("on", "grasped", 0)` and the label of its trigger."""

@@ -76,8 +76,10 @@ def _message(details: ErrorDetails) -> str:
 
 
 def _in_yaml(value: Any) -> str:
-    """The value as people write it: `true` and `null`, not Python's words."""
-    return {True: "true", False: "false", None: "nothing"}[value] if isinstance(value, bool | None) else repr(value)
+    """The value as people write it: `true`, `null` and `[]`, not Python's words."""
+    if isinstance(value, bool | None):
+        return {True: "true", False: "false", None: "nothing"}[value]
+    return repr(list(value) if isinstance(value, tuple) else value)
 
 
 def _said_by(error: ValueError) -> str:
@@ -104,9 +106,12 @@ def _follow(loc: Location, data: Any, schema: _Schema) -> tuple[FormPath, list[_
             continue
         if isinstance(data, list):
             data = dict(enumerate(data))
-        if isinstance(data, Mapping) and element in data:
-            data = data[element]
-            path.append(element)
+        # The model keeps the keys of cases as text; in the file they may be numbers and truth values.
+        for key in data if isinstance(data, Mapping) else ():
+            if element in {key, _in_yaml(key)}:
+                data = data[key]
+                path.append(key)
+                break
         nodes = [inner for node in nodes for inner in _into(node, element, schema)] or nodes
     return tuple(path), [form for node in nodes for form in _alternatives(node, schema)]
 

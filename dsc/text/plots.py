@@ -45,15 +45,6 @@ def plot_to_yaml(plot: ActionPlot) -> str:
     return dump(_short(plot.to_form()))
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of plot files, for editors."""
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "action plot",
-        **ActionPlot.model_json_schema(by_alias=True),
-    }
-
-
 _ORDER = (
     "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs",
     "receives", "emits", "seconds", "set", "switch", "to", "pass", "when", "of", "trigger", "use", "dynamic",

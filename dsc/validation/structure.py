@@ -12,13 +12,16 @@ from dsc.model.states import (
     AnyState,
     CompositeState,
     DynamicState,
-    HistoryState,
     OrthogonalState,
     Region,
     State,
     SubmachineState,
 )
+from dsc.model.transitions import Source
+from dsc.validation.connectors import check_connectors
+from dsc.validation.history import check_history
 from dsc.validation.profile import check_profile
+from dsc.validation.timing import check_timing
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 
 RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
@@ -28,6 +31,9 @@ RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
     yield from check_profile(plot)
+    yield from check_connectors(plot)
+    yield from check_history(plot)
+    yield from check_timing(plot)
     yield from _scope(plot, plot, ())
     names = {name for name, _, _ in plot.walk()}
     for name, state, path in plot.walk():
@@ -39,8 +45,6 @@ def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
         yield from _uses(plot, state, path, library)
         if plot.profile == "dsc":
             yield from _dead_end(plot, name, state, path)
-        if isinstance(state, HistoryState):
-            yield from _history(plot, state, path)
     yield from _rules(plot, names, library)
     if plot.profile == "scxml":
         yield from _tables(plot)
@@ -60,7 +64,7 @@ def _tables(plot: ActionPlot) -> Iterator[Finding]:
 def _scope(
     plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path
 ) -> Iterator[Finding]:
-    valid = _within(plot, path) if plot.profile == "scxml" else set(scope.states)
+    valid = plot.within(path) if plot.profile == "scxml" else set(scope.states)
     if scope.initial is not None and scope.initial not in valid:
         error = UnknownNameError(
             f"there is no state '{scope.initial}' to begin with",
@@ -68,11 +72,11 @@ def _scope(
         )  # fmt: skip
         yield Finding(error, "initial")
     for name, state in scope.states.items():
-        if isinstance(state, State):
+        if isinstance(state, Source):
             yield from _targets(plot, state, (*path, "states", name), scope.states)
 
 
-def _targets(plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState]) -> Iterator[Finding]:
+def _targets(plot: ActionPlot, state: Source, path: Path, siblings: Mapping[str, AnyState]) -> Iterator[Finding]:
     everywhere = {name for name, _, _ in plot.walk()}
     for inside, _, transition in state.placed_transitions():
         place = plot.place((*path, *inside, "to"))
@@ -93,22 +97,6 @@ def _target(
                 valid=siblings if plot.profile == "dsc" else everywhere,
             )
             yield Finding(missing, "target")
-
-
-def _within(plot: ActionPlot, path: Path) -> set[str]:
-    return {name for name, _, other in plot.walk() if other[: len(path)] == path and other != path}
-
-
-def _history(plot: ActionPlot, state: HistoryState, path: Path) -> Iterator[Finding]:
-    """What a history leads to is inside the state that the history belongs to (SCXML 3.10)."""
-    around = path[:-2]
-    valid = _within(plot, around)
-    if state.target not in valid:
-        error = UnknownNameError(
-            f"there is no state '{state.target}' beside the history", place=plot.place((*path, "to")),
-            found=state.target, valid=valid,
-        )  # fmt: skip
-        yield Finding(error, "target")
 
 
 def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> Iterator[Finding]:

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import outcomes_of
 from dsc.errors import Finding
-from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED
+from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED, TIMERS
 from dsc.model.actions import Trigger
-from dsc.model.plot import ActionPlot, Path
+from dsc.model.connectors import Connector
+from dsc.model.plot import ActionPlot, Path, initial_of
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -19,6 +20,7 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
+from dsc.model.transitions import Source
 from dsc.skills import SkillSignature
 from dsc.validation.structure import RESPONSES, around
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
@@ -42,6 +44,8 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
     for name, state, path in plot.walk():
         if isinstance(state, FinalState):
             yield from _final(plot, state, path)
+        if isinstance(state, Source) and plot.profile == "dsc":
+            yield from _emissions(plot, state, path)
         if not isinstance(state, State):
             continue
         handled = _handled([wired[name], *around(plot, path)])
@@ -50,7 +54,6 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
             yield from _completion(plot, name, state, wired[name], path, library)
             yield from _known_events(plot, state, path, library, skills)
-            yield from _emissions(plot, state, path)
 
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:
@@ -72,7 +75,7 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
     for number, rule in enumerate(plot.rules):
-        for siblings in plot.scopes():
+        for siblings in (scope.states for scope in plot.scopes()):
             for name, state in siblings.items():
                 answers = (not rule.of or name in rule.of) and rule.on in outcomes_of(state, library)
                 if answers and rule.do.then not in RESPONSES and rule.do.then not in siblings:
@@ -172,13 +175,25 @@ def _ends_silently(plot: ActionPlot | None) -> bool:
     """Whether the plot can reach a top-level final state without firing a declared outcome."""
     if plot is None:
         return True
-    silent = {name for name, s in plot.states.items() if isinstance(s, FinalState) and s.emit is None}
-    return any(
-        transition.target in silent and not set(transition.emitted) & set(plot.emits)
-        for state in plot.states.values()
-        if isinstance(state, State)
-        for _, transition in state.transitions()
-    )
+    waiting = {initial_of(plot)} | {
+        target for state in plot.states.values() if isinstance(state, State) for target in _silent_ways(plot, state)
+    }
+    seen: set[str] = set()
+    while waiting:  # connectors are passed through; what the way to them has fired, they need not fire again
+        name = waiting.pop()
+        seen.add(name)
+        reached = plot.states.get(name)
+        if isinstance(reached, FinalState) and reached.emit is None:
+            return True
+        if isinstance(reached, Connector):
+            waiting |= _silent_ways(plot, reached) - seen
+    return False
+
+
+def _silent_ways(plot: ActionPlot, source: Source) -> set[str]:
+    """Where transitions lead that fire no declared outcome."""
+    silent = (one for _, one in source.transitions() if not set(one.emitted) & set(plot.emits))
+    return {transition.target for transition in silent if transition.target is not None}
 
 
 def _known_events(
@@ -186,7 +201,7 @@ def _known_events(
 ) -> Iterator[Finding]:
     if not isinstance(state, State) or (isinstance(state, SubmachineState) and state.use.startswith("?")):
         return
-    known = RESERVED | set(plot.receives) | _local_events(plot)
+    known = RESERVED - TIMERS | set(plot.receives) | _local_events(plot)
     for _, inner, inner_path in plot.walk():
         if inner_path[: len(path)] == path:
             known = known | set(outcomes_of(inner, library)) | _skill_events(inner, skills)
@@ -202,8 +217,8 @@ def _known_events(
 
 
 def _local_events(plot: ActionPlot) -> set[str]:
-    states = [state for _, state, _ in plot.walk() if isinstance(state, State)]
-    return {event for state in states for _, transition in state.transitions() for event in transition.emitted}
+    sources = [state for _, state, _ in plot.walk() if isinstance(state, Source)]
+    return {event for source in sources for _, transition in source.transitions() for event in transition.emitted}
 
 
 def _skill_events(state: AnyState, skills: Skills) -> set[str]:
@@ -213,11 +228,9 @@ def _skill_events(state: AnyState, skills: Skills) -> set[str]:
     return {t.names.get(event, event) for t in triggers for event in skills[t.trigger].outcomes}
 
 
-def _emissions(plot: ActionPlot, state: AnyState, path: Path) -> Iterator[Finding]:
-    if not isinstance(state, State):
-        return
+def _emissions(plot: ActionPlot, source: Source, path: Path) -> Iterator[Finding]:
     listened = {event for _, s, _ in plot.walk() if isinstance(s, State) for event in s.on}
-    for inside, _, transition in state.placed_transitions():
+    for inside, _, transition in source.placed_transitions():
         for fired in transition.emitted:
             here = (*path, *inside, "emit")
             if fired in RESERVED and fired not in plot.emits:
