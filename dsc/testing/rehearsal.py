@@ -1,0 +1,113 @@
+"""A whole run of a plot without a robot: scripted skills, simulated time, everything that happened at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.engine.steps import Step
+from dsc.events import Event
+from dsc.model.plot import ActionPlot
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.skills import Component
+from dsc.testing.scripted import Call, Replies, ScriptedSkills
+from dsc.testing.worlds import change_of, world
+from dsc.trace import Record, Trace
+from knowledge_base.facts import Delta
+from knowledge_base.store import KnowledgeBase
+
+SOMEBODY = "somebody"
+"""Author of the changes that a test hands in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsal:
+    """What happened.
+
+    Attributes:
+        end: how the run ended.
+        seconds: how long it took, in simulated time.
+        steps: all macrosteps in which something came or happened; see `predicates`.
+        calls: the calls of scripted skills, in order.
+        records: the trace.
+        knowledge: what is known at the end.
+    """
+
+    end: RunEnd
+    seconds: float
+    steps: tuple[Step, ...]
+    calls: tuple[Call, ...]
+    records: tuple[Record, ...]
+    knowledge: KnowledgeBase
+
+    @property
+    def finished(self) -> bool:
+        """Whether the plot reached its final state."""
+        return self.end.finished
+
+    @property
+    def problem(self) -> str | None:
+        """Why it did not, or what went wrong in its last step."""
+        return self.end.problem
+
+    @property
+    def emitted(self) -> tuple[Event, ...]:
+        """The plot's outcome events, in order."""
+        return self.end.emitted
+
+
+def rehearse(
+    plots: Iterable[ActionPlot],
+    plot: str,
+    arguments: Mapping[str, Any] | None = None,
+    *,
+    skills: Mapping[str, Replies] | None = None,
+    like: Iterable[Component] = (),
+    components: Iterable[Component] = (),
+    knowledge: KnowledgeBase | None = None,
+    events: Iterable[tuple[float, Event | str]] = (),
+    changes: Iterable[tuple[float, Delta | str]] = (),
+) -> Rehearsal:
+    """Run a plot to its end in simulated time; it takes no real time to speak of.
+
+    Args:
+        plots: the library, or its plots.
+        plot: the name of the one to run.
+        arguments: values for its parameters.
+        skills: what scripted skills answer; see `ScriptedSkills`.
+        like: components whose signatures the scripted skills keep to.
+        components: others to be deployed, as they are.
+        knowledge: the world model, which the run changes; see `world`. An empty one if left out.
+        events: what comes from outside, each with the second at which it does; a name alone has no attributes.
+        changes: how others change the knowledge, each with the second: a change, or a PDDL effect on the world at
+            the start.
+
+    Raises:
+        InputError: the plot is unknown, an argument is wrong, an event or change cannot be handed in, or the
+            script does not fit: a skill that was called without an answer, an answer that is none of the skill's.
+    """
+    known = knowledge if knowledge is not None else world()
+    scripted = ScriptedSkills(known, skills or {}, like)
+    steps: list[Step] = []
+    records: list[Record] = []
+
+    async def run() -> tuple[RunEnd, float]:
+        clock = LoopClock()
+        trace = Trace(clock.now)
+        trace.listen(records.append)
+        deployed = [*scripted.components, *components]
+        sequencer = Sequencer(Library(plots), known, deployed, clock, trace)
+        sequencer.listen(steps.append)
+        for second, event in events:
+            sequencer.post(Event(event) if isinstance(event, str) else event, after=second)
+        for second, change in changes:
+            sequencer.change(change_of(change, known), SOMEBODY, after=second)
+        end = await sequencer.run(plot, arguments)
+        return end, clock.now()
+
+    end, seconds = run_simulated(run())
+    scripted.check()
+    return Rehearsal(end, seconds, tuple(steps), tuple(scripted.calls), tuple(records), known)
