@@ -14,14 +14,16 @@ _ROLE = ("when", "implements", "effects", "confirm")
 def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
     """The substitute under the original's name, with the original's part where it names none of its own.
 
-    That part is the condition as a candidate and the planning action with what is said about its effects.
+    That part is the condition as a candidate and the planning action with what is said about its effects. It still
+    declares every outcome of the original, so that what holders have wired is not found to be dead.
 
     Raises:
         SchemaError: a holder of the original could not hold the substitute.
     """
     _check(original, substitute)
     role = {key: getattr(original, key) for key in _ROLE if key not in substitute.model_fields_set}
-    return substitute.model_copy(update={"name": original.name, **role})
+    emits = {**original.emits, **substitute.emits}
+    return substitute.model_copy(update={"name": original.name, "emits": emits, **role})
 
 
 def _check(original: ActionPlot, substitute: ActionPlot) -> None:

@@ -69,8 +69,8 @@ class Coverage:
     @property
     def ratio(self) -> float:
         """The part of everything that was reached, from 0 to 1; 1 if there is nothing."""
-        total = sum(map(len, self._items.values()))
-        return 1.0 - len(self.missing()) / total if total else 1.0
+        reached, total = self._total()
+        return reached / total if total else 1.0
 
     def report(self) -> str:
         """A table of plots, and under each one a line with place for everything that was missed."""
@@ -85,8 +85,7 @@ class Coverage:
             at_least: from 0 to 1.
         """
         if self.ratio < at_least:
-            total = sum(map(len, self._items.values()))
-            reached = total - len(self.missing())
+            reached, total = self._total()
             raise AssertionError(
                 f"{reached} of {total} ({self.ratio:.1%}) covered, at least {at_least:.1%} wanted\n{self.report()}"
             )
@@ -135,6 +134,10 @@ class Coverage:
     def _count(self, plot: str | None, key: Key) -> None:
         if plot is not None and key in self._items[plot]:
             self._reached.add((plot, key))
+
+    def _total(self) -> tuple[int, int]:
+        total = sum(map(len, self._items.values()))
+        return total - len(self.missing()), total
 
     def _names(self, plot: str | None) -> Iterable[str]:
         if plot is None:
