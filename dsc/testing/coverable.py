@@ -60,7 +60,7 @@ def items_of(plot: ActionPlot) -> Iterator[Item]:
         if isinstance(state, State):
             for at, trigger, transition in state.placed_transitions():
                 here = (*path, *at)
-                goal = "stays" if transition.target is None else f"-> {transition.target}"
+                goal = "(stays)" if transition.target is None else f"-> {transition.target}"
                 text = f"'{name}' never took {trigger} {goal}"
                 yield Item(("transition", name, at), text, here, plot.place(here))
     for number, rule in enumerate(plot.rules):

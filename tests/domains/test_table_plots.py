@@ -8,7 +8,20 @@ from small_table import make_world
 from domains.clean_up_table.deployment import HOME, plots
 from domains.clean_up_table.skills import Arm, Base, Camera, Voice
 from dsc import Event, Library
-from dsc.testing import Answer, Coverage, DryRun, chose, configured, ends_with, entered, rehearse, switched, told, took, world
+from dsc.testing import (
+    Answer,
+    Coverage,
+    DryRun,
+    chose,
+    configured,
+    ends_with,
+    entered,
+    rehearse,
+    switched,
+    told,
+    took,
+    world,
+)
 
 LIBRARY = Library(plots())
 ROBOT = (Base(make_world()), Arm(make_world()), Camera(make_world(), list), Voice(make_world()))

@@ -35,7 +35,7 @@ def test_one_run_reaches_what_it_went_through():
     coverage.add(*fetch().steps)
     assert coverage.count("pick", "state") == (2, 3)
     assert coverage.count("pick", "transition") == (1, 3)
-    assert missing(coverage, "pick") == ["'grasp' never took felt stays", "'grasp' never took slipped -> dropped", "state 'dropped' was never entered"]
+    assert missing(coverage, "pick") == ["'grasp' never took felt (stays)", "'grasp' never took slipped -> dropped", "state 'dropped' was never entered"]
     assert missing(coverage, "fetch") == [
         "'work' never took stop -> ended",
         "state 'without' was never entered",

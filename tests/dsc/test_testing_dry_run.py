@@ -55,7 +55,7 @@ def test_an_answer_is_for_the_state_that_asked_and_goes_by_the_charts_name():
 
 def test_a_skill_that_does_not_run_cannot_answer():
     run = fetch()
-    with pytest.raises(UnknownNameError, match="no skill 'base.drvie' is running; did you mean 'base.drive'"):
+    with pytest.raises(UnknownNameError, match=r"no skill 'base.drvie' is running; did you mean 'base.drive'"):
         run.answer("base.drvie", "arrived")
     run.send("stop")
     with pytest.raises(UnknownNameError):

@@ -195,7 +195,7 @@ def test_a_script_that_is_not_like_the_skills_is_refused(skills, said):
 
 @pytest.mark.parametrize("name", ["grasp", ".grasp", "arm."])
 def test_a_script_names_components_and_skills(name):
-    with pytest.raises(ParseError, match="COMPONENT.SKILL"):
+    with pytest.raises(ParseError, match=r"COMPONENT\.SKILL"):
         fetch({name: "grasped"})
 
 
@@ -213,7 +213,7 @@ def test_where_the_script_and_the_run_do_not_fit_the_rehearsal_says_so(skills, s
 
 
 def test_an_answer_made_on_the_spot_is_held_against_the_skill_too():
-    with pytest.raises(UnknownNameError, match="skill 'arm.grasp' has no outcome 'grabbed'"):
+    with pytest.raises(UnknownNameError, match=r"skill 'arm.grasp' has no outcome 'grabbed'"):
         fetch({"base.drive": "arrived", "arm.grasp": lambda _call: "grabbed"}, like=[Arm(), Base()])
 
 
