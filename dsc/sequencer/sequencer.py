@@ -176,6 +176,8 @@ class Sequencer:
 
     def _leave(self, progress: _Progress) -> None:
         """Wherever the run ends, exit actions put the components at rest; a finished machine has nothing to leave."""
+        if self.machine.state.root is None:
+            return
         try:
             self._commit(self.machine.leave(self._situation()), progress)
         except InputError as error:
@@ -241,9 +243,8 @@ class Sequencer:
 
     def _commit(self, step: Step, progress: _Progress) -> None:
         """First what the chart told becomes knowledge, then actions leave."""
-        if step.moved or step.event is not None:  # nothing is left to leave, or the world changed to no effect
-            for listener in self._listeners:
-                listener(step)
+        for listener in self._listeners:
+            listener(step)
         self._tracer.step(step)
         self._tracer.decisions(step)
         self._apply(step.knowledge, CHART)

@@ -117,6 +117,10 @@ class DryRun:
         self.knowledge.apply(change_of(what, self.knowledge), author)
         return self._send(None)
 
+    def leave(self) -> Step:
+        """The run is ended from outside: everything active is left, and its exit actions put components at rest."""
+        return self._keep(self.machine.leave(self._situation()))
+
     def advance(self, seconds: float) -> tuple[Step, ...]:
         """Let time pass; what is due meanwhile comes in order, a skill that has not answered in time as `timed_out`.
 

@@ -1,6 +1,8 @@
 """Questions about a step, or about all steps of a run, that read well behind `assert`.
 
-States are named by their name or by their path from the outermost plot, e.g. `clear/execute/step_2`.
+States are named by their name or by their path from the outermost plot, e.g. `clear/execute/step_2`. Of a run that
+knows its library (`Rehearsal`, `DryRun`), a question about a state, trigger, rule or skill that no plot has is an
+`UnknownNameError`: the answer could only be no.
 """
 
 from __future__ import annotations
@@ -9,6 +11,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Protocol
 
 from dsc.engine.steps import Microstep, SetParameter, Start, Step, SwitchMode, Taken
+from dsc.model.plot import ActionPlot
+from dsc.testing.vocabulary import Vocabulary
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect
@@ -17,7 +21,12 @@ from knowledge_base.language.parser import parse_effect
 
 
 class HasSteps(Protocol):
-    """A run that keeps its steps: a `Rehearsal`, a `DryRun`."""
+    """A run that keeps its steps and its plots: a `Rehearsal`, a `DryRun`."""
+
+    @property
+    def library(self) -> Iterable[ActionPlot]:
+        """All plots that it may have used."""
+        ...
 
     @property
     def steps(self) -> Sequence[Step]:
@@ -31,11 +40,13 @@ Run = Step | Iterable[Step] | HasSteps
 
 def entered(run: Run, state: str) -> bool:
     """Whether the state was entered."""
+    _check(run, state=state)
     return any(step.entered(state) for step in _steps(run))
 
 
 def exited(run: Run, state: str) -> bool:
     """Whether the state was left."""
+    _check(run, state=state)
     return any(step.exited(state) for step in _steps(run))
 
 
@@ -61,6 +72,8 @@ def took(
         target: the state it leads to.
         rule: label of the contingency rule it comes from, e.g. `no_path: wait, retry`.
     """
+    for state in (source, target):
+        _check(run, state=state, trigger=trigger, rule=rule)
     return any(
         (source is None or _named(taken.source, source))
         and (trigger is None or taken.trigger == trigger)
@@ -72,6 +85,7 @@ def took(
 
 def consumed(run: Run, event: str, /, **attributes: Any) -> bool:
     """Whether a transition took such an event, from outside or fired within; attributes left out may be anything."""
+    _check(run, trigger=event)
     return any(_is_event(micro.event, event, attributes) for micro in _microsteps(run) if micro.taken)
 
 
@@ -87,6 +101,7 @@ def emitted(run: Run, event: str, /, **attributes: Any) -> bool:
 
 def started(run: Run, skill: str, /, **arguments: Any) -> bool:
     """Whether the skill (`component.skill`) was started; arguments left out may be anything."""
+    _check(run, skill=skill)
     return any(
         f"{output.component}.{output.skill}" == skill and _has(output.arguments, arguments)
         for output in _outputs(run)
@@ -114,6 +129,7 @@ def switched(run: Run, component: str, mode: str) -> bool:
 
 def chose(run: Run, state: str, plot: str | None) -> bool:
     """Whether a dynamic state chose the plot; `None`: no candidate fitted."""
+    _check(run, state=state)
     return any(
         _named(made.state, state) and made.decision.chosen == plot and not made.decision.satisfied
         for step in _steps(run)
@@ -131,6 +147,13 @@ def told(run: Run, what: str) -> bool:
     """
     wanted = tuple(_parts(parse_effect(what)))
     return any(all(_tells(step, part) for part in wanted) for step in _steps(run))
+
+
+def _check(run: Run, **names: str | None) -> None:
+    if isinstance(run, Step | Iterable):
+        return
+    bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)  # with what rules and planners added
+    Vocabulary([*run.library, *bound]).check(**names)
 
 
 def _steps(run: Run) -> Iterable[Step]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,11 +17,16 @@ from dsc.skills import Component
 from dsc.testing.scripted import Call, Replies, ScriptedSkills
 from dsc.testing.worlds import change_of, world
 from dsc.trace import Record, Trace
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
 SOMEBODY = "somebody"
 """Author of the changes that a test hands in."""
+A_DAY = 86400.0
+"""Seconds after which a rehearsal ends if nothing else is said: none goes on for ever."""
+MOST_STEPS = 100_000
+"""Nor does one in which time stands still."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +34,16 @@ class Rehearsal:
     """What happened.
 
     Attributes:
+        library: the plots that could be used.
         end: how the run ended.
         seconds: how long it took, in simulated time.
-        steps: all macrosteps in which something came or happened; see `predicates`.
+        steps: all macrosteps; see `predicates`.
         calls: the calls of scripted skills, in order.
         records: the trace.
         knowledge: what is known at the end.
     """
 
+    library: Library
     end: RunEnd
     seconds: float
     steps: tuple[Step, ...]
@@ -70,6 +78,7 @@ def rehearse(
     knowledge: KnowledgeBase | None = None,
     events: Iterable[tuple[float, Event | str]] = (),
     changes: Iterable[tuple[float, Delta | str]] = (),
+    until: float = A_DAY,
 ) -> Rehearsal:
     """Run a plot to its end in simulated time; it takes no real time to speak of.
 
@@ -84,6 +93,7 @@ def rehearse(
         events: what comes from outside, each with the second at which it does; a name alone has no attributes.
         changes: how others change the knowledge, each with the second: a change, or a PDDL effect on the world at
             the start.
+        until: seconds after which the run is ended, with that as its problem.
 
     Raises:
         InputError: the plot is unknown, an argument is wrong, an event or change cannot be handed in, or the
@@ -94,20 +104,31 @@ def rehearse(
     steps: list[Step] = []
     records: list[Record] = []
 
+    library = Library(plots)
+
+    def keep(step: Step) -> None:
+        steps.append(step)
+        if len(steps) > MOST_STEPS:
+            raise InputError(f"it still runs after {MOST_STEPS} steps")
+
     async def run() -> tuple[RunEnd, float]:
         clock = LoopClock()
         trace = Trace(clock.now)
         trace.listen(records.append)
-        deployed = [*scripted.components, *components]
-        sequencer = Sequencer(Library(plots), known, deployed, clock, trace)
-        sequencer.listen(steps.append)
+        sequencer = Sequencer(library, known, [*scripted.components, *components], clock, trace)
+        sequencer.listen(keep)
         for second, event in events:
             sequencer.post(Event(event) if isinstance(event, str) else event, after=second)
         for second, change in changes:
             sequencer.change(change_of(change, known), SOMEBODY, after=second)
-        end = await sequencer.run(plot, arguments)
+        try:
+            async with asyncio.timeout(until):
+                end = await sequencer.run(plot, arguments)
+        except TimeoutError:
+            emitted = tuple(event for step in steps for event in step.emitted)
+            end = RunEnd(finished=False, emitted=emitted, problem=f"it still runs after {until:g} s")
         return end, clock.now()
 
     end, seconds = run_simulated(run())
     scripted.check()
-    return Rehearsal(end, seconds, tuple(steps), tuple(scripted.calls), tuple(records), known)
+    return Rehearsal(library, end, seconds, tuple(steps), tuple(scripted.calls), tuple(records), known)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dsc import Event
-from dsc.testing import Answer, DryRun, consumed, emitted, entered, rehearse, took, world
+from dsc.testing import Answer, DryRun, consumed, emitted, entered, rehearse, switched, took, world
 from knowledge_base import InputError, UnknownNameError
 
 
@@ -67,6 +67,14 @@ def test_leaving_a_state_ends_its_skills_and_timers():
     assert run.send("stop").handled
     assert running(run) == []
     assert run.advance(1000) == ()
+
+
+def test_a_run_that_is_ended_from_outside_leaves_everything_in_order():
+    run = fetch()
+    step = run.leave()
+    assert switched(step, "base", "neutral")
+    assert step.microsteps[0].exited == ("go/driving", "go", "work")
+    assert (run.active, running(run), run.finished) == ((), [], False)
 
 
 def test_timeouts_come_when_they_are_due_and_in_order():

@@ -25,7 +25,7 @@ from dsc.testing import (
     trail,
     world,
 )
-from knowledge_base import InputError
+from knowledge_base import InputError, UnknownNameError
 
 SLIPPED = Answer("slipped", {"item": "cup"})
 
@@ -40,7 +40,6 @@ def run():
 def test_states(run):
     assert entered(run, "go/driving")
     assert entered(run, "driving")
-    assert not entered(run, "riving")
     assert not entered(run, "take/driving")
     assert exited(run, "take/grasp")
     assert not exited(run, "without")
@@ -71,7 +70,7 @@ def test_events(run):
     assert not consumed(run, "slipped", itme="cup")
     assert ignored(run, "hello")
     assert not ignored(run, "slipped")
-    assert not consumed(run, "hello")
+    assert not consumed(run.steps, "hello")
     assert emitted(run, "fetched", item="cup")
     assert not emitted(run, "fetched", item="can")
     assert not emitted(run, "slipped")  # an outcome of a plot further in
@@ -80,7 +79,6 @@ def test_events(run):
 def test_actions(run):
     assert started(run, "arm.grasp", item="cup")
     assert not started(run, "arm.grasp", item="can")
-    assert not started(run, "grasp")
     assert configured(run, "base.speed", 2)
     assert not configured(run, "base.speed", 3)
     assert switched(run, "base", "neutral")
@@ -100,6 +98,39 @@ def test_knowledge(run):
 def test_what_nobody_can_be_told_is_an_error(run, what):
     with pytest.raises(InputError):
         told(run, what)
+
+
+@pytest.mark.parametrize(
+    ("question", "said"),
+    [
+        (lambda run: entered(run, "drivng"), "no plot of this run has a state 'drivng'; did you mean 'driving'"),
+        (lambda run: exited(run, "tak/grasp"), "no plot of this run has a state 'tak'; did you mean 'take'"),
+        (lambda run: took(run, "takee"), "a state 'takee'; did you mean 'take'"),
+        (lambda run: took(run, target="takn"), "a state 'takn'; did you mean 'taken'"),
+        (lambda run: took(run, trigger="slip"), "a transition on 'slip'; did you mean 'slipped'"),
+        (lambda run: took(run, rule="no_path: retry"), "a rule 'no_path: retry'; did you mean 'no_path: wait, retry'"),
+        (lambda run: consumed(run, "arived"), "a transition on 'arived'; did you mean 'arrived'"),
+        (lambda run: started(run, "arm.grap"), "a skill 'arm.grap'; did you mean 'arm.grasp'"),
+        (lambda run: chose(run, "goo", None), "a state 'goo'; did you mean 'go'"),
+    ],
+)
+def test_a_question_about_what_cannot_happen_is_an_error_and_not_a_no(run, question, said):
+    with pytest.raises(UnknownNameError, match=said):
+        question(run)
+    assert not question(run.steps)  # bare steps do not know what else could have happened
+
+
+def test_what_rules_added_can_be_asked_about(run):
+    assert entered(run, "go_no_path_0_wait/pause")
+    assert not took(run, "go_no_path_0_wait", target="without")
+
+
+def test_events_that_match_by_prefix_are_not_known_beforehand():
+    charted = plot("{plot: p, profile: scxml, states: {a: {on: {go.*: e}}, e: {final: true}}}")
+    going = DryRun([charted], "p")
+    going.send("go.left")
+    assert consumed(going, "go.left")
+    assert not consumed(going, "go.right")
 
 
 def test_one_step_several_and_a_run_can_be_asked(run):

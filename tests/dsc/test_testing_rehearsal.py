@@ -9,7 +9,7 @@ from dsc_charts import plot
 from fetching import PLOTS, SCHEMA, Arm, Base
 
 from dsc import Event, Library
-from dsc.testing import Answer, Call, entered, rehearse, started, took, trail, world
+from dsc.testing import Answer, Call, entered, exited, rehearsal, rehearse, started, took, trail, world
 from knowledge_base import Delta, InputError, ParseError, UnknownNameError, fact
 
 SLIPPED = Answer("slipped", {"item": "cup"}, after=2)
@@ -128,6 +128,21 @@ def test_components_of_ones_own_stand_beside_scripted_ones():
     assert started(run, "base.drive", to="shelf")
 
 
+ROUND = "{plot: p, states: {a: {entry: {trigger: arm.turn}, on: {turned: a}}, e: {final: true}}, emits: {turn: }}"
+
+
+def test_no_rehearsal_goes_on_for_ever(monkeypatch):
+    turning = plot(ROUND.replace("turned: a", "turned: {to: a, emit: turn}"))
+    run = rehearse([turning], "p", skills={"arm.turn": Answer("turned", after=10)}, until=35)
+    assert (run.finished, run.problem, run.seconds) == (False, "it still runs after 35 s", 35)
+    assert [event.name for event in run.emitted] == ["turn"] * 3
+    assert exited(run.steps[-1], "a")  # and what it had started was ended
+    day = rehearse([turning], "p", skills={"arm.turn": Answer("turned", after=200)})
+    assert day.problem == "it still runs after 86400 s"
+    monkeypatch.setattr(rehearsal, "MOST_STEPS", 50)
+    assert rehearse([turning], "p", skills={"arm.turn": Answer("turned", after=0)}).problem == "it still runs after 50 steps"
+
+
 # -- what comes from outside -------------------------------------------------------------------------------
 
 
@@ -159,7 +174,7 @@ def test_others_change_the_knowledge():
     run = rehearse([waiting], "p", knowledge=world(SCHEMA, facts="(near shelf)"), changes=changes)
     assert run.finished
     assert run.seconds == pytest.approx(8)
-    assert len(run.steps) == 2  # the start, and the change that mattered
+    assert [step.moved for step in run.steps] == [True, False, True]
 
 
 @pytest.mark.parametrize(
