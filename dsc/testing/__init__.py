@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from dsc.testing.answers import Answer as Answer
+    from dsc.testing.answers import Call as Call
     from dsc.testing.coverage import Coverage as Coverage
     from dsc.testing.dry_run import DryRun as DryRun
     from dsc.testing.predicates import chose as chose
@@ -26,8 +28,6 @@ if TYPE_CHECKING:
     from dsc.testing.predicates import trail as trail
     from dsc.testing.rehearsal import Rehearsal as Rehearsal
     from dsc.testing.rehearsal import rehearse as rehearse
-    from dsc.testing.scripted import Answer as Answer
-    from dsc.testing.scripted import Call as Call
     from dsc.testing.scripted import ScriptedSkills as ScriptedSkills
     from dsc.testing.stubs import ends_with as ends_with
     from dsc.testing.worlds import world as world
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
     {
-        "Answer": "scripted",
-        "Call": "scripted",
+        "Answer": "answers",
+        "Call": "answers",
         "Coverage": "coverage",
         "DryRun": "dry_run",
         "Rehearsal": "rehearsal",

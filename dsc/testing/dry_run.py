@@ -101,6 +101,9 @@ class DryRun:
             attributes: the event's attributes.
             observed: what is known with it: a change, or a PDDL effect in which `?name` stands for an argument.
 
+        Returns:
+            The step; where it is not `handled`, a sequencer would end the run.
+
         Raises:
             UnknownNameError: no such skill is running.
         """

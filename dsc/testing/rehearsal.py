@@ -14,7 +14,8 @@ from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.skills import Component
-from dsc.testing.scripted import Call, Replies, ScriptedSkills
+from dsc.testing.answers import Call, Replies
+from dsc.testing.scripted import ScriptedSkills
 from dsc.testing.worlds import change_of, world
 from dsc.trace import Record, Trace
 from knowledge_base.errors import InputError
@@ -98,6 +99,7 @@ def rehearse(
     Raises:
         InputError: the plot is unknown, an argument is wrong, an event or change cannot be handed in, or the
             script does not fit: a skill that was called without an answer, an answer that is none of the skill's.
+        Exception: what a function of the script raised, e.g. a failed assertion about its call.
     """
     known = knowledge if knowledge is not None else world()
     scripted = ScriptedSkills(known, skills or {}, like)

@@ -103,6 +103,14 @@ def test_a_skill_that_does_not_answer_in_time_has_timed_out():
     assert running(run) == []
 
 
+def test_seconds_add_up_whatever_floating_point_makes_of_them():
+    run = DryRun([plot("{plot: p, states: {a: {after: {seconds: 0.8, to: e}}, e: {final: true}}}")], "p")
+    assert 0.7 + 0.1 < 0.8
+    run.advance(0.7)
+    run.advance(0.1)
+    assert run.finished
+
+
 def test_time_does_not_go_backwards():
     with pytest.raises(InputError, match="time does not go backwards: -1 s"):
         fetch().advance(-1)

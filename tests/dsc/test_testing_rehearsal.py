@@ -9,7 +9,7 @@ from dsc_charts import plot
 from fetching import PLOTS, SCHEMA, Arm, Base
 
 from dsc import Event, Library
-from dsc.testing import Answer, Call, entered, exited, rehearsal, rehearse, started, took, trail, world
+from dsc.testing import Answer, Call, consumed, entered, exited, rehearsal, rehearse, started, took, trail, world
 from knowledge_base import Delta, InputError, ParseError, UnknownNameError, fact
 
 SLIPPED = Answer("slipped", {"item": "cup"}, after=2)
@@ -230,6 +230,25 @@ def test_where_the_script_and_the_run_do_not_fit_the_rehearsal_says_so(skills, s
 def test_an_answer_made_on_the_spot_is_held_against_the_skill_too():
     with pytest.raises(UnknownNameError, match=r"skill 'arm.grasp' has no outcome 'grabbed'"):
         fetch({"base.drive": "arrived", "arm.grasp": lambda _call: "grabbed"}, like=[Arm(), Base()])
+
+
+def test_a_failed_assertion_about_a_call_fails_the_test_whatever_the_plot_makes_of_it():
+    coping = plot("{plot: p, states: {a: {entry: {trigger: arm.grasp, with: {item: cup}}, on: {grasped: e, skill_error: e}}, e: {final: true}}}")
+
+    def reply(call):
+        assert call.arguments == {"item": "can"}, "the wrong item"
+        return "grasped"
+
+    with pytest.raises(AssertionError, match="the wrong item"):
+        rehearse([coping], "p", skills={"arm.grasp": reply})
+    broken = rehearse([coping], "p", skills={"arm.grasp": InputError("broken on purpose")})
+    assert consumed(broken, "skill_error", reason="InputError: broken on purpose")
+
+
+@pytest.mark.parametrize("replies", [[None], lambda _call: None, ["grasped", 3]])
+def test_what_is_no_answer_is_refused(replies):
+    with pytest.raises(InputError, match=r"the script of 'arm.grasp' answers (None|3), which is no outcome's name"):
+        fetch({"base.drive": "arrived", "arm.grasp": replies})
 
 
 def test_a_call_that_the_real_skill_would_refuse_is_refused():
