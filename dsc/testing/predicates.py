@@ -86,7 +86,7 @@ def took(
 def consumed(run: Run, event: str, /, **attributes: Any) -> bool:
     """Whether a transition took such an event, from outside or fired within; attributes left out may be anything."""
     _check(run, trigger=event)
-    return any(_is_event(micro.event, event, attributes) for micro in _microsteps(run) if micro.taken)
+    return any(_is_event(micro.event, event, attributes) for micro in _microsteps(run))
 
 
 def ignored(run: Run, event: str, /, **attributes: Any) -> bool:

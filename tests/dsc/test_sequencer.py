@@ -5,12 +5,17 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from dsc_runs import SLOW, Arm, Ran
+from dsc_charts import plot
+from dsc_runs import SCHEMA, SLOW, Arm, Ran
 
+from dsc.dynamic.library import Library
 from dsc.events import Event
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import Outcome, skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
+from knowledge_base.store import KnowledgeBase
 
 GRASP = """
     plot: p
@@ -426,6 +431,21 @@ def test_what_is_still_to_come_when_a_run_ends_is_dropped():
     assert ran.end.finished
     assert ran.at == pytest.approx(2)
     assert [event["name"] for event in ran.of_type("event")] == ["grasped"]
+
+
+def test_what_was_still_to_come_does_not_come_in_the_next_run():
+    heard = []
+
+    async def main():
+        waits = Library([plot("{plot: p, states: {a: {after: {seconds: 3, to: e}}, e: {final: true}}}")])
+        sequencer = Sequencer(waits, KnowledgeBase(SCHEMA), [], LoopClock())
+        sequencer.listen(heard.append)
+        sequencer.post(Event("stop"), after=4)
+        await sequencer.run("p")
+        await sequencer.run("p")
+
+    run_simulated(main())
+    assert [step.event and step.event.name for step in heard] == [None, "after"] * 2
 
 
 def test_what_is_wrong_is_refused_at_once_however_late_it_would_come():

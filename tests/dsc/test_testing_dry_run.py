@@ -103,6 +103,17 @@ def test_a_skill_that_does_not_answer_in_time_has_timed_out():
     assert running(run) == []
 
 
+def test_a_skill_ends_once_also_where_its_state_goes_on():
+    text = "{plot: p, states: {a: {entry: {trigger: arm.grasp, within: 7}, on: {ok: {}, timed_out: {}}}}}"
+    answered = DryRun([plot(text)], "p")
+    assert answered.answer("arm.grasp", "ok").handled
+    assert running(answered) == []
+    assert answered.advance(10) == ()
+    late = DryRun([plot(text)], "p")
+    assert len(late.advance(10)) == 1
+    assert running(late) == []
+
+
 def test_seconds_add_up_whatever_floating_point_makes_of_them():
     run = DryRun([plot("{plot: p, states: {a: {after: {seconds: 0.8, to: e}}, e: {final: true}}}")], "p")
     assert 0.7 + 0.1 < 0.8

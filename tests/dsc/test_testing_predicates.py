@@ -53,6 +53,7 @@ def test_transitions(run):
     assert took(run, trigger="after")
     assert not took(run, "grasp", "slipped", "taken")
     assert not took(run, "go", target="go/blocked")
+    assert not took(run.steps, "rasp")  # part of a name is no name
     assert took(run, rule="no_path: wait, retry")
     assert took(run, "go", rule="no_path: wait, retry")
     assert not took(run, "take", rule="no_path: wait, retry")
