@@ -1,7 +1,8 @@
 """For pytest, where it is asked for: `pytest_plugins = ["dsc.testing.pytest_plugin"]`.
 
 With `dsc_plots = FOLDER ...` in pytest's own settings, the fixture `plot_coverage` counts for the whole session
-what tests add to it, and the summary ends with its report.
+what tests add to it, and the summary ends with its report. Workers of pytest-xdist count each for themselves, and
+nobody reports.
 """
 
 from __future__ import annotations
