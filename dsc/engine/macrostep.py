@@ -139,10 +139,9 @@ class Macrostep:
             choice = choice.follow(self._holds(frame, choice.edge, choice.condition))
         if choice is None:
             return False
-        if choice.keeps:
-            self._keep(frame, choice.keeps, event)
+        kept = bool(choice.keeps) and self._keep(frame, choice.keeps, event)
         if not choice.parts:
-            return bool(choice.keeps) and event is not None
+            return kept
         self._check_progress()
         self._execution.take(frame, choice)
         self._record.end_microstep(event, choice.taken_in(frame.compiled, frame.prefix))
@@ -152,10 +151,9 @@ class Macrostep:
         """Several plots listen: what is enabled in one may preempt what is enabled in another (SCXML 3.13)."""
         assert self._root is not None  # noqa: S101
         taken, late = select(self._root, trigger, self._guard)
-        for one in late:
-            self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event)
+        kept = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
         if not taken:
-            return bool(late) and event is not None
+            return any(kept)
         self._check_progress()
         by_frame: dict[Frame, list[Edge]] = {}
         for one in taken:
@@ -193,10 +191,12 @@ class Macrostep:
 
     # -- time --------------------------------------------------------------------------------------------
 
-    def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> None:
+    def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> bool:
         """An event that a state would take if it could be left already waits with it; a period comes again."""
-        if event is not None and event.name != EVERY:
-            frame.kept = (*frame.kept, *((state, event) for state in states))
+        if event is None or event.name == EVERY:
+            return False
+        frame.kept = (*frame.kept, *((state, event) for state in states))
+        return True
 
     def _least_time_passed(self, frame: Frame, state: str) -> bool:
         """The state can be left from now on; what it kept is offered again, before anything new."""
