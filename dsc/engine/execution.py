@@ -12,7 +12,7 @@ from dsc.engine.reaction import Entrance, Exit, Part, Reaction, initial_reaction
 from dsc.engine.situation import Decision, Situation
 from dsc.engine.state import NOTHING
 from dsc.engine.steps import Bound, Cancel, DecisionMade
-from dsc.engine.tables import Chart, CompiledPlot, Node
+from dsc.engine.tables import Chart, CompiledPlot
 from dsc.errors import RunawayError
 from dsc.events import DONE, DONE_STATE, NO_CANDIDATE, Event
 from dsc.model.states import DynamicState, SubmachineState
@@ -148,23 +148,21 @@ class Execution(Performer):
             self.act(frame, node.name, entrance.after)
         if node.timed:
             self.start_timers(frame, node, activation)
-        if node.holds_plot:
-            self._fill(frame, node, passed)
+        if isinstance(state, SubmachineState):
+            self._bind_submachine(frame, node.name, state, passed)
+        elif isinstance(state, DynamicState):
+            self._bind_dynamic(frame, node.name, state, passed)
         if entrance.emits is not None:
             self.act(frame, node.name, (entrance.emits,))
         if entrance.completes is not None:
             self._complete(frame, entrance.completes)
 
-    def _fill(self, frame: Frame, node: Node, passed: Mapping[str, Any]) -> None:
-        if isinstance(node.state, SubmachineState):
-            self._bind_submachine(frame, node.name, node.state, passed)
-        elif isinstance(node.state, DynamicState):
-            self._bind_dynamic(frame, node.name, node.state, passed)
-
     def _bind_submachine(self, frame: Frame, name: str, state: SubmachineState, passed: Mapping[str, Any]) -> None:
         try:
-            own = {key: term for key, term in state.arguments.items() if key not in passed}
-            arguments = {**self.values(frame, own), **passed}
+            arguments = passed
+            if state.arguments:
+                own = {key: term for key, term in state.arguments.items() if key not in passed}
+                arguments = {**self.values(frame, own), **passed}
             if state.use.startswith("?"):
                 compiled = self.chart.bind(frame.variables[state.use[1:]])
             else:

@@ -96,11 +96,10 @@ class Frame:
         if self.children:
             for child in self.children.values():
                 found += child.that(wanted)
-        if self.resting:
-            for host, state in self.resting.items():
-                if any(map(wanted, state.frames())):
-                    found += thaw(state, self, host).that(wanted)
-            self.resting = {host: state for host, state in self.resting.items() if host not in self.children}
+        for host, state in self.resting.items():
+            if wanted(state) or (state.children and any(map(wanted, state.frames()))):
+                self.forget(host)
+                found += thaw(state, self, host).that(wanted)
         return found
 
 
