@@ -39,6 +39,7 @@ class _Data:
         self._library = library
         self._schema = schema
         self._skills = skills
+        self._states = frozenset(name for name, _, _ in plot.walk())
         declared: dict[str, Parameter | Variable] = {**plot.parameters, **plot.variables}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
 
@@ -124,10 +125,11 @@ class _Data:
             yield from self._condition(state.goal, self._types, (*path, "goal"))
 
     def _transition(self, transition: Transition, attributes: Types | None, path: Path) -> Iterator[Finding]:
-        scope = self._scope(attributes, transition.guard)
         if transition.guard is not None:
+            scope = self._scope(attributes, transition.guard)
             yield from self._condition(transition.guard, scope, (*path, "when"))
-        yield from self._internal(transition.effect, attributes, path)
+        if transition.effect:
+            yield from self._internal(transition.effect, attributes, path)
 
     def _internal(self, actions: Iterable[Internal], attributes: Types | None, path: Path) -> Iterator[Finding]:
         for action in actions:
@@ -192,12 +194,11 @@ class _Data:
     # -- the language ------------------------------------------------------------------------------------
 
     def _condition(self, condition: Expression, scope: Types, path: Path) -> Iterator[Finding]:
-        states = {name for name, _, _ in self._plot.walk()}
         for name in asked_states(condition):
-            if name not in states:
+            if name not in self._states:
                 error = UnknownNameError(
-                    f"there is no state '{name}'", place=self._plot.place(path), found=name, valid=states
-                )
+                    f"there is no state '{name}'", place=self._plot.place(path), found=name, valid=self._states
+                )  # fmt: skip
                 yield Finding(error, "condition")
         if self._plot.profile == "scxml":
             condition = settle(condition, lambda _: True)

@@ -50,7 +50,7 @@ def _transition(plot: ActionPlot, name: str, transition: Transition, path: Path)
         yield _finding(plot, f"a transition of '{name}' is internal or has several targets", path)
     if transition.guard is not None and asked_states(transition.guard):
         yield _finding(plot, f"a guard of '{name}' asks which states are active", (*path, "when"))
-    if any(_is_foreign(action) for action in flat(transition.effect)):
+    if transition.do and any(_is_foreign(action) for action in flat(transition.do)):
         yield _finding(plot, f"a transition of '{name}' branches, logs or sends with a delay", path)
 
 

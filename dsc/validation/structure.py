@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from dsc.dynamic.library import Library
 from dsc.engine.compiler import compile_plot
@@ -18,8 +18,9 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
+from dsc.validation.nesting import Nesting
 from dsc.validation.profile import check_profile
-from knowledge_base.errors import Place, SchemaError, UnknownNameError
+from knowledge_base.errors import SchemaError, UnknownNameError
 
 RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 """What a rule may do besides going to a named state."""
@@ -28,20 +29,20 @@ RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
     yield from check_profile(plot)
-    yield from _scope(plot, plot, ())
-    names = {name for name, _, _ in plot.walk()}
+    nesting = Nesting(plot)
+    yield from _scope(plot, plot, (), nesting)
     for name, state, path in plot.walk():
         if isinstance(state, CompositeState):
-            yield from _scope(plot, state, path)
+            yield from _scope(plot, state, path, nesting)
         if isinstance(state, OrthogonalState):
             for key, region in state.regions.items():
-                yield from _scope(plot, region, (*path, "regions", key))
+                yield from _scope(plot, region, (*path, "regions", key), nesting)
         yield from _uses(plot, state, path, library)
         if plot.profile == "dsc":
-            yield from _dead_end(plot, name, state, path)
+            yield from _dead_end(plot, name, state, path, nesting)
         if isinstance(state, HistoryState):
-            yield from _history(plot, state, path)
-    yield from _rules(plot, names, library)
+            yield from _history(plot, state, path, nesting)
+    yield from _rules(plot, set(nesting.names), library)
     if plot.profile == "scxml":
         yield from _tables(plot)
 
@@ -58,9 +59,9 @@ def _tables(plot: ActionPlot) -> Iterator[Finding]:
 
 
 def _scope(
-    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path
+    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path, nesting: Nesting
 ) -> Iterator[Finding]:
-    valid = _within(plot, path) if plot.profile == "scxml" else set(scope.states)
+    valid = nesting.within(path) if plot.profile == "scxml" else set(scope.states)
     if scope.initial is not None and scope.initial not in valid:
         error = UnknownNameError(
             f"there is no state '{scope.initial}' to begin with",
@@ -69,40 +70,36 @@ def _scope(
         yield Finding(error, "initial")
     for name, state in scope.states.items():
         if isinstance(state, State):
-            yield from _targets(plot, state, (*path, "states", name), scope.states)
+            yield from _targets(plot, state, (*path, "states", name), scope.states, nesting)
 
 
-def _targets(plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState]) -> Iterator[Finding]:
-    everywhere = {name for name, _, _ in plot.walk()}
-    for inside, _, transition in state.placed_transitions():
-        place = plot.place((*path, *inside, "to"))
-        for target in transition.targets:
-            yield from _target(plot, target, siblings, everywhere, place)
-
-
-def _target(
-    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: set[str], place: Place | None
+def _targets(
+    plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState], nesting: Nesting
 ) -> Iterator[Finding]:
-    if target not in siblings and not (plot.profile == "scxml" and target in everywhere):
-        if target in everywhere:
-            error = SchemaError(f"the transition to '{target}' crosses a border", place=place, found=target)
-            yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
-        else:
-            missing = UnknownNameError(
-                f"there is no state '{target}'", place=place, found=target,
-                valid=siblings if plot.profile == "dsc" else everywhere,
-            )
-            yield Finding(missing, "target")
+    for inside, _, transition in state.placed_transitions():
+        for target in transition.targets:
+            if target not in siblings:
+                yield from _elsewhere(plot, target, siblings, nesting.names, (*path, *inside, "to"))
 
 
-def _within(plot: ActionPlot, path: Path) -> set[str]:
-    return {name for name, _, other in plot.walk() if other[: len(path)] == path and other != path}
+def _elsewhere(
+    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: Collection[str], path: Path
+) -> Iterator[Finding]:
+    """Findings about a target that is not beside its source."""
+    if target not in everywhere:
+        missing = UnknownNameError(
+            f"there is no state '{target}'", place=plot.place(path), found=target,
+            valid=siblings if plot.profile == "dsc" else everywhere,
+        )  # fmt: skip
+        yield Finding(missing, "target")
+    elif plot.profile == "dsc":
+        error = SchemaError(f"the transition to '{target}' crosses a border", place=plot.place(path), found=target)
+        yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
 
 
-def _history(plot: ActionPlot, state: HistoryState, path: Path) -> Iterator[Finding]:
+def _history(plot: ActionPlot, state: HistoryState, path: Path, nesting: Nesting) -> Iterator[Finding]:
     """What a history leads to is inside the state that the history belongs to (SCXML 3.10)."""
-    around = path[:-2]
-    valid = _within(plot, around)
+    valid = nesting.within(path[:-2])
     if state.target not in valid:
         error = UnknownNameError(
             f"there is no state '{state.target}' beside the history", place=plot.place((*path, "to")),
@@ -128,17 +125,12 @@ def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str]) -> Findin
     return Finding(error, "known plot")
 
 
-def around(plot: ActionPlot, path: Path) -> Iterator[State]:
-    """The composite and orthogonal states around the one at `path`."""
-    for _, state, other in plot.walk():
-        if isinstance(state, State) and other != path and path[: len(other)] == other:
-            yield state
-
-
-def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path) -> Iterator[Finding]:
-    if not isinstance(state, State) or any(True for _ in state.transitions()):
+def _dead_end(
+    plot: ActionPlot, name: str, state: AnyState, path: Path, nesting: Nesting
+) -> Iterator[Finding]:
+    if not isinstance(state, State) or any(state.transitions()):
         return
-    if not any(any(True for _ in other.transitions()) for other in around(plot, path)):
+    if not any(any(other.transitions()) for other in nesting.around(path)):
         error = SchemaError(f"no transition leaves the state '{name}'", place=plot.place(path))
         yield Finding(error, "no dead end", "wire what it ends with, or make it `final: true`")
 

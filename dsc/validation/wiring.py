@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import outcomes_of
@@ -20,7 +23,8 @@ from dsc.model.states import (
     SubmachineState,
 )
 from dsc.skills import SkillSignature
-from dsc.validation.structure import RESPONSES, around
+from dsc.validation.nesting import Nesting
+from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
 Skills = Mapping[str, SkillSignature] | None
@@ -37,6 +41,8 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         yield Finding(error, "rules")
         return
     wired = {name: state for name, state, _ in expanded.walk()}
+    nesting = Nesting(plot)
+    traffic = _traffic(plot, library, skills, nesting)
     yield from _declared_events(plot)
     yield from _rule_targets(plot, library)
     for name, state, path in plot.walk():
@@ -44,13 +50,15 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
             yield from _final(plot, state, path)
         if not isinstance(state, State):
             continue
-        handled = _handled([wired[name], *around(plot, path)])
-        yield from _outcomes(plot, name, outcomes_of(state, library), handled, path)
-        yield from _skills(plot, name, state, path, handled, skills)
+        outcomes = outcomes_of(state, library)
+        if outcomes or state.entry:  # otherwise it cannot end with anything
+            handled = _handled([wired[name], *nesting.around(path)])
+            yield from _outcomes(plot, name, outcomes, handled, path)
+            yield from _skills(plot, name, state, path, handled, skills)
         if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
             yield from _completion(plot, name, state, wired[name], path, library)
-            yield from _known_events(plot, state, path, library, skills)
-            yield from _emissions(plot, state, path)
+            yield from _known_events(plot, state, path, skills, traffic)
+            yield from _emissions(plot, state, path, traffic)
 
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:
@@ -181,29 +189,50 @@ def _ends_silently(plot: ActionPlot | None) -> bool:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class _Traffic:
+    """Which events there are, gathered once for a plot.
+
+    Attributes:
+        anywhere: events that may come to every state.
+        inside: path of a state -> what its content and skills, and those of states inside, end with.
+        heard: events that some state listens to.
+    """
+
+    anywhere: AbstractSet[str]
+    inside: Mapping[Path, AbstractSet[str]]
+    heard: AbstractSet[str]
+
+
+def _traffic(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> _Traffic:
+    anywhere = {*RESERVED, *plot.receives}
+    inside: defaultdict[Path, set[str]] = defaultdict(set)
+    heard: set[str] = set()
+    for _, state, path in plot.walk():
+        if not isinstance(state, State):
+            continue
+        for _, transition in state.transitions():
+            anywhere.update(transition.emitted)
+        heard.update(state.on)
+        for place in nesting.way(path):
+            inside[place].update(outcomes_of(state, library), _skill_events(state, skills))
+    return _Traffic(anywhere, inside, heard)
+
+
 def _known_events(
-    plot: ActionPlot, state: AnyState, path: Path, library: Library, skills: Skills
+    plot: ActionPlot, state: AnyState, path: Path, skills: Skills, traffic: _Traffic
 ) -> Iterator[Finding]:
     if not isinstance(state, State) or (isinstance(state, SubmachineState) and state.use.startswith("?")):
         return
-    known = RESERVED | set(plot.receives) | _local_events(plot)
-    for _, inner, inner_path in plot.walk():
-        if inner_path[: len(path)] == path:
-            known = known | set(outcomes_of(inner, library)) | _skill_events(inner, skills)
     if skills is None and any(isinstance(a, Trigger) for a in state.entry):
         return
     for event in state.on:
-        if event not in known:
+        if event not in traffic.anywhere and event not in traffic.inside[path]:
             error = UnknownNameError(
-                f"nothing here fires the event '{event}'",
-                place=plot.place((*path, "on", event)), found=event, valid=known - RESERVED | {DONE},
+                f"nothing here fires the event '{event}'", place=plot.place((*path, "on", event)),
+                found=event, valid=(traffic.anywhere | traffic.inside[path]) - RESERVED | {DONE},
             )  # fmt: skip
             yield Finding(error, "known event", "events from outside are declared under `receives`")
-
-
-def _local_events(plot: ActionPlot) -> set[str]:
-    states = [state for _, state, _ in plot.walk() if isinstance(state, State)]
-    return {event for state in states for _, transition in state.transitions() for event in transition.emitted}
 
 
 def _skill_events(state: AnyState, skills: Skills) -> set[str]:
@@ -213,19 +242,18 @@ def _skill_events(state: AnyState, skills: Skills) -> set[str]:
     return {t.names.get(event, event) for t in triggers for event in skills[t.trigger].outcomes}
 
 
-def _emissions(plot: ActionPlot, state: AnyState, path: Path) -> Iterator[Finding]:
+def _emissions(plot: ActionPlot, state: AnyState, path: Path, traffic: _Traffic) -> Iterator[Finding]:
     if not isinstance(state, State):
         return
-    listened = {event for _, s, _ in plot.walk() if isinstance(s, State) for event in s.on}
     for inside, _, transition in state.placed_transitions():
         for fired in transition.emitted:
             here = (*path, *inside, "emit")
             if fired in RESERVED and fired not in plot.emits:
                 yield _reserved(plot, fired, here)
-            elif fired not in plot.emits and fired not in listened:
+            elif fired not in plot.emits and fired not in traffic.heard:
                 error = UnknownNameError(
                     f"the plot does not declare the outcome '{fired}', and no state listens to it",
-                    place=plot.place(here), found=fired, valid=set(plot.emits) | listened - {DONE, NO_CANDIDATE},
+                    place=plot.place(here), found=fired, valid=set(plot.emits) | traffic.heard - {DONE, NO_CANDIDATE},
                 )  # fmt: skip
                 yield Finding(error, "declared outcome", "declare it under `emits`")
             elif fired in plot.emits and fired == transition.emit:

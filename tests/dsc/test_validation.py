@@ -10,6 +10,7 @@ from dsc_charts import plot
 
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
+from dsc.model.plot import ActionPlot
 from dsc.skills import Component, Outcome, skill
 from dsc.text.plots import load_library, parse_plot
 from dsc.validation import raise_findings, validate_library, validate_plot
@@ -344,3 +345,18 @@ def test_the_shipped_plots_pass_without_skills():
     library = load_library(root / "domains" / "clean_up_table" / "plots")
     schema = Schema.from_pddl(root / "domains" / "clean_up_table" / "domain.pddl")
     assert [str(f) for f in validate_library(library, schema, None)] == []
+
+
+def test_a_large_plot_is_walked_no_oftener_than_a_small_one(monkeypatch):
+    def walks(size):
+        states = {f"s{n}": {"on": {"next": [{"to": f"s{(n + 1) % size}", "when": "(> ?n 0)"}]}} for n in range(size)}
+        form = {"plot": "ring", "variables": {"n": "number"}, "receives": {"next": None}, "states": states}
+        ring = ActionPlot.model_validate(form)
+        seen = []
+        walk = ActionPlot.walk
+        monkeypatch.setattr(ActionPlot, "walk", lambda self: (seen.append(self), walk(self))[1])
+        assert validate_plot(ring, Library([ring]), SCHEMA) == []
+        monkeypatch.undo()
+        return len(seen)
+
+    assert walks(40) == walks(4)
