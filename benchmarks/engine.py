@@ -17,7 +17,7 @@ from rows import table
 from timing import Pace
 
 PAGE = Path(__file__).parents[1] / "docs" / "speed.md"
-FULL, QUICK = Pace(rounds=9, seconds=0.05), Pace(rounds=1, seconds=0.002)
+FULL, QUICK = Pace(rounds=15, seconds=0.02), Pace(rounds=1, seconds=0.002)
 
 
 def main() -> None:

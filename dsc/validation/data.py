@@ -95,8 +95,9 @@ class _Data:
                 else:
                     yield from self._external(action, (*path, key, position))
         for inside, event, transition in state.placed_transitions():
-            attributes = self._event_types(state, event) if event in state.on else None
-            yield from self._transition(transition, attributes, (*path, *inside))
+            if transition.guard is not None or transition.effect:
+                attributes = self._event_types(state, event) if event in state.on else None
+                yield from self._transition(transition, attributes, (*path, *inside))
             if isinstance(transition, TimedTransition):
                 yield from self._terms([("seconds", transition.seconds)], None, (*path, *inside))
         if isinstance(state, SubmachineState):
@@ -128,8 +129,7 @@ class _Data:
         if transition.guard is not None:
             scope = self._scope(attributes, transition.guard)
             yield from self._condition(transition.guard, scope, (*path, "when"))
-        if transition.effect:
-            yield from self._internal(transition.effect, attributes, path)
+        yield from self._internal(transition.effect, attributes, path)
 
     def _internal(self, actions: Iterable[Internal], attributes: Types | None, path: Path) -> Iterator[Finding]:
         for action in actions:

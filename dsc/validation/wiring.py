@@ -214,8 +214,9 @@ def _traffic(plot: ActionPlot, library: Library, skills: Skills, nesting: Nestin
         for _, transition in state.transitions():
             anywhere.update(transition.emitted)
         heard.update(state.on)
-        for place in nesting.way(path):
-            inside[place].update(outcomes_of(state, library), _skill_events(state, skills))
+        if ends := {*outcomes_of(state, library), *_skill_events(state, skills)}:
+            for place in nesting.way(path):
+                inside[place] |= ends
     return _Traffic(anywhere, inside, heard)
 
 
@@ -226,11 +227,12 @@ def _known_events(
         return
     if skills is None and any(isinstance(a, Trigger) for a in state.entry):
         return
+    inside = traffic.inside.get(path, frozenset())
     for event in state.on:
-        if event not in traffic.anywhere and event not in traffic.inside[path]:
+        if event not in traffic.anywhere and event not in inside:
             error = UnknownNameError(
                 f"nothing here fires the event '{event}'", place=plot.place((*path, "on", event)),
-                found=event, valid=(traffic.anywhere | traffic.inside[path]) - RESERVED | {DONE},
+                found=event, valid=(traffic.anywhere | inside) - RESERVED | {DONE},
             )  # fmt: skip
             yield Finding(error, "known event", "events from outside are declared under `receives`")
 
