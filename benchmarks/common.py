@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Callable, Sequence
+from statistics import median
 from typing import Any
 
 from peers.charts import PING, Chart, deep, flat, regions, ring
 from peers.contender import Contender
 from rows import ENGINE, FLOOR, Cell, Row, Target
-from timing import Figures, Job, Pace, measure, median, ratio
+from timing import Figures, Job, Pace, measure, ratio
 
 INSTANCES = 1000
 Everyone = Sequence[Contender]

@@ -1,4 +1,4 @@
-"""Plots and jobs for what only this engine is asked; each job was seen to do what it says."""
+"""Plots and jobs for what only this engine is asked; each was seen to go where it should."""
 
 from __future__ import annotations
 
@@ -77,6 +77,8 @@ def attributes() -> Job:
         for number in range(times):
             send(Event("ping", {"level": number}), situation)
 
+    run(1)
+    assert machine.state.is_active("b")
     return Job(run)
 
 

@@ -59,7 +59,7 @@ class Row:
         return {
             "case": self.case, "unit": self.unit, "lead": self.lead, "fastest_peer": self.fastest,
             "cells": {
-                name: {"value": one.value, "times": one.times, "against": one.against or FLOOR}
+                name: {"value": one.value, "times": one.times, "against": one.times and (one.against or FLOOR)}
                 for name, one in self.cells.items()
             },
             "targets": [

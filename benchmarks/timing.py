@@ -67,8 +67,3 @@ def measure(jobs: Mapping[str, Job], pace: Pace) -> Figures:
 def ratio(figures: Figures, one: str, other: str) -> float:
     """How many times as long one takes as the other: the median of the rounds."""
     return statistics.median(a / b for a, b in zip(figures[one], figures[other], strict=True))
-
-
-def median(seconds: list[float]) -> float:
-    """The middle one."""
-    return statistics.median(seconds)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
@@ -132,6 +132,7 @@ class ActionPlot(Frozen):
     generated: bool = False
     profile: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
+    _content: str | None = PrivateAttr(default=None)
 
     def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
         """The same plot that remembers where its parts stand in the text it was read from."""
@@ -229,8 +230,16 @@ class ActionPlot(Frozen):
     def __hash__(self) -> int:
         return hash(self._text())
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """See pydantic; what was worked out about the content is not copied with it."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied._content = None  # noqa: SLF001  a plot, like this one
+        return copied
+
     def _text(self) -> str:
-        return json.dumps(self.to_form())
+        if self._content is None:  # a trace asks for the digest whenever a plot is bound
+            self._content = json.dumps(self.to_form())
+        return self._content
 
 
 def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, AnyState, Path]]:
