@@ -9,7 +9,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from dsc.dynamic.rules import expand_rules
-from dsc.engine.compiler import CompiledPlot, compile_plot
+from dsc.dynamic.substitution import stand_in
+from dsc.engine.compiler import compile_plot
+from dsc.engine.tables import CompiledPlot
 from dsc.model.plot import ActionPlot
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
@@ -51,6 +53,18 @@ class Library:
         if found is None:
             raise UnknownNameError(f"there is no plot '{name}'", found=name, valid=self._plots)
         return found
+
+    def substitute(self, name: str, plot: ActionPlot) -> Library:
+        """A new library in which `plot` stands in place of the plot of that name; this one stays as it is.
+
+        Everything that used the old plot uses the new one: a whole branch is replaced, for a test or for good.
+
+        Raises:
+            UnknownNameError: there is no plot of that name.
+            SchemaError: who holds the old plot could not hold the new one; see `substitution.stand_in`.
+        """
+        other = stand_in(self.plot(name), plot)
+        return Library(other if own.name == name else own for own in self)
 
     def expanded(self, plot: ActionPlot) -> ActionPlot:
         """The plot with its rules as states and transitions; raises `UnknownNameError`."""

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from dsc.model.language import MISNAMED, UNKNOWN_FORM
+from dsc.model.language import LOCATED, UNKNOWN_FORM
 from dsc.text.yaml import Document, FormPath
 from knowledge_base.errors import InputError, UnknownNameError
 
@@ -64,7 +64,7 @@ def _message(details: ErrorDetails) -> str:
     kind = details["type"]
     if kind == "value_error":
         return _said_by(details["ctx"]["error"])
-    if kind == MISNAMED:
+    if kind == LOCATED:
         return details["msg"]
     if kind == UNKNOWN_FORM:
         return f"{details['msg']}; found {details['input']!r}"
@@ -76,8 +76,10 @@ def _message(details: ErrorDetails) -> str:
 
 
 def _in_yaml(value: Any) -> str:
-    """The value as people write it: `true` and `null`, not Python's words."""
-    return {True: "true", False: "false", None: "nothing"}[value] if isinstance(value, bool | None) else repr(value)
+    """The value as people write it: `true`, `null` and `[]`, not Python's words."""
+    if isinstance(value, bool | None):
+        return {True: "true", False: "false", None: "nothing"}[value]
+    return repr(list(value) if isinstance(value, tuple) else value)
 
 
 def _said_by(error: ValueError) -> str:
@@ -104,9 +106,12 @@ def _follow(loc: Location, data: Any, schema: _Schema) -> tuple[FormPath, list[_
             continue
         if isinstance(data, list):
             data = dict(enumerate(data))
-        if isinstance(data, Mapping) and element in data:
-            data = data[element]
-            path.append(element)
+        # The model keeps the keys of cases as text; in the file they may be numbers and truth values.
+        for key in data if isinstance(data, Mapping) else ():
+            if element in {key, _in_yaml(key)}:
+                data = data[key]
+                path.append(key)
+                break
         nodes = [inner for node in nodes for inner in _into(node, element, schema)] or nodes
     return tuple(path), [form for node in nodes for form in _alternatives(node, schema)]
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.outcomes import outcomes_of
+from dsc.dynamic.outcomes import outcomes_of, outputs_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
+from dsc.events import DONE
 from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
-from dsc.model.plot import ActionPlot, Parameter, Path, Variable
-from dsc.model.states import AnyState, DynamicState, FinalState, State, SubmachineState, TimedTransition, Transition
+from dsc.model.connectors import Connector, SelectState
+from dsc.model.plot import ActionPlot, Parameter, Path, Rule, Variable
+from dsc.model.states import AnyState, DynamicState, FinalState, State, SubmachineState
+from dsc.model.transitions import TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.wiring import Skills
 from knowledge_base.errors import InputError, UnknownNameError
@@ -40,7 +43,8 @@ class _Data:
         self._schema = schema
         self._skills = skills
         self._states = frozenset(name for name, _, _ in plot.walk())
-        declared: dict[str, Parameter | Variable] = {**plot.parameters, **plot.variables}
+        self._assigned = {**plot.variables, **plot.outputs}
+        declared: dict[str, Parameter | Variable] = {**plot.parameters, **self._assigned}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
 
     def findings(self) -> Iterator[Finding]:
@@ -54,6 +58,8 @@ class _Data:
             elif isinstance(state, FinalState):
                 yield from self._terms(state.arguments.items(), None, (*path, "with"))
                 yield from self._internal(state.entry, None, (*path, "entry"))
+            elif isinstance(state, Connector):
+                yield from self._connector(state, path)
             else:
                 yield from self._internal(state.do, None, (*path, "do"))
         for number, rule in enumerate(self._plot.rules):
@@ -68,9 +74,16 @@ class _Data:
             if rule.do.tell is not None:
                 yield from self._effect(rule.do.tell, event, (*path, "do", "tell"))
             yield from self._only(rule.do.arguments, event, (*path, "do", "with"))
-            if rule.do.use is not None:
-                used = self._library.plot(rule.do.use)
-                yield from self._arguments(used.name, used.parameters, set(rule.do.arguments), (*path, "do", "with"))
+            if rule.do.then == "continue":
+                yield from self._continued(rule, event, (*path, "do", "then"))
+
+    def _continued(self, rule: Rule, event: Types, path: Path) -> Iterator[Finding]:
+        """What goes on as if a state were done has the rule's event, not the outputs that `done` would bring."""
+        for name, state, _ in self._plot.walk():
+            answered = rule.on in outcomes_of(state, self._library) and (not rule.of or name in rule.of)
+            if answered and isinstance(state, State) and outputs_of(state, self._library):
+                for transition in state.on.get(DONE, ()):
+                    yield from self._transition(transition, event, path)
 
     # -- parts of a plot ---------------------------------------------------------------------------------
 
@@ -78,7 +91,10 @@ class _Data:
         if self._schema is None:
             return
         valid = FREE_TYPES | set(self._schema.types)
-        for kind, declarations in (("parameters", self._plot.parameters), ("variables", self._plot.variables)):
+        declared: dict[str, Mapping[str, Parameter | Variable]] = {
+            "parameters": self._plot.parameters, "variables": self._plot.variables, "outputs": self._plot.outputs,
+        }  # fmt: skip
+        for kind, declarations in declared.items():
             for name, declaration in declarations.items():
                 if declaration.type not in valid:
                     error = UnknownNameError(
@@ -88,47 +104,37 @@ class _Data:
                     yield Finding(error, "known type")
 
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
-        for key, actions in (("entry", state.entry), ("exit", state.exit)):
+        for key, actions in state.blocks():
             for position, action in enumerate(actions):
                 if isinstance(action, Internal):
                     yield from self._internal((action,), None, (*path, key, position))
                 else:
                     yield from self._external(action, (*path, key, position))
         for inside, event, transition in state.placed_transitions():
-            if transition.guard is not None or transition.effect:
+            if transition.guard is not None or transition.passed or transition.effect:
                 attributes = self._event_types(state, event) if event in state.on else None
                 yield from self._transition(transition, attributes, (*path, *inside))
             if isinstance(transition, TimedTransition):
                 yield from self._terms([("seconds", transition.seconds)], None, (*path, *inside))
-        if isinstance(state, SubmachineState):
+        if state.at_least is not None:
+            yield from self._terms([("at_least", state.at_least)], None, path)
+        if isinstance(state, SubmachineState | DynamicState):
             yield from self._terms(state.arguments.items(), None, (*path, "with"))
-            if not state.use.startswith("?"):
-                used = self._library.plot(state.use)
-                yield from self._arguments(used.name, used.parameters, set(state.arguments), (*path, "with"))
-        if isinstance(state, DynamicState):
-            yield from self._dynamic(state, path)
-
-    def _dynamic(self, state: DynamicState, path: Path) -> Iterator[Finding]:
-        yield from self._terms(state.arguments.items(), None, (*path, "with"))
-        candidates = [self._library.plot(name) for name in state.dynamic]
-        taken = {name for plot in candidates for name in plot.parameters}
-        for plot in candidates:
-            own = set(state.arguments) & set(plot.parameters)
-            yield from self._arguments(plot.name, plot.parameters, own, (*path, "with"))
-        for name in state.arguments:
-            if name not in taken:
-                error = UnknownNameError(
-                    f"no candidate has a parameter '{name}'",
-                    place=self._plot.place((*path, "with", name)), found=name, valid=taken,
-                )  # fmt: skip
-                yield Finding(error, "candidates conform")
-        if state.goal is not None:
+        if isinstance(state, DynamicState) and state.goal is not None:
             yield from self._condition(state.goal, self._types, (*path, "goal"))
+
+    def _connector(self, connector: Connector, path: Path) -> Iterator[Finding]:
+        # Which event brought the run here is not known beforehand.
+        if isinstance(connector, SelectState):
+            yield from self._terms([("select", connector.select)], None, path)
+        for inside, _, transition in connector.placed_transitions():
+            yield from self._transition(transition, None, (*path, *inside))
 
     def _transition(self, transition: Transition, attributes: Types | None, path: Path) -> Iterator[Finding]:
         if transition.guard is not None:
             scope = self._scope(attributes, transition.guard)
             yield from self._condition(transition.guard, scope, (*path, "when"))
+        yield from self._terms(transition.passed.items(), attributes, (*path, "pass"))
         yield from self._internal(transition.effect, attributes, path)
 
     def _internal(self, actions: Iterable[Internal], attributes: Types | None, path: Path) -> Iterator[Finding]:
@@ -152,10 +158,10 @@ class _Data:
 
     def _assign(self, action: Assign, path: Path) -> Iterator[Finding]:
         for name in action.assign:
-            if name not in self._plot.variables:
+            if name not in self._assigned:
                 error = UnknownNameError(
                     f"there is no variable '{name}'", place=self._plot.place((*path, name)),
-                    found=name, valid=self._plot.variables,
+                    found=name, valid=self._assigned,
                 )  # fmt: skip
                 yield Finding(error, "declared variable")
 
@@ -176,20 +182,6 @@ class _Data:
         except InputError as error:
             here = (*path, "with", error.found) if error.found else (*path, "trigger")
             yield Finding(_at(error, self._plot, here), "skill arguments")
-
-    def _arguments(
-        self, plot: str, parameters: Mapping[str, Parameter], given: set[str], path: Path
-    ) -> Iterator[Finding]:
-        for name in sorted(given - set(parameters)):
-            error: InputError = UnknownNameError(
-                f"plot '{plot}' has no parameter '{name}'",
-                place=self._plot.place((*path, name)), found=name, valid=parameters,
-            )  # fmt: skip
-            yield Finding(error, "known parameter")
-        for name, parameter in parameters.items():
-            if name not in given and parameter.default is None:
-                error = InputError(f"plot '{plot}' needs its parameter '{name}'", place=self._plot.place(path))
-                yield Finding(error, "parameters are given", f"add `{name}: …` under `with`")
 
     # -- the language ------------------------------------------------------------------------------------
 
@@ -245,6 +237,8 @@ class _Data:
             found = declared[event] or {}
         elif event in self._plot.receives:
             found = self._plot.receives[event] or {}
+        elif event == DONE:
+            found = outputs_of(state, self._library)
         else:
             found = self._skill_event(state, event)
         if found is None:

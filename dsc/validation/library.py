@@ -8,8 +8,10 @@ from dsc.dynamic.library import Library
 from dsc.errors import Finding, PlotError
 from dsc.model.plot import ActionPlot
 from dsc.skills import SkillSignature
+from dsc.validation.arguments import check_arguments
 from dsc.validation.components import check_components
 from dsc.validation.data import check_data
+from dsc.validation.outputs import check_outputs
 from dsc.validation.structure import check_structure
 from dsc.validation.wiring import check_wiring
 from knowledge_base.schema import Schema
@@ -47,6 +49,8 @@ def validate_plot(
     if findings:  # what follows would only repeat them in other words
         return findings
     findings = list(check_wiring(plot, library, signatures))
+    findings += check_arguments(plot, library)
+    findings += check_outputs(plot)
     findings += check_data(plot, library, schema, signatures)
     if components is not None:
         findings += check_components(plot, components)

@@ -31,6 +31,15 @@ class Nesting:
         states = (self._states[place] for place in self.way(path[:-1]))
         return (state for state in states if isinstance(state, State))
 
+    def state(self, name: str) -> AnyState:
+        """The state of that name, which must be there."""
+        return self._states[self.names[name]]
+
+    def inside(self, name: str, path: Path) -> bool:
+        """Whether there is a state of that name inside the one at `path`; anywhere if `path` is empty."""
+        found = self.names.get(name, path)
+        return found != path and found[: len(path)] == path
+
     def within(self, path: Path) -> set[str]:
-        """The names of the states inside the one at `path`; of all states if `path` is empty."""
-        return {name for name, other in self.names.items() if other[: len(path)] == path and other != path}
+        """The names of all states for which `inside` holds; for messages, since it looks at every state."""
+        return {name for name in self.names if self.inside(name, path)}

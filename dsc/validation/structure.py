@@ -12,14 +12,17 @@ from dsc.model.states import (
     AnyState,
     CompositeState,
     DynamicState,
-    HistoryState,
     OrthogonalState,
     Region,
     State,
     SubmachineState,
 )
+from dsc.model.transitions import Source
+from dsc.validation.connectors import check_connectors
+from dsc.validation.history import check_history
 from dsc.validation.nesting import Nesting
 from dsc.validation.profile import check_profile
+from dsc.validation.timing import check_timing
 from knowledge_base.errors import SchemaError, UnknownNameError
 
 RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
@@ -30,6 +33,9 @@ def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
     yield from check_profile(plot)
     nesting = Nesting(plot)
+    yield from check_connectors(plot)
+    yield from check_history(plot, nesting)
+    yield from check_timing(plot)
     yield from _scope(plot, plot, (), nesting)
     for name, state, path in plot.walk():
         if isinstance(state, CompositeState):
@@ -40,8 +46,6 @@ def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
         yield from _uses(plot, state, path, library)
         if plot.profile == "dsc":
             yield from _dead_end(plot, name, state, path, nesting)
-        if isinstance(state, HistoryState):
-            yield from _history(plot, state, path, nesting)
     yield from _rules(plot, set(nesting.names), library)
     if plot.profile == "scxml":
         yield from _tables(plot)
@@ -61,20 +65,20 @@ def _tables(plot: ActionPlot) -> Iterator[Finding]:
 def _scope(
     plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path, nesting: Nesting
 ) -> Iterator[Finding]:
-    valid = nesting.within(path) if plot.profile == "scxml" else set(scope.states)
-    if scope.initial is not None and scope.initial not in valid:
+    first, anywhere_inside = scope.initial, plot.profile == "scxml"
+    if first is not None and not (nesting.inside(first, path) if anywhere_inside else first in scope.states):
         error = UnknownNameError(
-            f"there is no state '{scope.initial}' to begin with",
-            place=plot.place((*path, "initial")), found=scope.initial, valid=valid,
+            f"there is no state '{first}' to begin with", place=plot.place((*path, "initial")),
+            found=first, valid=nesting.within(path) if anywhere_inside else scope.states,
         )  # fmt: skip
         yield Finding(error, "initial")
     for name, state in scope.states.items():
-        if isinstance(state, State):
+        if isinstance(state, Source):
             yield from _targets(plot, state, (*path, "states", name), scope.states, nesting)
 
 
 def _targets(
-    plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState], nesting: Nesting
+    plot: ActionPlot, state: Source, path: Path, siblings: Mapping[str, AnyState], nesting: Nesting
 ) -> Iterator[Finding]:
     for inside, _, transition in state.placed_transitions():
         for target in transition.targets:
@@ -97,17 +101,6 @@ def _elsewhere(
         yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
 
 
-def _history(plot: ActionPlot, state: HistoryState, path: Path, nesting: Nesting) -> Iterator[Finding]:
-    """What a history leads to is inside the state that the history belongs to (SCXML 3.10)."""
-    valid = nesting.within(path[:-2])
-    if state.target not in valid:
-        error = UnknownNameError(
-            f"there is no state '{state.target}' beside the history", place=plot.place((*path, "to")),
-            found=state.target, valid=valid,
-        )  # fmt: skip
-        yield Finding(error, "target")
-
-
 def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> Iterator[Finding]:
     if isinstance(state, SubmachineState) and state.use.startswith("?"):
         if state.use[1:] not in plot.variables and state.use[1:] not in plot.parameters:
@@ -125,9 +118,7 @@ def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str]) -> Findin
     return Finding(error, "known plot")
 
 
-def _dead_end(
-    plot: ActionPlot, name: str, state: AnyState, path: Path, nesting: Nesting
-) -> Iterator[Finding]:
+def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path, nesting: Nesting) -> Iterator[Finding]:
     if not isinstance(state, State) or any(state.transitions()):
         return
     if not any(any(other.transitions()) for other in nesting.around(path)):

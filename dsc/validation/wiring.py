@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import outcomes_of
 from dsc.errors import Finding
-from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED
+from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED, TIMERS
 from dsc.model.actions import Trigger
-from dsc.model.plot import ActionPlot, Path
+from dsc.model.connectors import Connector
+from dsc.model.plot import ActionPlot, Path, initial_of
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -22,6 +23,7 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
+from dsc.model.transitions import Source
 from dsc.skills import SkillSignature
 from dsc.validation.nesting import Nesting
 from dsc.validation.structure import RESPONSES
@@ -48,6 +50,8 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
     for name, state, path in plot.walk():
         if isinstance(state, FinalState):
             yield from _final(plot, state, path)
+        if isinstance(state, Source) and plot.profile == "dsc":
+            yield from _emissions(plot, state, path, traffic)
         if not isinstance(state, State):
             continue
         outcomes = outcomes_of(state, library)
@@ -58,7 +62,6 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
             yield from _completion(plot, name, state, wired[name], path, library)
             yield from _known_events(plot, state, path, skills, traffic)
-            yield from _emissions(plot, state, path, traffic)
 
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:
@@ -80,10 +83,12 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
     for number, rule in enumerate(plot.rules):
-        for siblings in plot.scopes():
+        if rule.do.then in RESPONSES:
+            continue
+        for siblings in (scope.states for scope in plot.scopes()):
             for name, state in siblings.items():
                 answers = (not rule.of or name in rule.of) and rule.on in outcomes_of(state, library)
-                if answers and rule.do.then not in RESPONSES and rule.do.then not in siblings:
+                if answers and rule.do.then not in siblings:
                     error = SchemaError(
                         f"the rule's way from '{name}' to '{rule.do.then}' crosses a border",
                         place=plot.place(("rules", number, "do", "then")), found=rule.do.then, valid=siblings,
@@ -180,13 +185,25 @@ def _ends_silently(plot: ActionPlot | None) -> bool:
     """Whether the plot can reach a top-level final state without firing a declared outcome."""
     if plot is None:
         return True
-    silent = {name for name, s in plot.states.items() if isinstance(s, FinalState) and s.emit is None}
-    return any(
-        transition.target in silent and not set(transition.emitted) & set(plot.emits)
-        for state in plot.states.values()
-        if isinstance(state, State)
-        for _, transition in state.transitions()
-    )
+    waiting = {initial_of(plot)} | {
+        target for state in plot.states.values() if isinstance(state, State) for target in _silent_ways(plot, state)
+    }
+    seen: set[str] = set()
+    while waiting:  # connectors are passed through; what the way to them has fired, they need not fire again
+        name = waiting.pop()
+        seen.add(name)
+        reached = plot.states.get(name)
+        if isinstance(reached, FinalState) and reached.emit is None:
+            return True
+        if isinstance(reached, Connector):
+            waiting |= _silent_ways(plot, reached) - seen
+    return False
+
+
+def _silent_ways(plot: ActionPlot, source: Source) -> set[str]:
+    """Where transitions lead that fire no declared outcome."""
+    silent = (one for _, one in source.transitions() if not set(one.emitted) & set(plot.emits))
+    return {transition.target for transition in silent if transition.target is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,14 +222,14 @@ class _Traffic:
 
 
 def _traffic(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> _Traffic:
-    anywhere = {*RESERVED, *plot.receives}
+    anywhere = {*(RESERVED - TIMERS), *plot.receives}
     inside: defaultdict[Path, set[str]] = defaultdict(set)
     heard: set[str] = set()
     for _, state, path in plot.walk():
+        if isinstance(state, Source):
+            anywhere.update(event for _, transition in state.transitions() for event in transition.emitted)
         if not isinstance(state, State):
             continue
-        for _, transition in state.transitions():
-            anywhere.update(transition.emitted)
         heard.update(state.on)
         if ends := {*outcomes_of(state, library), *_skill_events(state, skills)}:
             for place in nesting.way(path):
@@ -244,10 +261,8 @@ def _skill_events(state: AnyState, skills: Skills) -> set[str]:
     return {t.names.get(event, event) for t in triggers for event in skills[t.trigger].outcomes}
 
 
-def _emissions(plot: ActionPlot, state: AnyState, path: Path, traffic: _Traffic) -> Iterator[Finding]:
-    if not isinstance(state, State):
-        return
-    for inside, _, transition in state.placed_transitions():
+def _emissions(plot: ActionPlot, source: Source, path: Path, traffic: _Traffic) -> Iterator[Finding]:
+    for inside, _, transition in source.placed_transitions():
         for fired in transition.emitted:
             here = (*path, *inside, "emit")
             if fired in RESERVED and fired not in plot.emits:

@@ -16,7 +16,7 @@ import re
 from pathlib import PurePath
 from typing import Any
 
-from dsc.events import AFTER, RESERVED
+from dsc.events import RESERVED, TIMERS
 from dsc.model.plot import ActionPlot, Path
 from dsc.text.form import read_model
 from dsc.text.scxml.content import Form, actions, needed
@@ -177,8 +177,9 @@ class _Reader:
                 self._places[(*path, "always", len(always))] = child.place
                 always.append(self._transition(child))
                 continue
-            if AFTER in words:
-                raise NotExpressibleError("transition/@event", f"'{AFTER}' is the name of timeouts", place=child.place)
+            for word in TIMERS.intersection(words):
+                problem = f"'{word}' is what the executive's clock says"
+                raise NotExpressibleError("transition/@event", problem, place=child.place)
             key = _key(" ".join(words), on)
             self._places[(*path, "on", key, len(on.setdefault(key, [])))] = child.place
             on[key].append(self._transition(child))
