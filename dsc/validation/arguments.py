@@ -19,17 +19,16 @@ Holder = SubmachineState | DynamicState
 """A state whose content is a plot."""
 
 
-def check_arguments(plot: ActionPlot, library: Library) -> Iterator[Finding]:
+def check_arguments(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """Findings about the arguments of used plots."""
-    nesting = Nesting(plot)
     entrances = _Entrances(plot, library, nesting)
-    for name, state, path in plot.walk():
+    for name, state, path in nesting.states:
         if isinstance(state, Holder):
             yield from _known(plot, state, set(state.arguments), (*path, "with"), library)
             for need in _needs(state, library):
                 yield from _given(plot, name, path, need, entrances)
-        if isinstance(state, Source):
-            for inside, _, transition in state.placed_transitions():
+        for inside, _, transition in nesting.leaving(path):
+            if transition.passed:
                 yield from _passed(plot, transition, (*path, *inside), library, nesting)
     for number, rule in enumerate(plot.rules):
         if rule.do.use is not None:
@@ -76,8 +75,6 @@ def _unknown(plot: ActionPlot, used: ActionPlot, given: set[str], path: Path) ->
 def _passed(
     plot: ActionPlot, transition: Transition, path: Path, library: Library, nesting: Nesting
 ) -> Iterator[Finding]:
-    if not transition.passed:
-        return
     target = None if transition.target is None else nesting.state(transition.target)
     if isinstance(target, Holder):
         yield from _known(plot, target, set(transition.passed), (*path, "pass"), library)
@@ -148,12 +145,12 @@ class _Entrances:
 
     @cached_property
     def _defaults(self) -> set[str]:
-        histories = {state.target for _, state, _ in self._plot.walk() if isinstance(state, HistoryState)}
+        histories = {state.target for _, state, _ in self._nesting.states if isinstance(state, HistoryState)}
         return histories | {initial_of(scope) for scope in self._plot.scopes()}
 
     @cached_property
     def _remembered(self) -> set[Path]:
-        return {path[:-2] for _, state, path in self._plot.walk() if isinstance(state, HistoryState)}
+        return {path[:-2] for _, state, path in self._nesting.states if isinstance(state, HistoryState)}
 
 
 def _given(plot: ActionPlot, name: str, path: Path, need: _Need, entrances: _Entrances) -> Iterator[Finding]:

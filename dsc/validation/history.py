@@ -7,19 +7,19 @@ from collections.abc import Iterator
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import CompositeState, HistoryState, OrthogonalState
-from dsc.model.transitions import Source, Transition
+from dsc.model.transitions import Transition
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError, UnknownNameError
 
 
 def check_history(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
     """Findings about histories and about transitions that clear them."""
-    memory = _Memory(plot, nesting)
-    for _, state, path in plot.walk():
+    memory = _Memory(nesting)
+    for _, state, path in nesting.states:
         if isinstance(state, HistoryState):
             yield from _default(plot, state, path, nesting)
-        elif isinstance(state, Source) and plot.profile == "scxml":
-            for inside, _, transition in state.placed_transitions():
+        elif plot.profile == "scxml":
+            for inside, _, transition in nesting.leaving(path):
                 yield from _cleared(plot, transition, (*path, *inside, "clear"), memory)
 
 
@@ -43,11 +43,11 @@ class _Memory:
         below: paths of the states with histories at any level.
     """
 
-    def __init__(self, plot: ActionPlot, nesting: Nesting) -> None:
+    def __init__(self, nesting: Nesting) -> None:
         self.holders: dict[str, Path] = {}
         self.directly: set[Path] = set()
         self.below: set[Path] = set()
-        for name, state, path in plot.walk():
+        for name, state, path in nesting.states:
             if isinstance(state, CompositeState | OrthogonalState):
                 self.holders[name] = path
             elif isinstance(state, HistoryState):

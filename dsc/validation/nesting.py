@@ -1,4 +1,4 @@
-"""What is inside what in a plot, gathered in one walk: checks of large plots ask for it at every state."""
+"""What is inside what in a plot, gathered in one walk: every check asks for it, some of them at every state."""
 
 from __future__ import annotations
 
@@ -6,21 +6,28 @@ from collections.abc import Iterator
 
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import AnyState, State
+from dsc.model.transitions import FormPath, Source, Transition
 
 
 class Nesting:
-    """The states of a plot by name and by path.
+    """The states of a plot by name and by path, and their transitions.
 
     Attributes:
-        names: the names of all states, in document order.
+        states: all states in document order, with their names and paths.
+        names: the paths of all states by name, in document order.
     """
 
     def __init__(self, plot: ActionPlot) -> None:
-        self.names: dict[str, Path] = {}
-        self._states: dict[Path, AnyState] = {}
-        for name, state, path in plot.walk():
-            self.names[name] = path
-            self._states[path] = state
+        self.states = tuple(plot.walk())
+        self.names = {name: path for name, _, path in self.states}
+        self._states = {path: state for _, state, path in self.states}
+        self._leaving = {
+            path: tuple(state.placed_transitions()) for _, state, path in self.states if isinstance(state, Source)
+        }
+
+    def leaving(self, path: Path) -> tuple[tuple[FormPath, str, Transition], ...]:
+        """See `Source.placed_transitions`; nothing leaves what is no source."""
+        return self._leaving.get(path, ())
 
     def way(self, path: Path) -> Iterator[Path]:
         """The paths of the states around the one at `path`, outermost first, and its own."""

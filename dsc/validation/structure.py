@@ -17,7 +17,6 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from dsc.model.transitions import Source
 from dsc.validation.connectors import check_connectors
 from dsc.validation.history import check_history
 from dsc.validation.nesting import Nesting
@@ -29,15 +28,14 @@ RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 """What a rule may do besides going to a named state."""
 
 
-def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
+def check_structure(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
-    yield from check_profile(plot)
-    nesting = Nesting(plot)
-    yield from check_connectors(plot)
+    yield from check_profile(plot, nesting)
+    yield from check_connectors(plot, nesting)
     yield from check_history(plot, nesting)
-    yield from check_timing(plot)
+    yield from check_timing(plot, nesting)
     yield from _scope(plot, plot, (), nesting)
-    for name, state, path in plot.walk():
+    for name, state, path in nesting.states:
         if isinstance(state, CompositeState):
             yield from _scope(plot, state, path, nesting)
         if isinstance(state, OrthogonalState):
@@ -72,15 +70,14 @@ def _scope(
             found=first, valid=nesting.within(path) if anywhere_inside else scope.states,
         )  # fmt: skip
         yield Finding(error, "initial")
-    for name, state in scope.states.items():
-        if isinstance(state, Source):
-            yield from _targets(plot, state, (*path, "states", name), scope.states, nesting)
+    for name in scope.states:
+        yield from _targets(plot, (*path, "states", name), scope.states, nesting)
 
 
 def _targets(
-    plot: ActionPlot, state: Source, path: Path, siblings: Mapping[str, AnyState], nesting: Nesting
+    plot: ActionPlot, path: Path, siblings: Mapping[str, AnyState], nesting: Nesting
 ) -> Iterator[Finding]:
-    for inside, _, transition in state.placed_transitions():
+    for inside, _, transition in nesting.leaving(path):
         for target in transition.targets:
             if target not in siblings:
                 yield from _elsewhere(plot, target, siblings, nesting.names, (*path, *inside, "to"))
@@ -119,9 +116,7 @@ def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str]) -> Findin
 
 
 def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path, nesting: Nesting) -> Iterator[Finding]:
-    if not isinstance(state, State) or any(state.transitions()):
-        return
-    if not any(any(other.transitions()) for other in nesting.around(path)):
+    if isinstance(state, State) and not any(map(nesting.leaving, nesting.way(path))):
         error = SchemaError(f"no transition leaves the state '{name}'", place=plot.place(path))
         yield Finding(error, "no dead end", "wire what it ends with, or make it `final: true`")
 

@@ -35,7 +35,7 @@ _EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
 """Events that are nobody else's; the other two are passed on by who plans."""
 
 
-def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator[Finding]:
+def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> Iterator[Finding]:
     """Findings about events."""
     try:
         expanded = library.expanded(plot)
@@ -43,15 +43,14 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         yield Finding(error, "rules")
         return
     wired = {name: state for name, state, _ in expanded.walk()}
-    nesting = Nesting(plot)
     traffic = _traffic(plot, library, skills, nesting)
     yield from _declared_events(plot)
     yield from _rule_targets(plot, library)
-    for name, state, path in plot.walk():
+    for name, state, path in nesting.states:
         if isinstance(state, FinalState):
             yield from _final(plot, state, path)
-        if isinstance(state, Source) and plot.profile == "dsc":
-            yield from _emissions(plot, state, path, traffic)
+        if plot.profile == "dsc":
+            yield from _emissions(plot, path, nesting, traffic)
         if not isinstance(state, State):
             continue
         outcomes = outcomes_of(state, library)
@@ -225,9 +224,9 @@ def _traffic(plot: ActionPlot, library: Library, skills: Skills, nesting: Nestin
     anywhere = {*(RESERVED - TIMERS), *plot.receives}
     inside: defaultdict[Path, set[str]] = defaultdict(set)
     heard: set[str] = set()
-    for _, state, path in plot.walk():
-        if isinstance(state, Source):
-            anywhere.update(event for _, transition in state.transitions() for event in transition.emitted)
+    for _, state, path in nesting.states:
+        for _, _, transition in nesting.leaving(path):
+            anywhere.update(transition.emitted)
         if not isinstance(state, State):
             continue
         heard.update(state.on)
@@ -261,8 +260,8 @@ def _skill_events(state: AnyState, skills: Skills) -> set[str]:
     return {t.names.get(event, event) for t in triggers for event in skills[t.trigger].outcomes}
 
 
-def _emissions(plot: ActionPlot, source: Source, path: Path, traffic: _Traffic) -> Iterator[Finding]:
-    for inside, _, transition in source.placed_transitions():
+def _emissions(plot: ActionPlot, path: Path, nesting: Nesting, traffic: _Traffic) -> Iterator[Finding]:
+    for inside, _, transition in nesting.leaving(path):
         for fired in transition.emitted:
             here = (*path, *inside, "emit")
             if fired in RESERVED and fired not in plot.emits:
