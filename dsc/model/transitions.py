@@ -62,7 +62,9 @@ class Transition(Frozen):
     @property
     def targets(self) -> tuple[str, ...]:
         """All states to enter."""
-        return () if self.target is None else (self.target, *self.also)
+        if self.target is None:
+            return ()
+        return (self.target, *self.also) if self.also else (self.target,)
 
     @property
     def effect(self) -> tuple[Internal, ...]:

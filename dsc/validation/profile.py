@@ -34,7 +34,8 @@ def _source(plot: ActionPlot, name: str, source: Source, path: Path, nesting: Ne
         yield _finding(plot, f"'{name}' has connectors", (*path, "connectors"))
     if isinstance(source, State):
         for key, actions in source.blocks():
-            yield from _inside(plot, name, actions, (*path, key))
+            if actions:
+                yield from _inside(plot, name, actions, (*path, key))
     for inside, _, transition in nesting.leaving(path):
         yield from _transition(plot, name, transition, (*path, *inside))
 
