@@ -9,11 +9,10 @@ from dsc.engine.actions import fill_parameters
 from dsc.engine.frames import Frame
 from dsc.engine.performing import Performer
 from dsc.engine.reaction import Entrance, Exit, Part, Reaction, initial_reaction, leaving_reaction
-from dsc.engine.record import Record
 from dsc.engine.situation import Decision, Situation
 from dsc.engine.state import NOTHING
 from dsc.engine.steps import Bound, Cancel, DecisionMade
-from dsc.engine.tables import Chart, CompiledPlot, Node
+from dsc.engine.tables import Chart, CompiledPlot
 from dsc.errors import RunawayError
 from dsc.events import DONE, DONE_STATE, NO_CANDIDATE, Event
 from dsc.model.states import DynamicState, SubmachineState
@@ -24,18 +23,19 @@ MAX_NESTING = 40
 """Plots inside plots; deeper than that, a plot contains itself without end."""
 
 
-class Execution:
+class Execution(Performer):
     """Changes running plots as reactions say.
 
     Attributes:
+        chart: where plots are found.
         finished: whether the outermost plot has reached its final state.
     """
 
-    def __init__(self, chart: Chart, situation: Situation, record: Record, performer: Performer) -> None:
-        self._chart = chart
-        self._situation = situation
-        self._record = record
-        self._performer = performer
+    __slots__ = ("chart", "finished")
+
+    def __init__(self, chart: Chart, situation: Situation, serials: int) -> None:
+        super().__init__(situation, serials)
+        self.chart = chart
         self.finished = False
 
     def enter_plot(self, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> Frame:
@@ -72,11 +72,11 @@ class Execution:
         """The internal actions of a transition; returns what it passes to its target."""
         assert part.edge is not None  # noqa: S101  # what has no transition does not act
         source = frame.compiled.nodes[part.edge.source].name
-        self._performer.act(frame, source, part.effect)
+        self.act(frame, source, part.effect)
         try:
-            return self._performer.values(frame, part.edge.passed)
+            return self.values(frame, part.edge.passed)
         except InputError as error:
-            self._performer.fail(frame, f"{frame.prefix}{source}: {error}")
+            self.fail(frame, f"{frame.prefix}{source}: {error}")
             return {}
 
     # -- leaving -----------------------------------------------------------------------------------------
@@ -85,23 +85,35 @@ class Execution:
         """Leave nodes in this order; what runs inside one is left just before it."""
         for one in exits:
             node, name = one.node, one.node.name
-            inner = frame.children.get(name) if node.holds_plot else None
-            if inner is not None:
-                self.leave_plot(inner)
-                inner.take_out()
+            if node.holds_plot:
+                self._empty(frame, name)
             if node.state is not None:
-                self._record.exited.append(frame.prefix + name)
+                self.exited.append(frame.prefix + name)
             if node.addressed:
                 self._exit_addressed(frame, one)
             elif one.actions:
-                self._performer.act(frame, name, one.actions)
+                self.act(frame, name, one.actions)
+
+    def _empty(self, frame: Frame, host: str) -> None:
+        """Leave what runs inside a state; where that is no more than leaving, nothing has to be thawed for it."""
+        resting = frame.resting.get(host)
+        if resting is not None and not resting.children:
+            reaction = leaving_reaction(resting.configuration)
+            if reaction.silent:
+                self.exited += [f"{frame.prefix}{host}/{name}" for name in reaction.exited]
+                frame.forget(host)
+                return
+        inner = frame.child(host)
+        if inner is not None:
+            self.leave_plot(inner)
+            inner.take_out()
 
     def _exit_addressed(self, frame: Frame, one: Exit) -> None:
         name = one.node.name
         activation = frame.activations[name]
         if one.cancels:
-            self._record.output.append(Cancel(activation))
-        self._performer.act(frame, name, one.actions, activation, first=len(one.node.entry))
+            self.output.append(Cancel(activation))
+        self.act(frame, name, one.actions, activation, first=len(one.node.entry))
         frame.activations = {other: serial for other, serial in frame.activations.items() if other != name}
         if frame.kept:
             frame.kept = tuple([waiting for waiting in frame.kept if waiting[0] != name])
@@ -126,61 +138,59 @@ class Execution:
         node, state = entrance.node, entrance.node.state
         activation = 0
         if node.addressed:
-            activation = self._record.next_serial()
+            activation = self.next_serial()
             frame.activations = {**frame.activations, node.name: activation}
         if state is not None:
-            self._record.entered.append(frame.prefix + node.name)
+            self.entered.append(frame.prefix + node.name)
         if entrance.actions:
-            self._performer.act(frame, node.name, entrance.actions, activation)
+            self.act(frame, node.name, entrance.actions, activation)
         if entrance.after:
-            self._performer.act(frame, node.name, entrance.after)
+            self.act(frame, node.name, entrance.after)
         if node.timed:
-            self._performer.start_timers(frame, node, activation)
-        if node.holds_plot:
-            self._fill(frame, node, passed)
+            self.start_timers(frame, node, activation)
+        if isinstance(state, SubmachineState):
+            self._bind_submachine(frame, node.name, state, passed)
+        elif isinstance(state, DynamicState):
+            self._bind_dynamic(frame, node.name, state, passed)
         if entrance.emits is not None:
-            self._performer.act(frame, node.name, (entrance.emits,))
+            self.act(frame, node.name, (entrance.emits,))
         if entrance.completes is not None:
             self._complete(frame, entrance.completes)
 
-    def _fill(self, frame: Frame, node: Node, passed: Mapping[str, Any]) -> None:
-        if isinstance(node.state, SubmachineState):
-            self._bind_submachine(frame, node.name, node.state, passed)
-        elif isinstance(node.state, DynamicState):
-            self._bind_dynamic(frame, node.name, node.state, passed)
-
     def _bind_submachine(self, frame: Frame, name: str, state: SubmachineState, passed: Mapping[str, Any]) -> None:
         try:
-            own = {key: term for key, term in state.arguments.items() if key not in passed}
-            arguments = {**self._performer.values(frame, own), **passed}
+            arguments = passed
+            if state.arguments:
+                own = {key: term for key, term in state.arguments.items() if key not in passed}
+                arguments = {**self.values(frame, own), **passed}
             if state.use.startswith("?"):
-                compiled = self._chart.bind(frame.variables[state.use[1:]])
+                compiled = self.chart.bind(frame.variables[state.use[1:]])
             else:
-                compiled = self._chart.compiled(state.use)
+                compiled = self.chart.compiled(state.use)
             self._bind(frame, name, compiled, arguments)
         except InputError as error:
-            self._performer.fail(frame, f"{frame.prefix}{name}: {error}")
+            self.fail(frame, f"{frame.prefix}{name}: {error}")
 
     def _bind_dynamic(self, frame: Frame, name: str, state: DynamicState, passed: Mapping[str, Any]) -> None:
-        bindings = self._performer.bindings(frame)
+        bindings = self.bindings(frame)
         if passed:
             places = {given: Variable(f"passed.{given}") for given in passed}
             state = state.model_copy(update={"arguments": {**state.arguments, **places}})
             bindings = {**bindings, **{f"passed.{given}": value for given, value in passed.items()}}
         try:
-            decision = self._situation.choose(state, frame.compiled.plot.name, bindings)
-            self._record.decisions.append(DecisionMade(frame.prefix + name, decision))
+            decision = self.situation.choose(state, frame.compiled.plot.name, bindings)
+            self.decisions.append(DecisionMade(frame.prefix + name, decision))
             self._bind_decision(frame, name, decision)
         except InputError as error:
-            self._performer.fail(frame, f"{frame.prefix}{name}: {error}")
+            self.fail(frame, f"{frame.prefix}{name}: {error}")
 
     def _bind_decision(self, frame: Frame, name: str, decision: Decision) -> None:
         if decision.satisfied:
             self._done(frame, frame.compiled.index[name], {})
         elif decision.chosen is None:
-            self._record.internal.append(Event(NO_CANDIDATE, to=frame.activations[name]))
+            self.internal.append(Event(NO_CANDIDATE, to=frame.activations[name]))
         else:
-            self._bind(frame, name, self._chart.compiled(decision.chosen), decision.arguments)
+            self._bind(frame, name, self.chart.compiled(decision.chosen), decision.arguments)
 
     def _bind(self, frame: Frame, name: str, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> None:
         if frame.depth >= MAX_NESTING:
@@ -190,9 +200,9 @@ class Execution:
         self._enter_initial(inner, initial_reaction(compiled))
 
     def _new_frame(self, compiled: CompiledPlot, arguments: Mapping[str, Any], path: str = "") -> Frame:
-        variables = fill_parameters(compiled.plot, arguments, self._situation)
-        self._record.bound.append(Bound(path, compiled.plot))
-        return Frame(self._record.next_serial(), compiled, initial_reaction(compiled).following, variables)
+        variables = fill_parameters(compiled.plot, arguments, self.situation)
+        self.bound.append(Bound(path, compiled.plot))
+        return Frame(self.next_serial(), compiled, initial_reaction(compiled).following, variables)
 
     # -- completion --------------------------------------------------------------------------------------
 
@@ -208,6 +218,6 @@ class Execution:
     def _done(self, frame: Frame, index: int, outputs: Mapping[str, Any]) -> None:
         node = frame.compiled.nodes[index]
         if frame.compiled.scxml:
-            self._record.internal.append(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
+            self.internal.append(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
         elif DONE in node.edges:
-            self._record.internal.append(Event(DONE, outputs, to=frame.activations[node.name], exact=True))
+            self.internal.append(Event(DONE, outputs, to=frame.activations[node.name], exact=True))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.engine.configuration import Configuration
@@ -15,14 +15,17 @@ class Frame:
     """One running plot; see `FrameState`. Mappings are replaced, not changed: the state keeps the old ones.
 
     Attributes:
+        children: the plots inside that this step has to do with, by the name of the state that holds each.
+        resting: the other plots inside, as they were.
         parent, host: the frame around it and the name of the state there that holds it.
         prefix: what its states' paths begin with.
+        depth: how many plots it is inside of.
         gone: whether the state that holds it was left.
     """
 
     __slots__ = (
         "activations", "children", "compiled", "configuration", "depth", "gone", "host", "kept", "parent",
-        "prefix", "serial", "variables", "was",
+        "prefix", "resting", "serial", "variables", "was",
     )  # fmt: skip
 
     def __init__(
@@ -34,6 +37,7 @@ class Frame:
         self.variables = variables
         self.activations: Mapping[str, int] = NOTHING
         self.children: dict[str, Frame] = {}
+        self.resting: Mapping[str, FrameState] = NOTHING
         self.kept: tuple[tuple[str, Event], ...] = ()
         self.parent: Frame | None = None
         self.host = ""
@@ -50,20 +54,27 @@ class Frame:
         parent.children[host] = self
 
     def take_out(self) -> None:
-        """Its state was left, and with it everything inside."""
-        for frame in self.frames():
-            frame.gone = True
+        """Its state was left."""
+        self.gone = True
         if self.parent is not None:
             del self.parent.children[self.host]
 
-    def position(self, index: int) -> tuple[int, ...]:
-        """Its place in document order through all plots: what is inside comes after, with a longer tuple."""
-        if self.parent is None:
-            return (index,)
-        return (*self.parent.position(self.parent.compiled.index[self.host]), index)
+    def forget(self, host: str) -> None:
+        """A plot inside at rest was left, without this step having to do anything in it."""
+        self.resting = {name: state for name, state in self.resting.items() if name != host}
+
+    def child(self, host: str) -> Frame | None:
+        """The plot inside that state, if there is one."""
+        found = self.children.get(host)
+        if found is None and host in self.resting:
+            found = thaw(self.resting[host], self, host)
+            self.forget(host)
+        return found
 
     def inner(self) -> list[Frame]:
         """The frames directly inside, in document order."""
+        for host in self.resting:
+            self.child(host)
         found = list(self.children.values())
         if len(found) > 1:
             found.sort(key=lambda frame: self.compiled.index[frame.host])
@@ -71,31 +82,42 @@ class Frame:
 
     def frames(self) -> list[Frame]:
         """This frame and all inside it, in document order."""
-        found = [self]
+        return [self, *(frame for child in self.inner() for frame in child.frames())]
+
+    def position(self, index: int) -> tuple[int, ...]:
+        """Its place in document order through all plots: what is inside comes after, with a longer tuple."""
+        if self.parent is None:
+            return (index,)
+        return (*self.parent.position(self.parent.compiled.index[self.host]), index)
+
+    def that(self, wanted: Callable[[Frame | FrameState], bool]) -> list[Frame]:
+        """This frame and those inside it, as far as they are wanted; only these are thawed."""
+        found = [self] if wanted(self) else []
         if self.children:
-            for child in self.inner():
-                found += child.frames()
+            for child in self.children.values():
+                found += child.that(wanted)
+        for host, state in self.resting.items():
+            if wanted(state) or (state.children and any(map(wanted, state.frames()))):
+                self.forget(host)
+                found += thaw(state, self, host).that(wanted)
         return found
 
 
 def thaw(state: FrameState, parent: Frame | None = None, host: str = "") -> Frame:
-    """A frame to work on."""
+    """A frame to work on; what runs inside it stays at rest until it is asked for."""
     frame = Frame(state.serial, state.compiled, state.configuration, state.variables)
     if parent is not None:
         frame.put_into(parent, host)
     frame.activations = state.activations
+    frame.resting = state.children
     frame.kept = state.kept
     frame.was = state
-    for name, child in state.children.items():
-        thaw(child, frame, name)
     return frame
 
 
 def freeze(frame: Frame) -> FrameState:
     """The frame as a value: the very one it was made from, if nothing has changed."""
-    children: Mapping[str, FrameState] = NOTHING
-    if frame.children:
-        children = {child.host: freeze(child) for child in frame.inner()}
+    children = _frozen(frame) if frame.children else frame.resting
     was = frame.was
     if (
         was is not None
@@ -111,5 +133,14 @@ def freeze(frame: Frame) -> FrameState:
     )
 
 
+def _frozen(frame: Frame) -> Mapping[str, FrameState]:
+    """The plots inside, in document order."""
+    children = {**frame.resting, **{host: freeze(child) for host, child in frame.children.items()}}
+    if len(children) > 1:
+        index = frame.compiled.index
+        return {host: children[host] for host in sorted(children, key=lambda host: index[host])}
+    return children
+
+
 def _same(one: Mapping[str, FrameState], other: Mapping[str, FrameState]) -> bool:
-    return len(one) == len(other) and all(child is other.get(name) for name, child in one.items())
+    return one is other or (len(one) == len(other) and all(child is other.get(name) for name, child in one.items()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dsc.engine.choice import Question, choice_of
@@ -10,12 +10,10 @@ from dsc.engine.configuration import configuration_of
 from dsc.engine.execution import Execution
 from dsc.engine.frames import Frame, freeze, thaw
 from dsc.engine.membership import settle
-from dsc.engine.performing import Performer
 from dsc.engine.reaction import Part, Reaction, reaction_of, report
-from dsc.engine.record import Record
 from dsc.engine.selection import Addressed, Enabled, Trigger, select
 from dsc.engine.situation import Situation
-from dsc.engine.state import MachineState, at_rest
+from dsc.engine.state import FrameState, MachineState, at_rest
 from dsc.engine.steps import Step
 from dsc.engine.tables import Chart, Edge
 from dsc.errors import RunawayError
@@ -27,21 +25,23 @@ MAX_MICROSTEPS = 1000
 """A macrostep that takes more is going round in circles."""
 
 
-class Macrostep:
-    """Works on thawed frames; `finish` freezes them into the next state."""
+class Macrostep(Execution):
+    """Works on thawed frames; `finish` freezes them into the next state.
+
+    What it can do is in layers, one a file, of one object: a step has no time for several.
+    """
+
+    __slots__ = ("_broken_guards", "_root")
 
     def __init__(self, chart: Chart, situation: Situation, state: MachineState) -> None:
-        self._chart = chart
-        self._record = Record(state.serials)
-        self._performer = Performer(situation, self._record)
-        self._execution = Execution(chart, situation, self._record, self._performer)
+        super().__init__(chart, situation, state.serials)
         self._root = thaw(state.root) if state.root else None
         self._broken_guards: set[tuple[int, Edge]] = set()
 
     def start(self, plot: str, arguments: Mapping[str, Any]) -> None:
         """Enter the outermost plot; raises `InputError` if there is none of that name or its arguments do not fit."""
-        self._root = self._execution.enter_plot(self._chart.compiled(plot), arguments)
-        self._record.end_microstep(None, ())
+        self._root = self.enter_plot(self.chart.compiled(plot), arguments)
+        self.end_microstep(None, ())
         self._rest()
 
     def react(self, event: Event | None) -> bool:
@@ -55,51 +55,51 @@ class Macrostep:
     def leave(self) -> None:
         """Leave all active states of all plots."""
         assert self._root is not None  # noqa: S101  # there is nothing to leave before the start
-        self._execution.leave_plot(self._root)
-        self._record.end_microstep(None, ())
+        self.leave_plot(self._root)
+        self.end_microstep(None, ())
         self._root = None
-        self._record.errors += [_reason(event) for event in self._record.internal if event.name in ERRORS]
+        self.errors += [_reason(event) for event in self.internal if event.name in ERRORS]
 
     def finish(self, event: Event | None, *, handled: bool) -> Step:
         """The step as a value."""
-        if self._execution.finished and self._root is not None:
+        if self.finished and self._root is not None:
             self.leave()
-        done = self._record
-        finished = self._execution.finished
+        root, serials = self._root, self.serials
         return Step(
-            at_rest(freeze(self._root), done.serials) if self._root else MachineState(None, done.serials, finished),
+            at_rest(freeze(root), serials) if root else MachineState(None, serials, self.finished),
             event,
             handled,
-            tuple(done.microsteps),
-            tuple(done.decisions),
-            done.knowledge,
-            tuple(done.output),
-            tuple(done.emitted),
-            tuple(done.errors),
+            tuple(self.microsteps),
+            tuple(self.decisions),
+            self.knowledge,
+            tuple(self.output),
+            tuple(self.emitted),
+            tuple(self.errors),
         )
 
     def _rest(self) -> None:
-        while not self._execution.finished:
+        while not self.finished:
             if self._take_spontaneous():
                 continue
-            if not self._record.internal:
+            if not self.internal:
                 return
-            event = self._record.internal.popleft()
+            event = self.internal.popleft()
             if not self._take(event) and event.name in ERRORS:
-                self._record.errors.append(_reason(event))
+                self.errors.append(_reason(event))
 
     # -- one event ---------------------------------------------------------------------------------------
 
     def _take(self, event: Event) -> bool:
         """One microstep, if anybody listens to the event and can take it; or somebody keeps it for later."""
-        self._performer.event = event
+        self.event = event
         if event.to is not None:
             return self._take_addressed(event, event.to)
-        listeners = [
-            frame
-            for frame in self._frames()
-            if event.frame in (None, frame.serial) and choice_of(frame.configuration, event.name) is not None
-        ]
+        name, scope = event.name, event.frame
+
+        def listens(one: Frame | FrameState) -> bool:
+            return (scope is None or scope == one.serial) and choice_of(one.configuration, name) is not None
+
+        listeners = self._that(listens)
         if len(listeners) == 1:
             return self._take_alone(listeners[0], event.name, event)
         return bool(listeners) and self._take_together(event.name, event)
@@ -116,21 +116,19 @@ class Macrostep:
 
     def _take_spontaneous(self) -> bool:
         """One microstep, if a change of the world enables any transition."""
-        concerned = [frame for frame in self._frames() if frame.configuration.spontaneous]
+        concerned = self._that(_is_spontaneous)
         if len(concerned) == 1:
             return self._take_alone(concerned[0], None, None)
         return bool(concerned) and self._take_together(None, None)
 
-    def _frames(self) -> list[Frame]:
+    def _that(self, wanted: Callable[[Frame | FrameState], bool]) -> list[Frame]:
         assert self._root is not None  # noqa: S101  # `step` answers for a machine that has ended
-        return self._root.frames()
+        return self._root.that(wanted)
 
     def _find(self, activation: int) -> tuple[Frame, str] | None:
         """The frame and state that were given this number, if they are still active."""
-        for frame in self._frames():
-            for state, serial in frame.activations.items():
-                if serial == activation:
-                    return frame, state
+        for frame in self._that(lambda one: activation in one.activations.values()):
+            return frame, next(state for state, serial in frame.activations.items() if serial == activation)
         return None
 
     def _take_alone(self, frame: Frame, trigger: Trigger, event: Event | None) -> bool:
@@ -139,23 +137,21 @@ class Macrostep:
             choice = choice.follow(self._holds(frame, choice.edge, choice.condition))
         if choice is None:
             return False
-        if choice.keeps:
-            self._keep(frame, choice.keeps, event)
+        kept = bool(choice.keeps) and self._keep(frame, choice.keeps, event)
         if not choice.parts:
-            return bool(choice.keeps) and event is not None
+            return kept
         self._check_progress()
-        self._execution.take(frame, choice)
-        self._record.end_microstep(event, choice.taken_in(frame.compiled, frame.prefix))
+        self.take(frame, choice)
+        self.end_microstep(event, choice.taken_in(frame.compiled, frame.prefix))
         return True
 
     def _take_together(self, trigger: Trigger, event: Event | None) -> bool:
         """Several plots listen: what is enabled in one may preempt what is enabled in another (SCXML 3.13)."""
         assert self._root is not None  # noqa: S101
         taken, late = select(self._root, trigger, self._guard)
-        for one in late:
-            self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event)
+        kept = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
         if not taken:
-            return bool(late) and event is not None
+            return any(kept)
         self._check_progress()
         by_frame: dict[Frame, list[Edge]] = {}
         for one in taken:
@@ -163,13 +159,13 @@ class Macrostep:
         reactions = {frame: reaction_of(frame.configuration, tuple(edges)) for frame, edges in by_frame.items()}
         parts = [(one.frame, _part_of(one, reactions[one.frame])) for one in taken]
         reports = tuple([report(one.edge, one.frame.compiled, one.frame.prefix) for one in taken])
-        self._execution.take_together(reactions, parts)
-        self._record.end_microstep(event, reports)
+        self.take_together(reactions, parts)
+        self.end_microstep(event, reports)
         return True
 
     def _check_progress(self) -> None:
-        if len(self._record.microsteps) >= MAX_MICROSTEPS:
-            trail = [path for micro in self._record.microsteps[-6:] for path in micro.entered]
+        if len(self.microsteps) >= MAX_MICROSTEPS:
+            trail = [path for micro in self.microsteps[-6:] for path in micro.entered]
             raise RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
 
     # -- guards ------------------------------------------------------------------------------------------
@@ -182,28 +178,30 @@ class Macrostep:
 
     def _holds(self, frame: Frame, edge: Edge, condition: Expression) -> bool:
         try:
-            return self._performer.holds(frame, condition)
+            return self.holds(frame, condition)
         except InputError as error:
             # Once in a macrostep: a guard without trigger is looked at again after every microstep.
             if (frame.serial, edge) not in self._broken_guards:
                 self._broken_guards.add((frame.serial, edge))
                 source = frame.prefix + frame.compiled.nodes[edge.source].name
-                self._performer.fail(frame, f"guard of '{edge.trigger}' in {source}: {error}")
+                self.fail(frame, f"guard of '{edge.trigger}' in {source}: {error}")
             return False
 
     # -- time --------------------------------------------------------------------------------------------
 
-    def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> None:
+    def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> bool:
         """An event that a state would take if it could be left already waits with it; a period comes again."""
-        if event is not None and event.name != EVERY:
-            frame.kept = (*frame.kept, *((state, event) for state in states))
+        if event is None or event.name == EVERY:
+            return False
+        frame.kept = (*frame.kept, *((state, event) for state in states))
+        return True
 
     def _least_time_passed(self, frame: Frame, state: str) -> bool:
         """The state can be left from now on; what it kept is offered again, before anything new."""
         before = frame.configuration
         waiting = before.waiting - {frame.compiled.index[state]}
         frame.configuration = configuration_of(frame.compiled, before.active, waiting, before.history)
-        self._record.internal.extend(kept for name, kept in frame.kept if name == state)
+        self.internal.extend(kept for name, kept in frame.kept if name == state)
         frame.kept = tuple([one for one in frame.kept if one[0] != state])
         return True
 
@@ -213,7 +211,11 @@ class Macrostep:
             frame, state = found
             node = frame.compiled.nodes[frame.compiled.index[state]]
             seconds = node.cycles[event.number].seconds
-            self._performer.start_timer(frame, node, event.to or 0, EVERY, event.number, seconds)
+            self.start_timer(frame, node, event.to or 0, EVERY, event.number, seconds)
+
+
+def _is_spontaneous(one: Frame | FrameState) -> bool:
+    return one.configuration.spontaneous
 
 
 def _part_of(one: Enabled, reaction: Reaction) -> Part:

@@ -23,21 +23,28 @@ SHORTEST_PERIOD = 0.001
 """Seconds; a period of nothing would leave no time for anything else."""
 
 
-class Performer:
-    """Carries out actions; `event` is the last one taken, whose attributes they read."""
+class Performer(Record):
+    """Carries out actions.
 
-    def __init__(self, situation: Situation, record: Record) -> None:
-        self._situation = situation
-        self._record = record
+    Attributes:
+        situation: the world as the chart sees it.
+        event: the last one taken, whose attributes actions read.
+    """
+
+    __slots__ = ("event", "situation")
+
+    def __init__(self, situation: Situation, serials: int) -> None:
+        super().__init__(serials)
+        self.situation = situation
         self.event: Event | None = None
 
     def holds(self, frame: Frame, condition: Expression) -> bool:
         """Whether a condition is true in a frame; raises `InputError`."""
-        return self._situation.holds(condition, self.bindings(frame))
+        return self.situation.holds(condition, self.bindings(frame))
 
     def value(self, frame: Frame, term: TermField) -> Any:
         """What a term stands for in a frame; raises `InputError`."""
-        return evaluate(term, self.bindings(frame), self._situation)
+        return evaluate(term, self.bindings(frame), self.situation)
 
     def values(self, frame: Frame, terms: Mapping[str, TermField]) -> dict[str, Any]:
         """What several terms stand for; raises `InputError`."""
@@ -52,7 +59,7 @@ class Performer:
     def fail(self, frame: Frame, reason: str) -> None:
         """Let the plot know that something could not be evaluated."""
         name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
-        self._record.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
+        self.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
 
     def act(
         self, frame: Frame, state: str, actions: Iterable[Action], activation: int = 0, first: int = 0
@@ -68,7 +75,7 @@ class Performer:
                     self._perform(frame, action)
                 else:
                     value = partial(self.value, frame)
-                    self._record.output.append(output_of(action, activation, number, value))
+                    self.output.append(output_of(action, activation, number, value))
             except InputError as error:
                 self.fail(frame, f"{frame.prefix}{state}: {error}")
                 if frame.compiled.scxml:
@@ -92,33 +99,33 @@ class Performer:
         except InputError as error:
             self.fail(frame, f"{frame.prefix}{node.name}: {error}")
         else:
-            self._record.output.append(StartTimer(activation, index, delay, event))
+            self.output.append(StartTimer(activation, index, delay, event))
 
     def _perform(self, frame: Frame, action: Internal) -> None:
         match action:
             case Assign(assign=terms):
                 frame.variables = {**frame.variables, **self.values(frame, terms)}
             case Tell(tell=effect):
-                told = self._situation.tell(effect, self.bindings(frame))
-                self._record.knowledge = self._record.knowledge.then(told)
+                told = self.situation.tell(effect, self.bindings(frame))
+                self.knowledge = self.knowledge.then(told)
             case Emit():
                 attributes = self.values(frame, action.arguments)
                 delay = None if action.delay is None else delay_of(self.value(frame, action.delay))
                 self._emit(frame, action.emit, attributes, delay)
             case Log(log=parts, label=label):
                 text = "".join(str(self.value(frame, part)) for part in parts)
-                self._record.output.append(Note(label, text))
+                self.output.append(Note(label, text))
             case Choose():
                 for inner in action.then if self.holds(frame, action.condition) else action.otherwise:
                     self._perform(frame, inner)
 
     def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any], delay: float | None) -> None:
         if delay is not None:
-            self._record.output.append(SendLater(Event(name, attributes, frame=frame.serial), delay))
+            self.output.append(SendLater(Event(name, attributes, frame=frame.serial), delay))
         elif name not in frame.compiled.plot.emits:
-            self._record.internal.append(Event(name, attributes, frame=frame.serial))
+            self.internal.append(Event(name, attributes, frame=frame.serial))
         elif frame.parent is None:
-            self._record.emitted.append(Event(name, attributes))
+            self.emitted.append(Event(name, attributes))
         elif not frame.gone:
-            self._record.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
+            self.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
         # Else the host was left by another transition of this microstep: nobody waits for an outcome any more.

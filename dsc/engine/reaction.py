@@ -79,6 +79,7 @@ class Reaction:
         following: the configuration after it.
         keeps: names of states that keep the event until their least time has passed.
         taken, exited, entered: how it is reported for the outermost plot.
+        silent: whether nothing happens but that states are left.
         still: whether nothing but the configuration changes.
         reports: what was taken, for plots inside, by the path of the state that holds them.
     """
@@ -90,6 +91,7 @@ class Reaction:
     taken: tuple[Taken, ...] = ()
     exited: tuple[str, ...] = ()
     entered: tuple[str, ...] = ()
+    silent: bool = False
     still: bool = False
     reports: dict[str, tuple[Taken, ...]] = field(default_factory=dict)
 
@@ -214,11 +216,13 @@ class _Work:
             tuple(sorted(self.remembered.items())),
         )
         quiet = not keeps and not self.waiting and not following.spontaneous
+        silent = not parts and all(map(_leaves_quietly, exits))
         still = quiet and bool(parts) and all(map(_leaves_quietly, exits)) and all(map(_moves_quietly, parts))
         return Reaction(
             parts, exits, following, keeps, taken,
             exited=tuple(_names(one.node for one in exits)),
             entered=tuple(_names(one.node for one in entrances)),
+            silent=silent,
             still=still,
         )  # fmt: skip
 

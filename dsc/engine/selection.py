@@ -44,8 +44,8 @@ class Enabled:
         compiled, configuration = self.frame.compiled, self.frame.configuration
         indices = left_by(compiled, self.edge, configuration.active, dict(configuration.history))
         found = {(self.frame, index) for index in indices}
-        for name, child in self.frame.children.items():
-            if compiled.index[name] in indices:
+        for child in self.frame.inner():
+            if compiled.index[child.host] in indices:
                 found.update(everything(child))
         return found
 
@@ -106,7 +106,7 @@ def _has_to_wait(one: Enabled) -> bool:
 def _leaves(frame: Frame) -> Iterator[tuple[Frame, int]]:
     """All active states, here and in plots inside, that have no active state inside; document order."""
     for index in frame.configuration.leaves:
-        inner = frame.children.get(frame.compiled.nodes[index].name)
+        inner = frame.child(frame.compiled.nodes[index].name)
         if inner is None:
             yield frame, index
         else:

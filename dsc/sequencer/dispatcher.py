@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dsc.engine.steps import Cancel, Output, SendLater, SetParameter, Start, StartTimer, SwitchMode
-from dsc.events import SKILL_ERROR, TIMED_OUT, Event
+from dsc.events import EVERY, SKILL_ERROR, TIMED_OUT, Event
 from dsc.skills import Clock, Component, Outcome, SkillCall
 from knowledge_base.errors import UnknownNameError
 
@@ -68,8 +68,14 @@ class Dispatcher:
 
     @property
     def waiting(self) -> bool:
-        """Whether any answer or timeout is still to come."""
-        return bool(self._running) or bool(self._timers) or bool(self._sent)
+        """Whether any answer or timeout is still to come; periods, which always are, do not count."""
+        timeouts = any(event != EVERY for _, event, _ in self._timers)
+        return bool(self._running) or timeouts or bool(self._sent)
+
+    @property
+    def periods(self) -> frozenset[tuple[int, int]]:
+        """Activation and number of every period that passes at present."""
+        return frozenset((activation, number) for activation, event, number in self._timers if event == EVERY)
 
     def dispatch(self, output: Output) -> None:
         """Carry out one output of the machine.

@@ -11,9 +11,9 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
-from dsc.engine.steps import Start, Step
+from dsc.engine.steps import Start, StartTimer, Step
 from dsc.errors import RunawayError
-from dsc.events import RESERVED, Event
+from dsc.events import EVERY, RESERVED, Event
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.dispatcher import Dispatcher, SkillMessage, TimerMessage
 from dsc.sequencer.tracing import StepTracer
@@ -95,6 +95,7 @@ class Sequencer:
         self._caused_by: dict[str, int] = {}
         self._listeners: list[StepListener] = []
         self._coming: set[asyncio.TimerHandle] = set()
+        self._in_vain: set[tuple[int, int]] = set()
 
     def listen(self, listener: StepListener) -> None:
         """Tell `listener` every macrostep from now on, before its actions leave."""
@@ -196,8 +197,9 @@ class Sequencer:
         self._coming.add(handle)
 
     def _idle(self) -> bool:
-        waiting = self.dispatcher.waiting or bool(self._coming)
-        return not self._open_ended and self._inbox.empty() and not waiting
+        """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
+        coming = self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.periods <= self._in_vain
+        return not self._open_ended and self._inbox.empty() and not coming
 
     def _situation(self) -> KnowledgeSituation:
         return KnowledgeSituation(self.knowledge, self.library)
@@ -205,7 +207,9 @@ class Sequencer:
     def _take(self, message: Message, progress: _Progress) -> None:
         try:
             event = self._received(message)
+            before = self.machine.state
             step = self.machine.send(event, self._situation())
+            self._note_periods(message, in_vain=step.state == before and _is_vain(step))
             if isinstance(message, SkillMessage) and message.final:
                 self.dispatcher.settle(message.start)
             self._commit(step, progress)
@@ -213,6 +217,12 @@ class Sequencer:
                 self._unhandled(message, event, progress)
         except (RunawayError, InputError) as error:
             progress.problem = str(error)
+
+    def _note_periods(self, message: Message, *, in_vain: bool) -> None:
+        if not isinstance(message, TimerMessage) or not in_vain:
+            self._in_vain.clear()
+        elif message.timer.event == EVERY:
+            self._in_vain.add((message.timer.activation, message.timer.index))
 
     def _received(self, message: Message) -> Event | None:
         """Apply what the message observed; the event the machine shall see, if any."""
@@ -228,7 +238,8 @@ class Sequencer:
             self.trace.cause = None
             timer = message.timer
             event = Event(timer.event, to=timer.activation, exact=True, number=timer.index)
-            self.trace.cause = self._tracer.event(event, "timer")
+            if timer.event != EVERY:  # most periods pass without anything happening; if not, the step says so
+                self.trace.cause = self._tracer.event(event, "timer")
             return event
         start, outcome = message.start, message.outcome
         name = start.names.get(outcome.event, outcome.event)
@@ -266,6 +277,12 @@ class Sequencer:
             skill = f"{message.start.component}.{message.start.skill}"
             why = event.attributes.get("reason") if event.name in RESERVED else None
             progress.problem = f"nobody handles '{event.name}' of {skill}" + (f": {why}" if why else "")
+
+
+def _is_vain(step: Step) -> bool:
+    """Whether nothing came of it but the next period; in the same state and world, nothing ever will."""
+    only_timers = all(isinstance(output, StartTimer) for output in step.output)
+    return only_timers and not step.knowledge and not step.emitted
 
 
 def _plain_data(event: Event) -> dict[str, Any]:

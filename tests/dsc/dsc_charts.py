@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator as op
 import textwrap
 from collections.abc import Mapping
 
@@ -20,6 +21,9 @@ from knowledge_base.language import expression as lang
 
 PROPERTY = settings(deadline=None, derandomize=True)
 """How properties are tested: the same examples on every machine, however slow it is."""
+
+
+COMPARE = {"=": op.eq, "!=": op.ne, "<": op.lt, ">": op.gt, "<=": op.le, ">=": op.ge}
 
 
 def plot(text, source=None):
@@ -51,7 +55,7 @@ class FakeSituation:
                 return any(self.holds(p, bindings) for p in parts)
             case lang.Comparison(operator, left, right):
                 a, b = self.value(left, bindings), self.value(right, bindings)
-                return {"=": a == b, "!=": a != b, "<": a < b, ">": a > b, "<=": a <= b, ">=": a >= b}[operator]
+                return COMPARE[operator](a, b)
         raise NotImplementedError(expression)
 
     def value(self, term, bindings):
