@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, islice
 from typing import Any
 
 from dsc.engine.tables import CompiledPlot, Default, Edge, Node, Timed
@@ -96,24 +96,26 @@ class _Layout:
 
     def add_edges(self, node: Node, state: State | Connector) -> None:
         """The transitions of one state, in all tables of its node."""
-        edges = {place: self._edge(node, place, trigger, t) for place, trigger, t in state.placed_transitions()}
-        if isinstance(state, Connector):
-            node.always = tuple(edges.values())
-            return
-        node.edges = {event: tuple(edges["on", event, n] for n in range(len(many))) for event, many in state.on.items()}
-        node.timeouts = tuple(Timed(timed.seconds, edges["after", n]) for n, timed in enumerate(state.after))
-        node.cycles = tuple(Timed(timed.seconds, edges["every", n]) for n, timed in enumerate(state.every))
-        node.always = tuple(edges["always", n] for n in range(len(state.always)))
+        # They come in the order of the tables, so none is looked up by its place: large plots have many.
+        edges = (self._edge(node, place, trigger, one) for place, trigger, one in state.placed_transitions())
+        if isinstance(state, State):
+            node.edges = {event: tuple(islice(edges, len(many))) for event, many in state.on.items()}
+            node.timeouts = tuple(Timed(timed.seconds, next(edges)) for timed in state.after)
+            node.cycles = tuple(Timed(timed.seconds, next(edges)) for timed in state.every)
+        node.always = tuple(edges)
 
     def _edge(self, node: Node, place: tuple[str | int, ...], trigger: str, transition: Transition) -> Edge:
         targets = tuple([self._target(node, name) for name in transition.targets])
         if len(targets) > 1 and not self._together(targets):
             raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
-        within = isinstance(node.state, CompositeState) and all(node.index < at <= node.last for at in targets)
         return Edge(
             node.index, trigger, targets, transition.guard, transition.effect, transition.rule,
-            transition.internal and within, place, transition.passed, tuple(self._cleared(node, transition)),
+            transition.internal and self._stays(node, targets), place, transition.passed,
+            tuple(self._cleared(node, transition)) if transition.clear else (),
         )  # fmt: skip
+
+    def _stays(self, node: Node, targets: Sequence[int]) -> bool:
+        return isinstance(node.state, CompositeState) and all(node.index < at <= node.last for at in targets)
 
     def _together(self, targets: Sequence[int]) -> bool:
         """Whether all targets can be active at once: any two are in different regions (SCXML 3.11)."""

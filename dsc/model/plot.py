@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
@@ -135,6 +135,7 @@ class ActionPlot(Frozen):
     generated: bool = False
     profile: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
+    _content: str | None = PrivateAttr(default=None)
 
     def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
         """The same plot that remembers where its parts stand in the text it was read from."""
@@ -203,10 +204,6 @@ class ActionPlot(Frozen):
             elif isinstance(state, OrthogonalState):
                 yield from state.regions.values()
 
-    def within(self, path: Path) -> set[str]:
-        """The names of the states below the part at `path`."""
-        return {name for name, _, other in self.walk() if other[: len(path)] == path and other != path}
-
     def state(self, name: str) -> AnyState:
         """The state of that name anywhere in the plot.
 
@@ -242,8 +239,16 @@ class ActionPlot(Frozen):
     def __hash__(self) -> int:
         return hash(self._text())
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """See pydantic; what was worked out about the content is not copied with it."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied._content = None  # noqa: SLF001  a plot, like this one
+        return copied
+
     def _text(self) -> str:
-        return json.dumps(self.to_form())
+        if self._content is None:  # a trace asks for the digest whenever a plot is bound
+            self._content = json.dumps(self.to_form())
+        return self._content
 
 
 def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, AnyState, Path]]:

@@ -62,11 +62,15 @@ class Transition(Frozen):
     @property
     def targets(self) -> tuple[str, ...]:
         """All states to enter."""
-        return () if self.target is None else (self.target, *self.also)
+        if self.target is None:
+            return ()
+        return (self.target, *self.also) if self.also else (self.target,)
 
     @property
     def effect(self) -> tuple[Internal, ...]:
         """All internal actions in order of execution."""
+        if not self.assign and self.tell is None and self.emit is None:
+            return self.do
         actions: list[Internal] = list(self.do)
         if self.assign:
             actions.append(Assign(assign=self.assign))
@@ -79,7 +83,8 @@ class Transition(Frozen):
     @property
     def emitted(self) -> tuple[str, ...]:
         """The events its actions fire."""
-        return tuple(action.emit for action in flat(self.effect) if isinstance(action, Emit))
+        effect = self.effect  # most transitions have none, and large plots have many transitions
+        return tuple(action.emit for action in flat(effect) if isinstance(action, Emit)) if effect else ()
 
 
 class TimedTransition(Transition):

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from dsc.dynamic.library import Library
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Parameter, Path, initial_of
 from dsc.model.states import DynamicState, HistoryState, SubmachineState
 from dsc.model.transitions import Source, Transition
+from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
 Holder = SubmachineState | DynamicState
 """A state whose content is a plot."""
 
 
-def check_arguments(plot: ActionPlot, library: Library) -> Iterator[Finding]:
+def check_arguments(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """Findings about the arguments of used plots."""
-    ways_in = list(_ways_in(plot, library))
-    for name, state, path in plot.walk():
+    entrances = _Entrances(plot, library, nesting)
+    for name, state, path in nesting.states:
         if isinstance(state, Holder):
             yield from _known(plot, state, set(state.arguments), (*path, "with"), library)
             for need in _needs(state, library):
-                yield from _given(plot, name, path, need, ways_in)
-        if isinstance(state, Source):
-            for inside, _, transition in state.placed_transitions():
-                yield from _passed(plot, transition, (*path, *inside), library)
+                yield from _given(plot, name, path, need, entrances)
+        for inside, _, transition in nesting.leaving(path):
+            if transition.passed:
+                yield from _passed(plot, transition, (*path, *inside), library, nesting)
     for number, rule in enumerate(plot.rules):
         if rule.do.use is not None:
             used, here = library.plot(rule.do.use), ("rules", number, "do", "with")
@@ -69,10 +72,10 @@ def _unknown(plot: ActionPlot, used: ActionPlot, given: set[str], path: Path) ->
         yield Finding(error, "known parameter")
 
 
-def _passed(plot: ActionPlot, transition: Transition, path: Path, library: Library) -> Iterator[Finding]:
-    if not transition.passed:
-        return
-    target = None if transition.target is None else plot.state(transition.target)
+def _passed(
+    plot: ActionPlot, transition: Transition, path: Path, library: Library, nesting: Nesting
+) -> Iterator[Finding]:
+    target = None if transition.target is None else nesting.state(transition.target)
     if isinstance(target, Holder):
         yield from _known(plot, target, set(transition.passed), (*path, "pass"), library)
         return
@@ -112,35 +115,59 @@ def _needs(state: Holder, library: Library) -> Iterator[_Need]:
                 yield _Need(used.name, name)
 
 
-def _ways_in(plot: ActionPlot, library: Library) -> Iterator[_WayIn]:
-    try:
-        expanded = library.expanded(plot)
-    except InputError:  # which is a finding about the wiring
-        expanded = plot
-    own = {name for name, _, _ in plot.walk()}
-    for name, state, path in expanded.walk():
-        if isinstance(state, Source):
-            for inside, _, transition in state.placed_transitions():
-                written = name in own and transition.rule is None
-                yield _WayIn(transition, (*path, *inside) if written else None)
+class _Entrances:
+    """How states are entered, gathered when it is first asked for: in most plots `with` leaves nothing open."""
+
+    def __init__(self, plot: ActionPlot, library: Library, nesting: Nesting) -> None:
+        self._plot = plot
+        self._library = library
+        self._nesting = nesting
+
+    @cached_property
+    def ways(self) -> Mapping[str, list[_WayIn]]:
+        """State -> the transitions that lead to it."""
+        try:
+            expanded = self._library.expanded(self._plot)
+        except InputError:  # which is a finding about the wiring
+            expanded = self._plot
+        found: defaultdict[str, list[_WayIn]] = defaultdict(list)
+        for name, state, path in expanded.walk():
+            for inside, _, transition in state.placed_transitions() if isinstance(state, Source) else ():
+                written = name in self._nesting.names and transition.rule is None
+                way = _WayIn(transition, (*path, *inside) if written else None)
+                for target in transition.targets:
+                    found[target].append(way)
+        return found
+
+    def by_default(self, name: str, path: Path) -> bool:
+        """Whether the state begins its scope, or a history may bring it back."""
+        return name in self._defaults or any(path[:length] in self._remembered for length in range(len(path)))
+
+    @cached_property
+    def _defaults(self) -> set[str]:
+        histories = {state.target for _, state, _ in self._nesting.states if isinstance(state, HistoryState)}
+        return histories | {initial_of(scope) for scope in self._plot.scopes()}
+
+    @cached_property
+    def _remembered(self) -> set[Path]:
+        return {path[:-2] for _, state, path in self._nesting.states if isinstance(state, HistoryState)}
 
 
-def _given(plot: ActionPlot, name: str, path: Path, need: _Need, ways_in: Iterable[_WayIn]) -> Iterator[Finding]:
+def _given(plot: ActionPlot, name: str, path: Path, need: _Need, entrances: _Entrances) -> Iterator[Finding]:
     """A parameter that `with` leaves open is passed on every way into the state."""
-    leading = [way for way in ways_in if name in way.transition.targets]
-    passing = [way for way in leading if way.transition.target == name and need.parameter in way.transition.passed]
-    if not passing:
+    leading = entrances.ways.get(name, [])
+    silent = [way for way in leading if way.transition.target != name or need.parameter not in way.transition.passed]
+    if len(silent) == len(leading):
         yield _missing(plot, need, (*path, "with"))
         return
-    if _entered_by_default(plot, name):
+    if entrances.by_default(name, path):
         error = SchemaError(
             f"state '{name}' can be entered without a transition, but plot '{need.plot}' needs '{need.parameter}'",
             place=plot.place(path),
         )
         yield Finding(error, "parameters are given", f"add `{need.parameter}: …` under its `with`")
-    for way in leading:
-        if way not in passing:
-            yield _not_passed(plot, name, path, need, way)
+    for way in silent:
+        yield _not_passed(plot, name, path, need, way)
 
 
 def _missing(plot: ActionPlot, need: _Need, path: Path) -> Finding:
@@ -157,12 +184,3 @@ def _not_passed(plot: ActionPlot, name: str, path: Path, need: _Need, way: _WayI
     )
     fix = f"add `{need.parameter}: …` under its `pass`" if way.path else f"add `{need.parameter}: …` under `with`"
     return Finding(error, "parameters are given", fix)
-
-
-def _entered_by_default(plot: ActionPlot, name: str) -> bool:
-    """Whether the state begins its scope, or a history may bring it back."""
-    firsts = {initial_of(scope) for scope in plot.scopes()}
-    around = [path[:-2] for _, state, path in plot.walk() if isinstance(state, HistoryState)]
-    defaults = {state.target for _, state, _ in plot.walk() if isinstance(state, HistoryState)}
-    here = next(path for found, _, path in plot.walk() if found == name)
-    return name in firsts | defaults or any(here[: len(scope)] == scope for scope in around)

@@ -15,6 +15,7 @@ from dsc.model.plot import ActionPlot, Parameter, Path, Rule, Variable
 from dsc.model.states import AnyState, DynamicState, FinalState, State, SubmachineState
 from dsc.model.transitions import TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
+from dsc.validation.nesting import Nesting
 from dsc.validation.wiring import Skills
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.check import check, check_effect
@@ -30,18 +31,21 @@ Types = Mapping[str, str | None]
 
 
 def check_data(
-    plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills
+    plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
 ) -> Iterator[Finding]:
     """Findings about variables, types, conditions, effects and arguments."""
-    yield from _Data(plot, library, schema, skills).findings()
+    yield from _Data(plot, library, schema, skills, nesting).findings()
 
 
 class _Data:
-    def __init__(self, plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills) -> None:
+    def __init__(
+        self, plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
+    ) -> None:
         self._plot = plot
         self._library = library
         self._schema = schema
         self._skills = skills
+        self._nesting = nesting
         self._assigned = {**plot.variables, **plot.outputs}
         declared: dict[str, Parameter | Variable] = {**plot.parameters, **self._assigned}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
@@ -51,7 +55,7 @@ class _Data:
         if self._plot.when is not None:
             own = {name: self._types[name] for name in self._plot.parameters}
             yield from self._condition(self._plot.when, own, ("when",))
-        for _, state, path in self._plot.walk():
+        for _, state, path in self._nesting.states:
             if isinstance(state, State):
                 yield from self._state(state, path)
             elif isinstance(state, FinalState):
@@ -78,7 +82,7 @@ class _Data:
 
     def _continued(self, rule: Rule, event: Types, path: Path) -> Iterator[Finding]:
         """What goes on as if a state were done has the rule's event, not the outputs that `done` would bring."""
-        for name, state, _ in self._plot.walk():
+        for name, state, _ in self._nesting.states:
             answered = rule.on in outcomes_of(state, self._library) and (not rule.of or name in rule.of)
             if answered and isinstance(state, State) and outputs_of(state, self._library):
                 for transition in state.on.get(DONE, ()):
@@ -109,9 +113,10 @@ class _Data:
                     yield from self._internal((action,), None, (*path, key, position))
                 else:
                     yield from self._external(action, (*path, key, position))
-        for inside, event, transition in state.placed_transitions():
-            attributes = self._event_types(state, event) if event in state.on else None
-            yield from self._transition(transition, attributes, (*path, *inside))
+        for inside, event, transition in self._nesting.leaving(path):
+            if transition.guard is not None or transition.passed or transition.effect:
+                attributes = self._event_types(state, event) if event in state.on else None
+                yield from self._transition(transition, attributes, (*path, *inside))
             if isinstance(transition, TimedTransition):
                 yield from self._terms([("seconds", transition.seconds)], None, (*path, *inside))
         if state.at_least is not None:
@@ -125,12 +130,12 @@ class _Data:
         # Which event brought the run here is not known beforehand.
         if isinstance(connector, SelectState):
             yield from self._terms([("select", connector.select)], None, path)
-        for inside, _, transition in connector.placed_transitions():
+        for inside, _, transition in self._nesting.leaving(path):
             yield from self._transition(transition, None, (*path, *inside))
 
     def _transition(self, transition: Transition, attributes: Types | None, path: Path) -> Iterator[Finding]:
-        scope = self._scope(attributes, transition.guard)
         if transition.guard is not None:
+            scope = self._scope(attributes, transition.guard)
             yield from self._condition(transition.guard, scope, (*path, "when"))
         yield from self._terms(transition.passed.items(), attributes, (*path, "pass"))
         yield from self._internal(transition.effect, attributes, path)
@@ -184,12 +189,12 @@ class _Data:
     # -- the language ------------------------------------------------------------------------------------
 
     def _condition(self, condition: Expression, scope: Types, path: Path) -> Iterator[Finding]:
-        states = {name for name, _, _ in self._plot.walk()}
         for name in asked_states(condition):
-            if name not in states:
+            if name not in self._nesting.names:
                 error = UnknownNameError(
-                    f"there is no state '{name}'", place=self._plot.place(path), found=name, valid=states
-                )
+                    f"there is no state '{name}'", place=self._plot.place(path),
+                    found=name, valid=self._nesting.names,
+                )  # fmt: skip
                 yield Finding(error, "condition")
         if self._plot.profile == "scxml":
             condition = settle(condition, lambda _: True)
@@ -258,7 +263,7 @@ class _Data:
         """The attributes a rule's event has wherever it can come from, also from steps of a plan."""
         found: dict[str, str | None] = {}
         known = False
-        sources = [outcomes_of(state, self._library) for _, state, _ in self._plot.walk()]
+        sources = [outcomes_of(state, self._library) for _, state, _ in self._nesting.states]
         sources += [plot.emits for plot in self._library if plot.implements]
         for outcomes in sources:
             if event in outcomes:
@@ -268,7 +273,7 @@ class _Data:
         return found if known else None
 
     def _unknown_event(self, event: str, path: Path) -> Finding:
-        valid = {name for _, state, _ in self._plot.walk() for name in outcomes_of(state, self._library)}
+        valid = {name for _, state, _ in self._nesting.states for name in outcomes_of(state, self._library)}
         valid |= {name for plot in self._library if plot.implements for name in plot.emits}
         error = UnknownNameError(
             f"no state of this plot can end with '{event}'", place=self._plot.place(path), found=event, valid=valid

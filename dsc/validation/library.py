@@ -11,6 +11,7 @@ from dsc.skills import SkillSignature
 from dsc.validation.arguments import check_arguments
 from dsc.validation.components import check_components
 from dsc.validation.data import check_data
+from dsc.validation.nesting import Nesting
 from dsc.validation.outputs import check_outputs
 from dsc.validation.structure import check_structure
 from dsc.validation.wiring import check_wiring
@@ -45,13 +46,14 @@ def validate_plot(
         components: names of the components that are deployed; without them, `set` and `switch` are not checked.
     """
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
-    findings = list(check_structure(plot, library))
+    nesting = Nesting(plot)
+    findings = list(check_structure(plot, library, nesting))
     if findings:  # what follows would only repeat them in other words
         return findings
-    findings = list(check_wiring(plot, library, signatures))
-    findings += check_arguments(plot, library)
+    findings = list(check_wiring(plot, library, signatures, nesting))
+    findings += check_arguments(plot, library, nesting)
     findings += check_outputs(plot)
-    findings += check_data(plot, library, schema, signatures)
+    findings += check_data(plot, library, schema, signatures, nesting)
     if components is not None:
         findings += check_components(plot, components)
     return findings

@@ -14,9 +14,12 @@ from knowledge_base.errors import SchemaError
 
 def check_outputs(plot: ActionPlot) -> Iterator[Finding]:
     """Findings about outputs that nothing gives a value."""
+    open_ones = [name for name, output in plot.outputs.items() if output.initial is None]
+    if not open_ones:
+        return
     assigned = {name for _, state, _ in plot.walk() for name in _assigned(_actions(state))}
-    for name, output in plot.outputs.items():
-        if output.initial is None and name not in assigned:
+    for name in open_ones:
+        if name not in assigned:
             error = SchemaError(f"the output '{name}' never gets a value", place=plot.place(("outputs", name)))
             yield Finding(error, "outputs are given", "`assign` it on the way to the end, or add `initial`")
 

@@ -10,31 +10,33 @@ from dsc.model.actions import Choose, Emit, ExternalAction, Internal, Log, flat
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import FinalState, HistoryState, OrthogonalState, State
 from dsc.model.transitions import Source, Transition
+from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError
 
 FIX = "write `profile: scxml` if the plot is to be an SCXML chart"
 
 
-def check_profile(plot: ActionPlot) -> Iterator[Finding]:
+def check_profile(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
     """Findings about what the plot's profile does not have."""
     if plot.profile == "scxml":
         return
-    for name, state, path in plot.walk():
+    for name, state, path in nesting.states:
         if isinstance(state, HistoryState):
             yield _finding(plot, f"'{name}' is a history state", path)
         elif isinstance(state, FinalState):
             yield from _inside(plot, name, state.entry, (*path, "entry"))
         else:
-            yield from _source(plot, name, state, path)
+            yield from _source(plot, name, state, path, nesting)
 
 
-def _source(plot: ActionPlot, name: str, source: Source, path: Path) -> Iterator[Finding]:
+def _source(plot: ActionPlot, name: str, source: Source, path: Path, nesting: Nesting) -> Iterator[Finding]:
     if isinstance(source, OrthogonalState) and source.connectors:
         yield _finding(plot, f"'{name}' has connectors", (*path, "connectors"))
     if isinstance(source, State):
         for key, actions in source.blocks():
-            yield from _inside(plot, name, actions, (*path, key))
-    for inside, _, transition in source.placed_transitions():
+            if actions:
+                yield from _inside(plot, name, actions, (*path, key))
+    for inside, _, transition in nesting.leaving(path):
         yield from _transition(plot, name, transition, (*path, *inside))
 
 
@@ -52,7 +54,7 @@ def _transition(plot: ActionPlot, name: str, transition: Transition, path: Path)
         yield _finding(plot, f"a transition of '{name}' clears histories", (*path, "clear"))
     if transition.guard is not None and asked_states(transition.guard):
         yield _finding(plot, f"a guard of '{name}' asks which states are active", (*path, "when"))
-    if any(_is_foreign(action) for action in flat(transition.effect)):
+    if transition.do and any(_is_foreign(action) for action in flat(transition.do)):
         yield _finding(plot, f"a transition of '{name}' branches, logs or sends with a delay", path)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from dsc.dynamic.library import Library
 from dsc.engine.compiler import compile_plot
@@ -17,35 +17,34 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from dsc.model.transitions import Source
 from dsc.validation.connectors import check_connectors
 from dsc.validation.history import check_history
+from dsc.validation.nesting import Nesting
 from dsc.validation.profile import check_profile
 from dsc.validation.timing import check_timing
-from knowledge_base.errors import Place, SchemaError, UnknownNameError
+from knowledge_base.errors import SchemaError, UnknownNameError
 
 RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 """What a rule may do besides going to a named state."""
 
 
-def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
+def check_structure(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
-    yield from check_profile(plot)
-    yield from check_connectors(plot)
-    yield from check_history(plot)
-    yield from check_timing(plot)
-    yield from _scope(plot, plot, ())
-    names = {name for name, _, _ in plot.walk()}
-    for name, state, path in plot.walk():
+    yield from check_profile(plot, nesting)
+    yield from check_connectors(plot, nesting)
+    yield from check_history(plot, nesting)
+    yield from check_timing(plot, nesting)
+    yield from _scope(plot, plot, (), nesting)
+    for name, state, path in nesting.states:
         if isinstance(state, CompositeState):
-            yield from _scope(plot, state, path)
+            yield from _scope(plot, state, path, nesting)
         if isinstance(state, OrthogonalState):
             for key, region in state.regions.items():
-                yield from _scope(plot, region, (*path, "regions", key))
+                yield from _scope(plot, region, (*path, "regions", key), nesting)
         yield from _uses(plot, state, path, library)
         if plot.profile == "dsc":
-            yield from _dead_end(plot, name, state, path)
-    yield from _rules(plot, names, library)
+            yield from _dead_end(plot, name, state, path, nesting)
+    yield from _rules(plot, set(nesting.names), library)
     if plot.profile == "scxml":
         yield from _tables(plot)
 
@@ -62,41 +61,41 @@ def _tables(plot: ActionPlot) -> Iterator[Finding]:
 
 
 def _scope(
-    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path
+    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path, nesting: Nesting
 ) -> Iterator[Finding]:
-    valid = plot.within(path) if plot.profile == "scxml" else set(scope.states)
-    if scope.initial is not None and scope.initial not in valid:
+    first, anywhere_inside = scope.initial, plot.profile == "scxml"
+    if first is not None and not (nesting.inside(first, path) if anywhere_inside else first in scope.states):
         error = UnknownNameError(
-            f"there is no state '{scope.initial}' to begin with",
-            place=plot.place((*path, "initial")), found=scope.initial, valid=valid,
+            f"there is no state '{first}' to begin with", place=plot.place((*path, "initial")),
+            found=first, valid=nesting.within(path) if anywhere_inside else scope.states,
         )  # fmt: skip
         yield Finding(error, "initial")
-    for name, state in scope.states.items():
-        if isinstance(state, Source):
-            yield from _targets(plot, state, (*path, "states", name), scope.states)
+    for name in scope.states:
+        yield from _targets(plot, (*path, "states", name), scope.states, nesting)
 
 
-def _targets(plot: ActionPlot, state: Source, path: Path, siblings: Mapping[str, AnyState]) -> Iterator[Finding]:
-    everywhere = {name for name, _, _ in plot.walk()}
-    for inside, _, transition in state.placed_transitions():
-        place = plot.place((*path, *inside, "to"))
-        for target in transition.targets:
-            yield from _target(plot, target, siblings, everywhere, place)
-
-
-def _target(
-    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: set[str], place: Place | None
+def _targets(
+    plot: ActionPlot, path: Path, siblings: Mapping[str, AnyState], nesting: Nesting
 ) -> Iterator[Finding]:
-    if target not in siblings and not (plot.profile == "scxml" and target in everywhere):
-        if target in everywhere:
-            error = SchemaError(f"the transition to '{target}' crosses a border", place=place, found=target)
-            yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
-        else:
-            missing = UnknownNameError(
-                f"there is no state '{target}'", place=place, found=target,
-                valid=siblings if plot.profile == "dsc" else everywhere,
-            )
-            yield Finding(missing, "target")
+    for inside, _, transition in nesting.leaving(path):
+        for target in transition.targets:
+            if target not in siblings:
+                yield from _elsewhere(plot, target, siblings, nesting.names, (*path, *inside, "to"))
+
+
+def _elsewhere(
+    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: Collection[str], path: Path
+) -> Iterator[Finding]:
+    """Findings about a target that is not beside its source."""
+    if target not in everywhere:
+        missing = UnknownNameError(
+            f"there is no state '{target}'", place=plot.place(path), found=target,
+            valid=siblings if plot.profile == "dsc" else everywhere,
+        )  # fmt: skip
+        yield Finding(missing, "target")
+    elif plot.profile == "dsc":
+        error = SchemaError(f"the transition to '{target}' crosses a border", place=plot.place(path), found=target)
+        yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
 
 
 def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> Iterator[Finding]:
@@ -116,17 +115,8 @@ def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str]) -> Findin
     return Finding(error, "known plot")
 
 
-def around(plot: ActionPlot, path: Path) -> Iterator[State]:
-    """The composite and orthogonal states around the one at `path`."""
-    for _, state, other in plot.walk():
-        if isinstance(state, State) and other != path and path[: len(other)] == other:
-            yield state
-
-
-def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path) -> Iterator[Finding]:
-    if not isinstance(state, State) or any(True for _ in state.transitions()):
-        return
-    if not any(any(True for _ in other.transitions()) for other in around(plot, path)):
+def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path, nesting: Nesting) -> Iterator[Finding]:
+    if isinstance(state, State) and not any(map(nesting.leaving, nesting.way(path))):
         error = SchemaError(f"no transition leaves the state '{name}'", place=plot.place(path))
         yield Finding(error, "no dead end", "wire what it ends with, or make it `final: true`")
 

@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot
 from dsc.model.states import State
+from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.expression import Constant, Term
 
 
-def check_timing(plot: ActionPlot) -> Iterator[Finding]:
+def check_timing(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
     """Findings about timeouts that come while the state still has to wait."""
-    for name, state, path in plot.walk():
+    for name, state, path in nesting.states:
         least = _seconds(state.at_least) if isinstance(state, State) else None
         if not isinstance(state, State) or least is None:
             continue

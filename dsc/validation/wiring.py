@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import outcomes_of
@@ -22,7 +25,8 @@ from dsc.model.states import (
 )
 from dsc.model.transitions import Source
 from dsc.skills import SkillSignature
-from dsc.validation.structure import RESPONSES, around
+from dsc.validation.nesting import Nesting
+from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
 Skills = Mapping[str, SkillSignature] | None
@@ -31,7 +35,7 @@ _EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
 """Events that are nobody else's; the other two are passed on by who plans."""
 
 
-def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator[Finding]:
+def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> Iterator[Finding]:
     """Findings about events."""
     try:
         expanded = library.expanded(plot)
@@ -39,21 +43,24 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         yield Finding(error, "rules")
         return
     wired = {name: state for name, state, _ in expanded.walk()}
+    traffic = _traffic(plot, library, skills, nesting)
     yield from _declared_events(plot)
     yield from _rule_targets(plot, library)
-    for name, state, path in plot.walk():
+    for name, state, path in nesting.states:
         if isinstance(state, FinalState):
             yield from _final(plot, state, path)
-        if isinstance(state, Source) and plot.profile == "dsc":
-            yield from _emissions(plot, state, path)
+        if plot.profile == "dsc":
+            yield from _emissions(plot, path, nesting, traffic)
         if not isinstance(state, State):
             continue
-        handled = _handled([wired[name], *around(plot, path)])
-        yield from _outcomes(plot, name, outcomes_of(state, library), handled, path)
-        yield from _skills(plot, name, state, path, handled, skills)
+        outcomes = outcomes_of(state, library)
+        if outcomes or state.entry:  # otherwise it cannot end with anything
+            handled = _handled([wired[name], *nesting.around(path)])
+            yield from _outcomes(plot, name, outcomes, handled, path)
+            yield from _skills(plot, name, state, path, handled, skills)
         if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
             yield from _completion(plot, name, state, wired[name], path, library)
-            yield from _known_events(plot, state, path, library, skills)
+            yield from _known_events(plot, state, path, skills, traffic)
 
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:
@@ -75,10 +82,12 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
     for number, rule in enumerate(plot.rules):
+        if rule.do.then in RESPONSES:
+            continue
         for siblings in (scope.states for scope in plot.scopes()):
             for name, state in siblings.items():
                 answers = (not rule.of or name in rule.of) and rule.on in outcomes_of(state, library)
-                if answers and rule.do.then not in RESPONSES and rule.do.then not in siblings:
+                if answers and rule.do.then not in siblings:
                     error = SchemaError(
                         f"the rule's way from '{name}' to '{rule.do.then}' crosses a border",
                         place=plot.place(("rules", number, "do", "then")), found=rule.do.then, valid=siblings,
@@ -196,29 +205,52 @@ def _silent_ways(plot: ActionPlot, source: Source) -> set[str]:
     return {transition.target for transition in silent if transition.target is not None}
 
 
+@dataclass(frozen=True, slots=True)
+class _Traffic:
+    """Which events there are, gathered once for a plot.
+
+    Attributes:
+        anywhere: events that may come to every state.
+        inside: path of a state -> what its content and skills, and those of states inside, end with.
+        heard: events that some state listens to.
+    """
+
+    anywhere: AbstractSet[str]
+    inside: Mapping[Path, AbstractSet[str]]
+    heard: AbstractSet[str]
+
+
+def _traffic(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> _Traffic:
+    anywhere = {*(RESERVED - TIMERS), *plot.receives}
+    inside: defaultdict[Path, set[str]] = defaultdict(set)
+    heard: set[str] = set()
+    for _, state, path in nesting.states:
+        for _, _, transition in nesting.leaving(path):
+            anywhere.update(transition.emitted)
+        if not isinstance(state, State):
+            continue
+        heard.update(state.on)
+        if ends := {*outcomes_of(state, library), *_skill_events(state, skills)}:
+            for place in nesting.way(path):
+                inside[place] |= ends
+    return _Traffic(anywhere, inside, heard)
+
+
 def _known_events(
-    plot: ActionPlot, state: AnyState, path: Path, library: Library, skills: Skills
+    plot: ActionPlot, state: AnyState, path: Path, skills: Skills, traffic: _Traffic
 ) -> Iterator[Finding]:
     if not isinstance(state, State) or (isinstance(state, SubmachineState) and state.use.startswith("?")):
         return
-    known = RESERVED - TIMERS | set(plot.receives) | _local_events(plot)
-    for _, inner, inner_path in plot.walk():
-        if inner_path[: len(path)] == path:
-            known = known | set(outcomes_of(inner, library)) | _skill_events(inner, skills)
     if skills is None and any(isinstance(a, Trigger) for a in state.entry):
         return
+    inside = traffic.inside.get(path, frozenset())
     for event in state.on:
-        if event not in known:
+        if event not in traffic.anywhere and event not in inside:
             error = UnknownNameError(
-                f"nothing here fires the event '{event}'",
-                place=plot.place((*path, "on", event)), found=event, valid=known - RESERVED | {DONE},
+                f"nothing here fires the event '{event}'", place=plot.place((*path, "on", event)),
+                found=event, valid=(traffic.anywhere | inside) - RESERVED | {DONE},
             )  # fmt: skip
             yield Finding(error, "known event", "events from outside are declared under `receives`")
-
-
-def _local_events(plot: ActionPlot) -> set[str]:
-    sources = [state for _, state, _ in plot.walk() if isinstance(state, Source)]
-    return {event for source in sources for _, transition in source.transitions() for event in transition.emitted}
 
 
 def _skill_events(state: AnyState, skills: Skills) -> set[str]:
@@ -228,17 +260,16 @@ def _skill_events(state: AnyState, skills: Skills) -> set[str]:
     return {t.names.get(event, event) for t in triggers for event in skills[t.trigger].outcomes}
 
 
-def _emissions(plot: ActionPlot, source: Source, path: Path) -> Iterator[Finding]:
-    listened = {event for _, s, _ in plot.walk() if isinstance(s, State) for event in s.on}
-    for inside, _, transition in source.placed_transitions():
+def _emissions(plot: ActionPlot, path: Path, nesting: Nesting, traffic: _Traffic) -> Iterator[Finding]:
+    for inside, _, transition in nesting.leaving(path):
         for fired in transition.emitted:
             here = (*path, *inside, "emit")
             if fired in RESERVED and fired not in plot.emits:
                 yield _reserved(plot, fired, here)
-            elif fired not in plot.emits and fired not in listened:
+            elif fired not in plot.emits and fired not in traffic.heard:
                 error = UnknownNameError(
                     f"the plot does not declare the outcome '{fired}', and no state listens to it",
-                    place=plot.place(here), found=fired, valid=set(plot.emits) | listened - {DONE, NO_CANDIDATE},
+                    place=plot.place(here), found=fired, valid=set(plot.emits) | traffic.heard - {DONE, NO_CANDIDATE},
                 )  # fmt: skip
                 yield Finding(error, "declared outcome", "declare it under `emits`")
             elif fired in plot.emits and fired == transition.emit:

@@ -286,6 +286,15 @@ def test_the_order_of_states_is_part_of_a_plot():
     assert forward != backward
 
 
+def test_a_copy_that_says_something_else_is_another_plot_even_if_the_first_was_compared_before():
+    first = plot("plot: p\nstates:\n  a:\n    on:\n      e: b\n  b:\n")
+    digest = first.digest
+    copy = first.model_copy(update={"about": "another"})
+    assert copy.digest != digest
+    assert copy != first
+    assert copy.model_copy(update={"about": None}) == first
+
+
 def test_states_are_walked_in_document_order_with_their_paths():
     names = [name for name, _, _ in EVERYTHING.walk()]
     assert names == ["first", "second", "third", "box", "in_a", "in_b", "both", "l", "r", "either", "which", "over"]

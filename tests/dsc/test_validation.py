@@ -10,6 +10,7 @@ from dsc_charts import plot
 
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
+from dsc.model.plot import ActionPlot
 from dsc.skills import Component, Outcome, skill
 from dsc.text.plots import load_library, parse_plot
 from dsc.validation import raise_findings, validate_library, validate_plot
@@ -530,3 +531,46 @@ def test_the_shipped_plots_pass_without_skills():
     library = load_library(root / "domains" / "clean_up_table" / "plots")
     schema = Schema.from_pddl(root / "domains" / "clean_up_table" / "domain.pddl")
     assert [str(f) for f in validate_library(library, schema, None)] == []
+
+
+def _ring(size):
+    states = {f"s{n}": {"on": {"next": [{"to": f"s{(n + 1) % size}", "when": "(> ?n 0)"}]}} for n in range(size)}
+    return {"plot": "ring", "variables": {"n": "number"}, "receives": {"next": None}, "states": states}
+
+
+def _handed_on(size):
+    """Submachines one after the other, each with a choice before it that passes what the plot inside needs."""
+    states = {}
+    for n in range(size):
+        states[f"c{n}"] = {"choice": [{"to": f"c{n + 1}", "when": "(> ?n 0)"}, {"to": f"s{n}", "pass": {"item": "?item"}}]}
+        states[f"s{n}"] = {"use": "search", "on": {"done": {"to": f"c{n + 1}", "assign": {"out": 1}}}}
+    states[f"c{size}"] = {"select": "?n", "cases": {1: "e"}, "else": "e"}
+    more = {"parameters": {"item": "item"}, "variables": {"n": {"type": "number", "initial": 1}}, "outputs": {"out": "number"}}
+    return {"plot": "handed_on", **more, "states": {"begin": {"on": {"done": "c0"}}, **states, "e": {"final": True}}}
+
+
+def _remembering(size):
+    """Composite states with histories, which transitions forget."""
+    states = {
+        f"s{n}": {
+            "initial": f"a{n}", "after": {"seconds": 1, "to": f"h{(n + 1) % size}", "clear": [f"s{n}", f"s{n}*"]},
+            "states": {f"a{n}": {"on": {"go": f"b{n}"}}, f"b{n}": {}, f"h{n}": {"history": "deep", "to": f"b{n}"}},
+        }
+        for n in range(size)
+    }  # fmt: skip
+    return {"plot": "remembering", "profile": "scxml", "states": states}
+
+
+@pytest.mark.parametrize("form", [_ring, _handed_on, _remembering])
+def test_a_large_plot_is_walked_no_oftener_than_a_small_one(form, monkeypatch):
+    def walks(size):
+        large = ActionPlot.model_validate(form(size))
+        seen = []
+        walk = ActionPlot.walk
+        library = Library([*HELPERS, large])
+        monkeypatch.setattr(ActionPlot, "walk", lambda self: (seen.append(self), walk(self))[1])
+        assert validate_plot(large, library, SCHEMA) == []
+        monkeypatch.undo()
+        return len(seen)
+
+    assert walks(40) == walks(4)
