@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from dsc.dynamic.outcomes import Plots, outcomes_of
 from dsc.events import DONE, GAVE_UP, NO_CANDIDATE
-from dsc.model.actions import Assign, Choose, Emit, Log, Tell
+from dsc.model.actions import Assign, Emit, Internal, Tell
 from dsc.model.plot import ActionPlot, Rule, Variable
 from dsc.model.states import (
     AnyState,
@@ -28,8 +28,6 @@ from dsc.model.transitions import Transition
 from knowledge_base.errors import SchemaError
 from knowledge_base.language import expression as lang
 from knowledge_base.language.effect import substitute_effect
-
-AnyInternal = Assign | Tell | Emit | Log | Choose
 
 DEFAULT_RETRIES = 3
 """Bound on `retry` and `replan` responses that name none, so that no rule can go on for ever."""
@@ -169,7 +167,7 @@ def _because(outcome: str, giving_up: Transition) -> Transition:
     })
 
 
-def _action_because(action: AnyInternal, reason: Mapping[str, str]) -> AnyInternal:
+def _action_because(action: Internal, reason: Mapping[str, str]) -> Internal:
     match action:
         case Tell():
             return Tell(tell=substitute_effect(action.tell, reason))
@@ -196,7 +194,7 @@ def _joined(
 ) -> Transition:
     """One transition that does what the rule says and then what comes after it."""
     both = [part for part in (guard, after.guard) if part is not None]
-    actions: list[AnyInternal] = []
+    actions: list[Internal] = []
     if rule.do.tell is not None:
         actions.append(Tell(tell=rule.do.tell))
     if counting:

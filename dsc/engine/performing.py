@@ -10,10 +10,10 @@ from dsc.engine.actions import delay_of, evaluate, output_of
 from dsc.engine.frames import Frame
 from dsc.engine.record import Record
 from dsc.engine.situation import Situation
-from dsc.engine.steps import Note, SendLater, StartTimer
+from dsc.engine.steps import Note, Revoke, SendLater, StartTimer
 from dsc.engine.tables import Node
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, Event
-from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Tell
+from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Tell, Withdraw
 from dsc.model.language import TermField
 from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Expression
@@ -110,8 +110,12 @@ class Performer(Record):
                 self.knowledge = self.knowledge.then(told)
             case Emit():
                 attributes = self.values(frame, action.arguments)
-                delay = None if action.delay is None else delay_of(self.value(frame, action.delay))
-                self._emit(frame, action.emit, attributes, delay)
+                if action.delay is None:
+                    self._emit(frame, action.emit, attributes)
+                else:
+                    self._emit_later(frame, action, action.delay, attributes)
+            case Withdraw(withdraw=term):
+                self.output.append(Revoke(frame.serial, str(self.value(frame, term))))
             case Log(log=parts, label=label):
                 text = "".join(str(self.value(frame, part)) for part in parts)
                 self.output.append(Note(label, text))
@@ -119,10 +123,16 @@ class Performer(Record):
                 for inner in action.then if self.holds(frame, action.condition) else action.otherwise:
                     self._perform(frame, inner)
 
-    def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any], delay: float | None) -> None:
-        if delay is not None:
-            self.output.append(SendLater(Event(name, attributes, frame=frame.serial), delay))
-        elif name not in frame.compiled.plot.emits:
+    def _emit_later(self, frame: Frame, action: Emit, delay: TermField, attributes: Mapping[str, Any]) -> None:
+        name = "" if action.id is None else str(self.value(frame, action.id))
+        if action.into is not None:
+            name = f"{action.emit}.{self.next_serial()}"
+            frame.variables = {**frame.variables, action.into: name}
+        event = Event(action.emit, attributes, frame=frame.serial)
+        self.output.append(SendLater(event, delay_of(self.value(frame, delay)), name))
+
+    def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
+        if name not in frame.compiled.plot.emits:
             self.internal.append(Event(name, attributes, frame=frame.serial))
         elif frame.parent is None:
             self.emitted.append(Event(name, attributes))

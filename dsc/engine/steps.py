@@ -69,6 +69,15 @@ class SendLater:
 
     event: Event
     seconds: float
+    id: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Revoke:
+    """Do not hand in the events of that id that are still to come for the plot instance `frame` (SCXML 6.3)."""
+
+    frame: int
+    id: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +88,7 @@ class Note:
     text: str
 
 
-Output = Start | Cancel | SetParameter | SwitchMode | StartTimer | SendLater | Note
+Output = Start | Cancel | SetParameter | SwitchMode | StartTimer | SendLater | Revoke | Note
 """What leaves the machine, in order."""
 
 

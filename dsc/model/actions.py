@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Annotated
 
-from pydantic import Field, Tag
+from pydantic import Field, Tag, model_validator
 
 from dsc.model.language import ConditionField, EffectField, Frozen, TermField, by_key
 
@@ -59,12 +59,27 @@ class Tell(Frozen):
 class Emit(Frozen):
     """Fire an event: a declared outcome goes to the state that holds this plot, any other stays inside.
 
-    With `delay` (seconds; only in profile `scxml`) it comes as an event from outside, after whatever comes before.
+    With `delay` (seconds; only in profile `scxml`) it comes as an event from outside, after whatever comes before;
+    until then it can be withdrawn by its `id`. `into` is a variable that gets an id made for it (SCXML 6.2).
     """
 
     emit: str
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
     delay: TermField | None = None
+    id: TermField | None = None
+    into: str | None = None
+
+    @model_validator(mode="after")
+    def _is_named_to_be_withdrawn(self) -> Emit:
+        if self.delay is None and (self.id is not None or self.into is not None):
+            raise ValueError("an event without delay cannot be withdrawn; `id` and `into` go with `delay`")
+        return self
+
+
+class Withdraw(Frozen):
+    """Let the delayed events of that id, fired in this plot, not come (SCXML 6.3; only in profile `scxml`)."""
+
+    withdraw: TermField
 
 
 class Log(Frozen):
@@ -92,14 +107,15 @@ InternalAction = Annotated[
     Annotated[Assign, Tag("assign")]
     | Annotated[Tell, Tag("tell")]
     | Annotated[Emit, Tag("emit")]
+    | Annotated[Withdraw, Tag("withdraw")]
     | Annotated[Log, Tag("log")]
     | Annotated[Choose, Tag("if")],
-    by_key("assign", "tell", "emit", "log", "if"),
+    by_key("assign", "tell", "emit", "withdraw", "log", "if"),
 ]
 """What transitions may hold."""
 Choose.model_rebuild()
 
-Internal = Assign | Tell | Emit | Log | Choose
+Internal = Assign | Tell | Emit | Withdraw | Log | Choose
 """The internal actions, to be told from the external ones."""
 
 Action = Annotated[
@@ -109,9 +125,10 @@ Action = Annotated[
     | Annotated[Assign, Tag("assign")]
     | Annotated[Tell, Tag("tell")]
     | Annotated[Emit, Tag("emit")]
+    | Annotated[Withdraw, Tag("withdraw")]
     | Annotated[Log, Tag("log")]
     | Annotated[Choose, Tag("if")],
-    by_key("trigger", "set", "switch", "assign", "tell", "emit", "log", "if"),
+    by_key("trigger", "set", "switch", "assign", "tell", "emit", "withdraw", "log", "if"),
 ]
 """What entry and exit may hold; internal actions only in profile `scxml` (SCXML 3.8)."""
 

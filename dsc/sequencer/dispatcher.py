@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dsc.engine.steps import Cancel, Output, SendLater, SetParameter, Start, StartTimer, SwitchMode
+from dsc.engine.steps import Cancel, Output, Revoke, SendLater, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import EVERY, SKILL_ERROR, TIMED_OUT, Event
 from dsc.skills import Clock, Component, Outcome, SkillCall
 from knowledge_base.errors import UnknownNameError
@@ -55,7 +55,7 @@ class Dispatcher:
         self._configuring: dict[str, asyncio.Task[None]] = {}
         self._ending: set[asyncio.Task[None]] = set()
         self._timers: dict[tuple[int, str, int], asyncio.TimerHandle] = {}
-        self._sent: dict[int, asyncio.TimerHandle] = {}
+        self._sent: dict[int, tuple[SendLater, asyncio.TimerHandle]] = {}
         self._last_sent = 0
 
     def deploy(self, component: Component) -> None:
@@ -91,6 +91,8 @@ class Dispatcher:
             self._start_timer(output)
         elif isinstance(output, SendLater):
             self._send_later(output)
+        elif isinstance(output, Revoke):
+            self._revoke(output)
         elif isinstance(output, SetParameter):
             component = self.component(output.component)
             self._configure(component, lambda: component.configure(output.parameter, _encoded(output.value)))
@@ -119,7 +121,7 @@ class Dispatcher:
         for handle in self._timers.values():
             handle.cancel()
         self._timers.clear()
-        for handle in self._sent.values():
+        for _, handle in self._sent.values():
             handle.cancel()
         self._sent.clear()
         tasks = [*self._ending, *self._configuring.values()]
@@ -199,7 +201,13 @@ class Dispatcher:
             del self._sent[number]
             self._post(later.event)
 
-        self._sent[number] = asyncio.get_running_loop().call_later(later.seconds, due)
+        self._sent[number] = (later, asyncio.get_running_loop().call_later(later.seconds, due))
+
+    def _revoke(self, revoke: Revoke) -> None:
+        for number, (later, handle) in list(self._sent.items()):
+            if (later.event.frame, later.id) == (revoke.frame, revoke.id):
+                handle.cancel()
+                del self._sent[number]
 
     def _timer_due(self, timer: StartTimer) -> None:
         del self._timers[timer.activation, timer.event, timer.index]

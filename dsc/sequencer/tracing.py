@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from dsc.engine.steps import Cancel, Note, Output, SendLater, SetParameter, Start, StartTimer, Step, SwitchMode
+from dsc.engine.steps import (
+    Cancel,
+    Note,
+    Output,
+    Revoke,
+    SendLater,
+    SetParameter,
+    Start,
+    StartTimer,
+    Step,
+    SwitchMode,
+)
 from dsc.events import Event
 from dsc.trace import Trace
 from knowledge_base.facts import Change
@@ -100,7 +111,7 @@ class StepTracer:
             return self._trace.record("action", action="switch", component=output.component, mode=output.mode)
         if isinstance(output, Note):
             return self._trace.record("log", label=output.label, text=output.text)
-        assert isinstance(output, Cancel | StartTimer | SendLater)  # noqa: S101
+        assert isinstance(output, Cancel | StartTimer | SendLater | Revoke)  # noqa: S101
         return None
 
     def _plots(self, step: Step) -> None:

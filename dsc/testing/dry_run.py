@@ -9,7 +9,7 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
-from dsc.engine.steps import Cancel, Output, SendLater, Start, StartTimer, Step
+from dsc.engine.steps import Cancel, Output, Revoke, SendLater, Start, StartTimer, Step
 from dsc.events import TIMED_OUT, Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
@@ -25,12 +25,16 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class _Due:
-    """An event that comes at a certain time, unless its activation is left or its skill (by action) answers."""
+    """An event that comes at a certain time, unless its activation is left, its skill answers, or it is withdrawn.
+
+    `action_id` is that of the skill, `sent` the plot instance and id by which it can be withdrawn.
+    """
 
     at: float
     event: Event
     activation: int | None = None
     action_id: str | None = None
+    sent: tuple[int | None, str] | None = None
 
 
 class DryRun:
@@ -167,8 +171,10 @@ class DryRun:
             case StartTimer(activation, index, seconds, name):
                 timeout = Event(name, to=activation, exact=True, number=index)
                 self._due.append(_Due(self.now + seconds, timeout, activation))
-            case SendLater(event, seconds):
-                self._due.append(_Due(self.now + seconds, event))
+            case SendLater(event, seconds, name):
+                self._due.append(_Due(self.now + seconds, event, sent=(event.frame, name)))
+            case Revoke(frame, name):
+                self._due = [due for due in self._due if due.sent != (frame, name)]
             case Cancel(activation):
                 self.running = [start for start in self.running if start.activation != activation]
                 self._due = [due for due in self._due if due.activation != activation]

@@ -9,7 +9,7 @@ from dsc.dynamic.outcomes import outcomes_of, outputs_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
-from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
+from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger, Withdraw
 from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot, Parameter, Path, Rule, Variable
 from dsc.model.states import AnyState, DynamicState, FinalState, State, SubmachineState
@@ -149,8 +149,12 @@ class _Data:
                 yield from self._terms(action.assign.items(), attributes, (*path, "assign"))
             elif isinstance(action, Emit):
                 yield from self._terms(action.arguments.items(), attributes, (*path, "with"))
-                if action.delay is not None:
-                    yield from self._terms([("delay", action.delay)], attributes, path)
+                later = [("delay", action.delay), ("id", action.id)]
+                yield from self._terms([(key, term) for key, term in later if term is not None], attributes, path)
+                if action.into is not None:
+                    yield from self._known_variable(action.into, (*path, "into"))
+            elif isinstance(action, Withdraw):
+                yield from self._terms([("withdraw", action.withdraw)], attributes, path)
             elif isinstance(action, Log):
                 yield from self._terms([("log", part) for part in action.log], attributes, path)
             elif isinstance(action, Choose):
@@ -161,12 +165,14 @@ class _Data:
 
     def _assign(self, action: Assign, path: Path) -> Iterator[Finding]:
         for name in action.assign:
-            if name not in self._assigned:
-                error = UnknownNameError(
-                    f"there is no variable '{name}'", place=self._plot.place((*path, name)),
-                    found=name, valid=self._assigned,
-                )  # fmt: skip
-                yield Finding(error, "declared variable")
+            yield from self._known_variable(name, (*path, name))
+
+    def _known_variable(self, name: str, path: Path) -> Iterator[Finding]:
+        if name not in self._assigned:
+            error = UnknownNameError(
+                f"there is no variable '{name}'", place=self._plot.place(path), found=name, valid=self._assigned
+            )
+            yield Finding(error, "declared variable")
 
     def _external(self, action: ExternalAction, path: Path) -> Iterator[Finding]:
         if isinstance(action, Switch):

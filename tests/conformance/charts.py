@@ -20,7 +20,7 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
-from dsc.engine.steps import SendLater, Step
+from dsc.engine.steps import Revoke, SendLater, Step
 from dsc.events import Event
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.reader import parse_scxml
@@ -61,7 +61,7 @@ class Player:
     situation: Any
     now: float = 0.0
     machine: Machine = field(init=False)
-    _due: list[tuple[float, int, Event]] = field(default_factory=list)
+    _due: list[tuple[float, int, SendLater]] = field(default_factory=list)
     _number: Iterator[int] = field(default_factory=count)
     _last: Step | None = None
 
@@ -78,15 +78,19 @@ class Player:
 
     def until(self, time: float) -> None:
         while self._due and self._due[0][0] <= time:
-            self.now, _, event = heapq.heappop(self._due)
-            self._took(self.machine.send(event, self.situation()))
+            self.now, _, later = heapq.heappop(self._due)
+            self._took(self.machine.send(later.event, self.situation()))
         self.now = time
 
     def _took(self, step: Step) -> None:
         self._last = step if step.moved else self._last
         for output in step.output:
             if isinstance(output, SendLater):
-                heapq.heappush(self._due, (self.now + output.seconds, next(self._number), output.event))
+                heapq.heappush(self._due, (self.now + output.seconds, next(self._number), output))
+            elif isinstance(output, Revoke):
+                gone = output
+                self._due = [due for due in self._due if (due[2].event.frame, due[2].id) != (gone.frame, gone.id)]
+                heapq.heapify(self._due)
 
     @property
     def leaves(self) -> list[str]:

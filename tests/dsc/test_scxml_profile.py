@@ -6,6 +6,7 @@ import json
 
 import pytest
 from dsc_charts import Run, plot
+from dsc_runs import Ran
 
 from dsc.dynamic.library import Library
 from dsc.engine.selection import matches
@@ -14,8 +15,10 @@ from dsc.engine.steps import Note, SendLater
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, SimulatedEventLoop
 from dsc.sequencer.sequencer import Sequencer
+from dsc.testing import DryRun
 from dsc.trace import Trace
 from dsc.validation import validate_plot
+from knowledge_base.errors import InputError
 from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
 
@@ -94,6 +97,64 @@ def test_a_delayed_event_leaves_the_machine_with_its_delay():
     [sent] = step.output
     assert isinstance(sent, SendLater)
     assert (sent.event.name, sent.seconds) == ("e", 0.5)
+
+
+WITHDRAWN = """
+    plot: p
+    profile: scxml
+    variables: {made: {type: symbol, initial: none}}
+    states:
+      a:
+        entry:
+          - {emit: first, delay: 1, id: one}
+          - {emit: second, delay: 2, into: made}
+          - {emit: third, delay: 3, id: one}
+          - {emit: last, delay: 4}
+        on:
+          not_one: {do: [{withdraw: one}]}
+          not_made: {do: [{withdraw: ?made}]}
+          first: first
+          second: second
+          last: last
+      first: {final: true}
+      second: {final: true}
+      last: {final: true}
+"""
+
+
+@pytest.mark.parametrize(
+    ("withdrawn", "ends_at"), [((), 1), (("not_one",), 2), (("not_made",), 1), (("not_made", "not_one"), 4)]
+)
+def test_delayed_events_can_be_withdrawn_by_their_id(withdrawn, ends_at):
+    run = DryRun([plot(WITHDRAWN)], "p")
+    for event in withdrawn:
+        run.send(event)
+    for _ in range(5):
+        if not run.finished:
+            run.advance(1)
+    assert run.finished
+    assert run.now == ends_at
+    assert run.steps[-1].event.name == {1: "first", 2: "second", 4: "last"}[ends_at]
+
+
+def test_the_sequencer_withdraws_delayed_events():
+    text = WITHDRAWN.replace("entry:", "always: {do: [{withdraw: one}], to: b}\n        entry:", 1)
+    text = text.replace("      first: {final", "      b: {on: {first: first, second: second, last: last}}\n      first: {final", 1)
+    ran = Ran(text)
+    assert ran.end.finished
+    assert ran.at == 2.0
+
+
+def test_an_event_is_only_withdrawn_in_the_plot_that_sent_it():
+    outer = "{plot: p, profile: scxml, states: {a: {entry: {emit: e, delay: 1, id: x}, use: q, on: {e: f}}, f: {final: true}}}"
+    run = DryRun([plot(outer), plot("{plot: q, profile: scxml, states: {b: {entry: {withdraw: x}}}}")], "p")
+    run.advance(1)
+    assert run.finished
+
+
+def test_what_comes_at_once_has_no_id():
+    with pytest.raises(InputError, match="cannot be withdrawn"):
+        plot("{plot: p, profile: scxml, states: {a: {entry: {emit: e, id: x}}}}")
 
 
 def test_completion_is_an_event_that_anybody_may_take():

@@ -39,6 +39,19 @@ def test_what_is_read_can_be_written_and_read_again():
     assert '"back " + x' in written.replace("&quot;", '"')
 
 
+def test_what_is_sent_and_cancelled_by_id_is_read_and_written():
+    text = """<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" name="c">
+    <datamodel><data id="made" expr="'none'"/></datamodel>
+    <state id="a"><onentry>
+      <send event="e" delay="1s" id="one"/><send event="f" delay="2s" idlocation="made"/>
+      <cancel sendid="one"/><cancel sendidexpr="made"/>
+    </onentry></state></scxml>"""
+    read = parse_scxml(text)
+    kinds = [(type(action).__name__, getattr(action, "into", None)) for action in read.state("a").entry]
+    assert kinds == [("Emit", None), ("Emit", "made"), ("Withdraw", None), ("Withdraw", None)]
+    assert parse_scxml(to_scxml(read)).state("a") == read.state("a")
+
+
 def test_a_plain_dsc_plot_can_be_written():
     text = """
     plot: p

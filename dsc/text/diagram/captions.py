@@ -6,7 +6,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dsc.events import TIMERS
-from dsc.model.actions import Assign, Choose, Configure, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
+from dsc.model.actions import (
+    Assign,
+    Choose,
+    Configure,
+    Emit,
+    ExternalAction,
+    Internal,
+    Log,
+    Switch,
+    Tell,
+    Trigger,
+    Withdraw,
+)
 from dsc.model.connectors import CHOICE, SelectState, case_value
 from dsc.model.states import State
 from dsc.model.transitions import Source, TimedTransition, Transition
@@ -183,6 +195,8 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
             return f"{parameter} := {to_text(value)}"
         case Switch(switch=component, to=mode):
             return f"{component} → {mode}"
+        case Withdraw(withdraw=sent):
+            return f"withdraw {to_text(sent)}"
         case Log(log=parts):
             return f"log {' '.join(map(to_text, parts))}"
         case Choose(condition=condition, then=then, otherwise=otherwise):

@@ -88,7 +88,19 @@ def _send(element: Element, names: Names) -> Form:
     if target not in {"", "#_internal"}:
         raise NotExpressibleError("send/@target", "events go to the chart itself only", place=element.place)
     form: Form = {"emit": _constant(element, "event", names), "with": _arguments(element, names)}
-    return form if target else {**form, "delay": _delay(element, names)}
+    if target:
+        return form
+    if "id" in element.attributes:
+        form["id"] = Constant(element.attributes["id"], quoted=True)
+    if "idlocation" in element.attributes:
+        form["into"] = variable(element.attributes["idlocation"], names, element)
+    return {**form, "delay": _delay(element, names)}
+
+
+def _cancel(element: Element, names: Names) -> Form:
+    if "sendidexpr" in element.attributes:
+        return {"withdraw": term(element.attributes["sendidexpr"], names, element.place)}
+    return {"withdraw": Constant(needed(element, "sendid"), quoted=True)}
 
 
 def _constant(element: Element, attribute: str, names: Names) -> str:
@@ -130,4 +142,4 @@ def _param(element: Element, names: Names) -> Term:
     return term(needed(element, "expr"), names, element.place)
 
 
-_READERS = {"raise": _raise, "assign": _assign, "log": _log, "if": _if, "send": _send}
+_READERS = {"raise": _raise, "assign": _assign, "log": _log, "if": _if, "send": _send, "cancel": _cancel}

@@ -24,7 +24,8 @@ ATTRIBUTES: Mapping[str, frozenset[str]] = {
         "data": "id expr",
         "raise": "event",
         "assign": "location expr",
-        "send": "event eventexpr target type id delay delayexpr namelist",
+        "send": "event eventexpr target type id idlocation delay delayexpr namelist",
+        "cancel": "sendid sendidexpr",
         "param": "name expr location",
         "content": "expr",
         "log": "label expr",
@@ -37,7 +38,7 @@ ATTRIBUTES: Mapping[str, frozenset[str]] = {
 STATES = frozenset({"state", "parallel", "final"})
 
 _CHART = frozenset({"transition", "onentry", "onexit", "datamodel", "history"})
-_ACTIONS = frozenset({"raise", "assign", "send", "log", "if"})
+_ACTIONS = frozenset({"raise", "assign", "send", "cancel", "log", "if"})
 CHILDREN: Mapping[str, frozenset[str]] = {
     "scxml": STATES | {"datamodel"},
     "state": STATES | _CHART | {"initial"},
@@ -53,8 +54,8 @@ CHILDREN: Mapping[str, frozenset[str]] = {
     "if": _ACTIONS | {"elseif", "else"},
 }
 """Elements -> what may stand directly inside them."""
-_KNOWN_TO_SCXML = frozenset({"script", "foreach", "invoke", "finalize", "donedata", "cancel", "onexit"})
-_KNOWN_ATTRIBUTES = frozenset({"src", "idlocation", "targetexpr", "typeexpr", "srcexpr", "autoforward", "sendid"})
+_KNOWN_TO_SCXML = frozenset({"script", "foreach", "invoke", "finalize", "donedata", "onexit"})
+_KNOWN_ATTRIBUTES = frozenset({"src", "targetexpr", "typeexpr", "srcexpr", "autoforward"})
 
 
 def check(element: Element) -> None:

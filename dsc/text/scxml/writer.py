@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from xml.etree import ElementTree as ET
 
-from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log
+from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Withdraw
 from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.states import (
@@ -154,6 +154,9 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
                 ET.SubElement(around, "log", {**labelled, **shown})
             case Emit():
                 _send(around, action)
+            case Withdraw(withdraw=sent):
+                which = {"sendid": sent.value} if isinstance(sent, Constant) else {"sendidexpr": term_text(sent)}
+                ET.SubElement(around, "cancel", {name: str(value) for name, value in which.items()})
             case Choose():
                 _if(around, action)
             case _:
@@ -169,6 +172,12 @@ def _send(around: ET.Element, action: Emit) -> None:
         element.set("target", "#_internal")
     elif action.delay != Constant(0):
         element.set("delay", f"{_seconds(action.delay):g}s")
+    if action.into is not None:
+        element.set("idlocation", identifier(action.into))
+    if action.id is not None:
+        if not isinstance(action.id, Constant):
+            raise NotExpressibleError("send/@id", "an id that is worked out has no counterpart")
+        element.set("id", str(action.id.value))
     for name, term in action.arguments.items():
         ET.SubElement(element, "param", {"name": name, "expr": term_text(term)})
 
