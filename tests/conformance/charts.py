@@ -22,6 +22,8 @@ from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Revoke, SendLater, Step
 from dsc.events import Event
+from dsc.model.plot import ActionPlot
+from dsc.model.states import State
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.reader import parse_scxml
 from dsc.text.scxml.writer import to_scxml
@@ -45,12 +47,18 @@ SCRIPT_AGAINST_THE_STANDARD = {"more-parallel/test10": OTHERWISE, "more-parallel
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What became of one chart: `passed`, `excluded` (with the element) or `failed`."""
+    """What became of one chart.
+
+    Attributes:
+        verdict: `passed`, `excluded` (because of the element) or `failed`.
+        crosses: whether transitions cross borders, which profile `dsc` has to refuse.
+    """
 
     name: str
     verdict: str
     element: str = ""
     reason: str = ""
+    crosses: bool = False
 
 
 @dataclass(slots=True)
@@ -133,6 +141,10 @@ def run(file: Path) -> Result:
         plot = parse_scxml(to_scxml(plot), str(file))  # and what is read can be written
         library = Library([plot])
         raise_findings(validate_plot(plot, library))
+        crosses = _crosses(plot)
+        refused = any(finding.rule == "no border crossing" for finding in validate_plot(_strict(plot), library))
+        if crosses != refused:
+            return Result(name, "failed", "", f"crosses borders: {crosses}; refused by profile dsc: {refused}")
         knowledge = KnowledgeBase(Schema.parse("(define (domain none))"))
         player = Player(library, lambda: KnowledgeSituation(knowledge, library))
         problem = play(player, plot.name, _script(file, standard=name not in SCRIPT_AGAINST_THE_STANDARD))
@@ -144,7 +156,23 @@ def run(file: Path) -> Result:
         return Result(name, "failed", "", problem)
     if name in SCRIPT_AGAINST_THE_STANDARD:
         return Result(name, "excluded", "script", SCRIPT_AGAINST_THE_STANDARD[name])
-    return Result(name, "passed")
+    return Result(name, "passed", crosses=crosses)
+
+
+def _crosses(plot: ActionPlot) -> bool:
+    """Whether a target stands in another scope than its source."""
+    scope_of = {name: number for number, scope in enumerate(plot.scopes()) for name in scope.states}
+    return any(
+        scope_of.get(name) != scope_of.get(target)
+        for name, state, _ in plot.walk()
+        if isinstance(state, State)
+        for _, transition in state.transitions()
+        for target in transition.targets
+    )
+
+
+def _strict(plot: ActionPlot) -> ActionPlot:
+    return plot.model_copy(update={"profile": "dsc"})
 
 
 def _script(file: Path, *, standard: bool) -> dict[str, Any]:
@@ -177,7 +205,11 @@ def table(results: list[Result]) -> str:
 def score(results: list[Result]) -> str:
     """`passed/all`, and what became of the rest."""
     found = {verdict: sum(one.verdict == verdict for one in results) for verdict in ("passed", "excluded", "failed")}
-    return f"{found['passed']}/{len(results)} pass, {found['excluded']} excluded, {found['failed']} fail"
+    crossing = sum(one.crosses for one in results)
+    return (
+        f"{found['passed']}/{len(results)} pass, {found['excluded']} excluded, {found['failed']} fail; "
+        f"{crossing} of those that pass cross borders of composites, and profile dsc refuses each of them"
+    )
 
 
 def main() -> int:
