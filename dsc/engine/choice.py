@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from dsc.engine.configuration import MOST_TRIGGERS, Configuration
+from dsc.engine.determinisation import reaction_of
 from dsc.engine.frames import Frame
 from dsc.engine.membership import FALSE, settle
-from dsc.engine.reaction import Reaction, reaction_of
+from dsc.engine.reaction import Reaction
 from dsc.engine.selection import Enabled, Trigger, edges_of, select
 from dsc.engine.state import NOTHING
 from dsc.engine.tables import Edge

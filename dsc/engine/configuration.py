@@ -32,7 +32,7 @@ class Configuration:
         waiting: those of them whose transitions have to wait, because their least time has not passed.
         history: what the plot's history states remember.
         choices: trigger -> what is decided there (see `choice`).
-        reactions: transitions taken together -> what follows (see `reaction`).
+        reactions: transitions taken together -> what follows (see `determinisation`).
         questions: how many guards `choices` ask.
         bare: the machine's state in which this is all there is, if it was ever reached.
         steps: the last step from there for each event that only moves on.

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from dsc.engine.actions import fill_parameters
+from dsc.engine.determinisation import initial_reaction, leaving_reaction
 from dsc.engine.frames import Frame
 from dsc.engine.performing import Performer
-from dsc.engine.reaction import Entrance, Exit, Part, Reaction, initial_reaction, leaving_reaction
+from dsc.engine.reaction import Entrance, Exit, Part, Reaction
 from dsc.engine.situation import Decision, Situation
 from dsc.engine.state import NOTHING
 from dsc.engine.steps import Bound, Cancel, DecisionMade

@@ -7,10 +7,11 @@ from typing import Any
 
 from dsc.engine.choice import Question, choice_of
 from dsc.engine.configuration import configuration_of
+from dsc.engine.determinisation import reaction_of
 from dsc.engine.execution import Execution
 from dsc.engine.frames import Frame, freeze, thaw
 from dsc.engine.membership import settle
-from dsc.engine.reaction import Part, Reaction, reaction_of, report
+from dsc.engine.reaction import Part, Reaction, report
 from dsc.engine.selection import Addressed, Enabled, Trigger, select
 from dsc.engine.situation import Situation
 from dsc.engine.state import FrameState, MachineState, at_rest
