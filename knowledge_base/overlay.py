@@ -19,6 +19,7 @@ class Overlay:
 
     def __init__(self, base: World) -> None:
         self._base = base
+        self._schema = base.schema
         self._added = FactIndex()
         self._removed: dict[Fact, None] = {}
         self._values: dict[Fact, float] = {}
@@ -28,7 +29,7 @@ class Overlay:
     @property
     def schema(self) -> Schema:
         """What may be said about it: as of the base."""
-        return self._base.schema
+        return self._schema
 
     @property
     def delta(self) -> Delta:

@@ -8,10 +8,13 @@ from __future__ import annotations
 from dsc.engine.choice import Choice, Question
 from dsc.engine.reaction import Reaction
 from dsc.engine.situation import Situation
-from dsc.engine.state import NOTHING, FrameState, MachineState, at_rest
-from dsc.engine.steps import Microstep, Step
+from dsc.engine.state import FrameState, MachineState, at_rest
+from dsc.engine.steps import NO_CHANGE, Microstep, Step
 from dsc.events import Event
 from knowledge_base.errors import InputError
+
+_new = tuple.__new__
+"""Makes named tuples; their constructors take as long again, to put keywords and defaults into their places."""
 
 
 def move(state: MachineState, root: FrameState, event: Event, situation: Situation) -> Step | None:
@@ -29,11 +32,11 @@ def move(state: MachineState, root: FrameState, event: Event, situation: Situati
     if before.bare is state:
         after = following.bare or at_rest(root._replace(configuration=following), state.serials)
     else:
-        after = MachineState(
-            FrameState(root.serial, root.compiled, following, root.variables, root.activations, NOTHING, ()),
-            state.serials,
-        )
-    step = Step(after, event, True, (Microstep(event, choice.taken, choice.exited, choice.entered),))  # noqa: FBT003
+        serial, compiled, _, variables, activations, children, kept = root
+        frame = _new(FrameState, (serial, compiled, following, variables, activations, children, kept))
+        after = _new(MachineState, (frame, state.serials, False))
+    micro = _new(Microstep, (event, choice.taken, choice.exited, choice.entered, ()))
+    step = _new(Step, (after, event, True, (micro,), (), NO_CHANGE, (), (), ()))
     if before.bare is state and before.choices[event.name] is choice:
         before.steps[event.name] = step
     return step
