@@ -7,13 +7,9 @@ a step is a look-up. What is kept is bounded, and forgetting it changes nothing 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dsc.engine.tables import CompiledPlot
-
-if TYPE_CHECKING:
-    from dsc.engine.state import MachineState
-    from dsc.engine.steps import Step
 
 Remembered = tuple[tuple[int, tuple[int, ...]], ...]
 """History node and the nodes that were active when the node around it was last left, in order."""
@@ -27,6 +23,8 @@ MOST_TRIGGERS = 256
 class Configuration:
     """The active nodes of a plot and all else that decides which transitions can be taken.
 
+    What the modules above work out about it they keep here: it is the one thing that all of them share.
+
     Attributes:
         active: the active nodes, in document order, without the plot itself.
         waiting: those of them whose transitions have to wait, because their least time has not passed.
@@ -34,8 +32,8 @@ class Configuration:
         choices: trigger -> what is decided there (see `choice`).
         reactions: transitions taken together -> what follows (see `determinisation`).
         questions: how many guards `choices` ask.
-        bare: the machine's state in which this is all there is, if it was ever reached.
-        steps: the last step from there for each event that only moves on.
+        bare: the `MachineState` in which this is all there is, if it was ever reached.
+        steps: the last `Step` from there for each event that only moves on.
     """
 
     def __init__(
@@ -48,8 +46,8 @@ class Configuration:
         self.choices: dict[Any, Any] = {}
         self.reactions: dict[Any, Any] = {}
         self.questions = 0
-        self.bare: MachineState | None = None
-        self.steps: dict[str, Step] = {}
+        self.bare: Any = None
+        self.steps: dict[str, Any] = {}
 
     def __eq__(self, other: object) -> bool:
         """Whether the same is active, waiting and remembered; of which plot, the frame says."""

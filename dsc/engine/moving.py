@@ -20,7 +20,7 @@ _new = tuple.__new__
 def move(state: MachineState, root: FrameState, event: Event, situation: Situation) -> Step | None:
     """The step, if it is known and as short as that; `None` says that it has to be worked out."""
     before = root.configuration
-    known = before.steps.get(event.name)
+    known: Step | None = before.steps.get(event.name)
     if known is not None and known.event is event and before.bare is state:
         return known
     choice: Choice | None = before.choices.get(event.name)

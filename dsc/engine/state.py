@@ -153,10 +153,10 @@ def at_rest(root: FrameState, serials: int) -> MachineState:
     frame_serial = 1  # the outermost plot has the first number
     if serials > frame_serial or root.variables or root.children:
         return MachineState(root, serials)
-    configuration = root.configuration
-    if configuration.bare is None:
-        configuration.bare = MachineState(root, serials)
-    return configuration.bare
+    kept: MachineState | None = root.configuration.bare
+    if kept is None:
+        kept = root.configuration.bare = MachineState(root, serials)
+    return kept
 
 
 def _paths(frame: FrameState, prefix: str) -> Iterator[str]:
