@@ -121,7 +121,8 @@ def _inwards(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[Edg
         ground.lines,
     )
     arrivals = {(_rounded(port.before), port.out[0] == 0): port for port in ports}
-    goals = {goal: port.price + _taken(port, ground.lines) for goal, port in arrivals.items()}
+    words = [_text_area(text) for text in way[-1].texts] if way[-1].kind in ROUND else []
+    goals = {goal: port.price + _taken(port, words, ground.lines) for goal, port in arrivals.items()}
     points = maze.way(_rounded(start), goals, vertical=vertical)
     ends = [port for (before, _), port in arrivals.items() if before == points[-1]]
     return [*points, min(ends, key=lambda port: port.price).place]
@@ -147,8 +148,12 @@ def _survey(box: Box, way: Sequence[Box], ground: _Ground) -> None:
         if len(ahead) > 1 or inner.kind is BoxKind.REGION:
             _survey(inner, ahead, ground)
             continue
-        for part in (inner, *inner.boxes)[1:] if ahead and inner.kind in ROUND else (inner,):
-            ground.keep_clear((part.x, part.y, part.width, part.height))
+        for area in (_area(inner.boxes[0]), *_writing(inner)) if ahead and inner.kind in ROUND else (_area(inner),):
+            ground.keep_clear(area)
+
+
+def _area(box: Box) -> Area:
+    return box.x, box.y, box.width, box.height
 
 
 def _writing(box: Box) -> Iterator[Area]:
@@ -181,13 +186,19 @@ def _ports(box: Box) -> list[Port]:
 
 def _spread(length: float) -> list[float]:
     room = length / 2 - CORNER
-    return [number * PORT_GAP for number in range(-2, 3) if abs(number) * PORT_GAP <= max(room, 0.0)]
+    middle = [number * PORT_GAP for number in range(-2, 3) if abs(number) * PORT_GAP <= max(room, 0.0)]
+    return [-room, *middle, room] if room > middle[-1] + PORT_GAP / 2 else middle
 
 
-def _taken(port: Port, lines: Iterable[tuple[Point, Point]]) -> float:
-    """Another line begins or ends there."""
+def _taken(port: Port, words: Iterable[Area], lines: Iterable[tuple[Point, Point]]) -> float:
+    """What it costs that words or other lines are there."""
     near = sum(1 for ends in lines if any(_distance(end, port.place) < PORT_GAP / 2 for end in ends))
-    return 60.0 * near
+    return 60.0 * near + 500.0 * any(_holds(area, port.before) for area in words)
+
+
+def _holds(area: Area, point: Point) -> bool:
+    x, y, width, height = area
+    return x <= point[0] <= x + width and y <= point[1] <= y + height
 
 
 def _nearest(point: Point, ports: Iterable[Port]) -> Point:
