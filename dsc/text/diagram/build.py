@@ -18,7 +18,7 @@ from dsc.model.states import (
     Region,
     State,
 )
-from dsc.text.diagram.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card, name_beside
+from dsc.text.diagram.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card
 from dsc.text.diagram.crossing import join, way_to
 from dsc.text.diagram.edges import Bundle, bundles, initial_bundle
 from dsc.text.diagram.header import header, rules_note

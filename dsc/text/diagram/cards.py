@@ -88,8 +88,9 @@ def history_card(name: str, state: HistoryState) -> Box:
     texts = tuple(
         Text(half + aside, top + LINE_HEIGHT * number, row.text, row.style) for number, row in enumerate(rows)
     )
-    mark = Text(CIRCLE_SIZE / 2, CIRCLE_SIZE / 2 + 4, "H*" if state.history == "deep" else "H", TextStyle.DETAIL, centred=True)
-    circle = Box(BoxKind.CIRCLE, "", 0, 0, CIRCLE_SIZE, CIRCLE_SIZE, (mark,))
+    mark = "H*" if state.history == "deep" else "H"
+    letter = Text(CIRCLE_SIZE / 2, CIRCLE_SIZE / 2 + 4, mark, TextStyle.DETAIL, centred=True)
+    circle = Box(BoxKind.CIRCLE, "", 0, 0, CIRCLE_SIZE, CIRCLE_SIZE, (letter,))
     title = "\n".join(filter(None, [name, state.about, *(row.full for row in rows[1:])]))
     # The circle is in the middle, since that is where edges meet it.
     circle = circle.moved(half - CIRCLE_SIZE / 2, (height - CIRCLE_SIZE) / 2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from math import inf
 
 from dsc.text.diagram.layered.arrange import without_detours
 from dsc.text.diagram.layout import Area, Box, BoxKind, Edge, Point, Text
@@ -19,6 +20,8 @@ CLEAR = 3.0
 """The least distance from things."""
 ARRIVAL = 11.0
 """Straight end of a line at a state, so that an arrowhead has room."""
+LEAST = 2.5
+"""Between places where lines may run, so that there are not too many in large drawings."""
 PORT_GAP = 14.0
 CORNER = 11.0
 """Free space at a state's corners."""
@@ -68,19 +71,20 @@ def prolonged(edge: Edge, start: Box, end: Box, also: Iterable[str], drawn: Sequ
 
     Args:
         edge: ends at the borders of the boxes.
-        start, end: where its source and its target are, or these themselves.
+        start: where its source is, or that itself.
+        end: where its target is, or that itself.
         also: more targets in `end`; the edges to them share the way to its border.
         drawn: edges that are there already, which are crossed seldom.
     """
     first, second, *_ = edge.points
-    tail = [*reversed(_inwards(start, edge.source, (second, first), drawn)), *edge.points]
-    *_, before, last = edge.points
-    edges = []
+    before, last = edge.points[-2:]
+    tail = [*reversed(_led_on(start, edge.source, (second, first), drawn)), *edge.points]
+    edges: list[Edge] = []
     for target in (edge.target, *also):
-        others = [*(one for one in drawn if one.target != target), *edges]
-        points = without_detours([*tail, *_inwards(end, target, (before, last), others)])
-        plain = replace(edge, target=target, points=points)
-        edges.append(replace(plain, label=(), area=None) if edges else plain)
+        others = [one for one in (*drawn, *edges) if one.target != target] if target != end.name else ()
+        points = without_detours([*tail, *_led_on(end, target, (before, last), others)])
+        forked = replace(edge, label=(), area=None) if edges else edge
+        edges.append(replace(forked, target=target, points=points))
     return edges
 
 
@@ -88,7 +92,7 @@ def join(box: Box, source: str, target: str) -> Edge:
     """The edge from a history among regions to a state in one of them."""
     circle = way_to(box, source)[-1].boxes[0]
     port = (circle.x + circle.width / 2, circle.y + circle.height)
-    points = _inwards(box, target, ((port[0], circle.y), port), ())
+    points = _inwards(way_to(box, target), ((port[0], circle.y), port), ())
     return Edge(source, target, without_detours([port, *points]))
 
 
@@ -102,21 +106,25 @@ def way_to(box: Box, name: str) -> tuple[Box, ...]:
     return ()
 
 
-def _inwards(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[Edge]) -> list[Point]:
-    """How a line goes on whose last piece comes to the border of `box`: to the border of the state `name` in it."""
-    way = way_to(box, name)
-    ports = _ports(way[-1])
-    if way == (box,):
-        return [_nearest(last[1], ports)] if box.kind is BoxKind.HISTORY else []
+def _led_on(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[Edge]) -> list[Point]:
+    """How a line goes on whose last piece comes to the border of `box`, to the border of the state `name`."""
+    if box.name != name:
+        return _inwards(way_to(box, name), last, drawn)
+    if box.kind is BoxKind.HISTORY:
+        return [min((port.place for port in _ports(box)), key=lambda place: _distance(place, last[1]))]
+    return []
+
+
+def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[Edge]) -> list[Point]:
+    """From the border of the first box on the way to the border of the last one."""
+    box, ports = way[0], _ports(way[-1])
     vertical = last[0][0] == last[1][0]
     start = _shifted(last[1], _direction(*last), TRACKS[0])
     ground = _ground(way, drawn)
     befores = [port.before for port in ports]
-    xs = [start[0], *(x for x, _ in befores), *ground.xs]
-    ys = [start[1], *(y for _, y in befores), *ground.ys]
     maze = Maze(
-        (round(x, 1) for x in xs if box.x < x < box.x + box.width),
-        (round(y, 1) for y in ys if box.y < y < box.y + box.height),
+        _places([start[0], *(x for x, _ in befores)], ground.xs, (box.x, box.x + box.width)),
+        _places([start[1], *(y for _, y in befores)], ground.ys, (box.y, box.y + box.height)),
         ground.solid,
         ground.lines,
     )
@@ -124,8 +132,20 @@ def _inwards(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[Edg
     words = [_text_area(text) for text in way[-1].texts] if way[-1].kind in ROUND else []
     goals = {goal: port.price + _taken(port, words, ground.lines) for goal, port in arrivals.items()}
     points = maze.way(_rounded(start), goals, vertical=vertical)
-    ends = [port for (before, _), port in arrivals.items() if before == points[-1]]
-    return [*points, min(ends, key=lambda port: port.price).place]
+    return [*points, next(port.place for (before, _), port in arrivals.items() if before == points[-1])]
+
+
+def _places(needed: Iterable[float], useful: Iterable[float], bounds: tuple[float, float]) -> list[float]:
+    """Where lines may run: where they have to, and wherever it is useful and no other place is close."""
+    fixed = [(round(place, 1), 0) for place in needed]
+    free = [(round(place, 1), 1) for place in useful if bounds[0] < place < bounds[1]]
+    places: list[float] = []
+    last = -inf
+    for place, rank in sorted({*fixed, *free}):
+        if rank == 0 or place - last >= LEAST:
+            places.append(place)
+            last = place
+    return places
 
 
 def _ground(way: Sequence[Box], drawn: Sequence[Edge]) -> _Ground:
@@ -199,10 +219,6 @@ def _taken(port: Port, words: Iterable[Area], lines: Iterable[tuple[Point, Point
 def _holds(area: Area, point: Point) -> bool:
     x, y, width, height = area
     return x <= point[0] <= x + width and y <= point[1] <= y + height
-
-
-def _nearest(point: Point, ports: Iterable[Port]) -> Point:
-    return min((port.place for port in ports), key=lambda place: _distance(place, point))
 
 
 def _distance(one: Point, other: Point) -> float:

@@ -91,7 +91,7 @@ def _bundle(
     source: str, targets: tuple[str, ...], group: list[Labelled], said: tuple[Caption, ...], *, recovery: bool
 ) -> Bundle:
     lines = [(line, caption.style) for caption in said for line in caption.lines]
-    rule = recovery or bool(group) and all(one.transition.rule is not None for one in group)
+    rule = recovery or (bool(group) and all(one.transition.rule is not None for one in group))
     width = max((text_width(line, style) for line, style in lines), default=0.0)
     height = LINE_HEIGHT * len(lines) + _gap(said) * max(len(said) - 1, 0)
     return Bundle(source, targets[0], said, rule, width, height, targets[1:])

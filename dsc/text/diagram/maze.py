@@ -5,6 +5,8 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from heapq import heappop, heappush
+from itertools import pairwise
+from math import inf
 
 from dsc.text.diagram.layout import Area, Point
 
@@ -58,24 +60,34 @@ class Maze:
             goals: crossings with the direction in which to go on from them (vertical or not) -> the price of that.
             vertical: the direction in which it comes to the start.
         """
+        (left, right), (top, low) = (_span(place[axis] for place, _ in goals) for axis in (0, 1))
+
+        def least(node: Node) -> float:
+            """What it costs at least from there on."""
+            x, y = self._xs[node[0]], self._ys[node[1]]
+            return max(left - x, x - right, 0.0) + max(top - y, y - low, 0.0)
+
         ends = {(self._column(x), self._row(y), up): price for ((x, y), up), price in goals.items()}
         first = (self._column(start[0]), self._row(start[1]), vertical)
         paid: dict[Node, float] = {first: 0.0}
         came: dict[Node, Node] = {}
-        queue: list[tuple[float, Node, bool]] = [(0.0, first, False)]
+        queue: list[tuple[float, Node, bool]] = [(least(first), first, False)]
+        done: set[Node] = set()
         while queue:
-            price, node, arrived = heappop(queue)
+            _, node, arrived = heappop(queue)
             if arrived:
                 return self._points(node, came)
-            if price > paid[node]:
+            if node in done:
                 continue
+            done.add(node)
+            price = paid[node]
             for end in ((*node[:2], False), (*node[:2], True)):
                 if end in ends:
                     heappush(queue, (price + ends[end] + BEND * (end[2] != node[2]), node, True))
             for following, step in self._steps(node):
-                if price + step < paid.get(following, float("inf")):
+                if price + step < paid.get(following, inf):
                     paid[following], came[following] = price + step, node
-                    heappush(queue, (price + step, following, False))
+                    heappush(queue, (price + step + least(following), following, False))
         raise AssertionError("a grid is connected")
 
     def _steps(self, node: Node) -> Iterable[tuple[Node, float]]:
@@ -101,9 +113,14 @@ class Maze:
         return bisect_left(self._ys, y)
 
 
+def _span(places: Iterable[float]) -> tuple[float, float]:
+    listed = list(places)
+    return min(listed), max(listed)
+
+
 def _lengths(places: Sequence[float], count: int) -> list[list[float]]:
     """The prices of the steps along `count` free lines."""
-    steps = [after - before for before, after in zip(places, places[1:], strict=False)]
+    steps = [after - before for before, after in pairwise(places)]
     return [steps.copy() for _ in range(count)]
 
 

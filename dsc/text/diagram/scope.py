@@ -96,7 +96,8 @@ def _node(box: Box, own: Sequence[Span], *, sideways: bool) -> Node:
 def _roomy(box: Box, own: Sequence[Span], *, sideways: bool) -> Box:
     """A box as large as the labels of its loops, so that these keep clear of other boxes."""
     room = room_along_loops([span.bundle for span in own], sideways=sideways)
-    return widened(box, max(box.width, room), box.height) if sideways else widened(box, box.width, max(box.height, room))
+    width, height = (room, 0.0) if sideways else (0.0, room)
+    return widened(box, max(box.width, width), max(box.height, height))
 
 
 def widened(box: Box, width: float, height: float) -> Box:

@@ -71,8 +71,8 @@ def _box(box: Box, around: str) -> Iterator[str]:
     yield from _separators(box.boxes, stroke)
     yield "</g>"
     names = {inner.name for inner in box.boxes}
+    flat = [edge for edge in box.edges if names.issuperset((edge.source, edge.target))]
     over = [edge for edge in box.edges if not names.issuperset((edge.source, edge.target))]
-    flat = [edge for edge in box.edges if edge not in over]
     # All lines are under all labels; where lines of rules and others run together, the others are seen.
     for edge in sorted(flat, key=lambda one: not one.rule):
         yield from _edge(edge)
@@ -80,6 +80,7 @@ def _box(box: Box, around: str) -> Iterator[str]:
         yield from _label(edge, fill)
     for inner in box.boxes:
         yield from _box(inner, fill)
+    # What leads into inner boxes is drawn over them.
     for edge in over:
         yield from _edge(edge)
     for edge in over:
