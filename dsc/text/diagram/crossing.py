@@ -118,7 +118,7 @@ def _led_on(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[Edge
 def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[Edge]) -> list[Point]:
     """From the border of the first box on the way to the border of the last one."""
     box, ports = way[0], _ports(way[-1])
-    vertical = last[0][0] == last[1][0]
+    vertical = abs(last[0][0] - last[1][0]) < abs(last[0][1] - last[1][1])
     start = _shifted(last[1], _direction(*last), TRACKS[0])
     ground = _ground(way, drawn)
     befores = [port.before for port in ports]
@@ -128,17 +128,17 @@ def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[Edge
         ground.solid,
         ground.lines,
     )
-    arrivals = {(_rounded(port.before), port.out[0] == 0): port for port in ports}
+    arrivals = {(port.before, port.out[0] == 0): port for port in ports}
     words = [_text_area(text) for text in way[-1].texts] if way[-1].kind in ROUND else []
     goals = {goal: port.price + _taken(port, words, ground.lines) for goal, port in arrivals.items()}
-    points = maze.way(_rounded(start), goals, vertical=vertical)
+    points = maze.way(start, goals, vertical=vertical)
     return [*points, next(port.place for (before, _), port in arrivals.items() if before == points[-1])]
 
 
 def _places(needed: Iterable[float], useful: Iterable[float], bounds: tuple[float, float]) -> list[float]:
     """Where lines may run: where they have to, and wherever it is useful and no other place is close."""
-    fixed = [(round(place, 1), 0) for place in needed]
-    free = [(round(place, 1), 1) for place in useful if bounds[0] < place < bounds[1]]
+    fixed = [(place, 0) for place in needed]
+    free = [(place, 1) for place in useful if bounds[0] < place < bounds[1]]
     places: list[float] = []
     last = -inf
     for place, rank in sorted({*fixed, *free}):
@@ -232,7 +232,3 @@ def _direction(before: Point, after: Point) -> Point:
 
 def _shifted(point: Point, direction: Point, length: float) -> Point:
     return point[0] + direction[0] * length, point[1] + direction[1] * length
-
-
-def _rounded(point: Point) -> Point:
-    return round(point[0], 1), round(point[1], 1)
