@@ -215,7 +215,7 @@ HISTORIES = """
   a: {on: {back: h, whole: all}}
   o:
     regions:
-      left: {states: {b: {states: {c: , d: , h: {history: deep, to: d, do: {emit: began}}}}}}
+      left: {states: {b: {states: {c: , d: , h: {history: deep, to: d, do: [{emit: began}]}}}}}
       right: {states: {e: }}
     connectors: {all: {history: shallow, to: c}}
 """
