@@ -22,19 +22,23 @@ from dsc.text.diagram.captions import block_texts, full_text, labelled, seconds_
 
 def to_mermaid(plot: ActionPlot) -> str:
     """The plot as a Mermaid state diagram."""
-    return "\n".join(["stateDiagram-v2", *_Writer(plot).lines()]) + "\n"
+    return "\n".join(["stateDiagram-v2", *_Writer(plot, hulls_have_rows=False).lines()]) + "\n"
 
 
 def to_plantuml(plot: ActionPlot) -> str:
     """The plot as a PlantUML state diagram."""
-    return "\n".join(["@startuml", f"title {plot.name}", *_Writer(plot).lines(), "@enduml"]) + "\n"
+    lines = _Writer(plot, hulls_have_rows=True).lines()
+    return "\n".join(["@startuml", f"title {plot.name}", *lines, "@enduml"]) + "\n"
 
 
 class _Writer:
-    """States get short names of their own, since theirs may hold anything."""
+    """States get short names of their own, since theirs may hold anything.
 
-    def __init__(self, plot: ActionPlot) -> None:
-        self._plot = plot
+    Mermaid refuses rows of text in states with states inside (`hulls_have_rows`); their titles say it then.
+    """
+
+    def __init__(self, plot: ActionPlot, *, hulls_have_rows: bool) -> None:
+        self._plot, self._hulls_have_rows = plot, hulls_have_rows
         self._alias = {name: f"s{number}" for number, (name, _, _) in enumerate(plot.walk(), start=1)}
 
     def lines(self) -> Iterator[str]:
@@ -51,17 +55,18 @@ class _Writer:
             if isinstance(state, Connector):  # a choice has no title in these forms
                 yield f"{indent}state {self._alias[name]} <<choice>>"
                 continue
-            yield f'{indent}state "{_safe(_title(name, state))}" as {self._alias[name]}'
+            rows = [_safe(text) for text in _rows(state)]
+            in_title = isinstance(state, CompositeState | OrthogonalState) and not self._hulls_have_rows
+            title = "<br/>".join([_safe(_title(name, state)), *(rows if in_title else ())])
+            yield f'{indent}state "{title}" as {self._alias[name]}'
             if isinstance(state, CompositeState | OrthogonalState):
                 yield f"{indent}state {self._alias[name]} {{"
                 yield from self._inside(state, indent + "  ")
                 yield f"{indent}}}"
             if isinstance(state, FinalState):
                 yield f"{indent}{self._alias[name]} --> [*]"
-            if isinstance(state, State):
-                least = [] if state.at_least is None else [f"at least {seconds_text(state.at_least)}"]
-                for text in (*least, *block_texts(state)):
-                    yield f"{indent}{self._alias[name]} : {_safe(text)}"
+            if not in_title:
+                yield from (f"{indent}{self._alias[name]} : {text}" for text in rows)
 
     def _inside(self, state: CompositeState | OrthogonalState, indent: str) -> Iterator[str]:
         if isinstance(state, CompositeState):
@@ -82,10 +87,18 @@ class _Writer:
         for one in labelled(state):
             text = _safe(full_text(one))
             label = f" : {text}" if text else ""
-            if one.transition.target is None:
-                yield f"  {self._alias[name]}{label}"
             for target in one.transition.targets:
                 yield f"  {self._alias[name]} --> {self._alias[target]}{label}"
+
+
+def _rows(state: AnyState) -> Iterator[str]:
+    """What a state says besides its name: how long it lasts, its actions, the events that do not leave it."""
+    if not isinstance(state, State):
+        return
+    if state.at_least is not None:
+        yield f"at least {seconds_text(state.at_least)}"
+    yield from block_texts(state)
+    yield from (full_text(one) for one in labelled(state) if one.transition.target is None)
 
 
 def _title(name: str, state: AnyState) -> str:

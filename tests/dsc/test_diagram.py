@@ -8,6 +8,7 @@ from time import process_time
 from xml.etree import ElementTree as ET
 
 import pytest
+from dsc_drawings import apart, area, boxes, edges, inside, on_border
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,7 @@ from dsc.model.states import State
 from dsc.text.diagram import draw, lay_out
 from dsc.text.diagram.layered.fitting import fit
 from dsc.text.diagram.layered.tracks import Net, assign_tracks
-from dsc.text.diagram.layout import Box, BoxKind, Edge, TextStyle
+from dsc.text.diagram.layout import Box, BoxKind, TextStyle
 from dsc.text.diagram.measure import pack, shorten, text_width
 from dsc.text.plots import load_library, parse_plot
 from knowledge_base.errors import UnknownNameError
@@ -40,14 +41,6 @@ def texts(svg: str, style: TextStyle) -> list[str]:
 
 def everything(svg: str) -> str:
     return " ".join(ET.fromstring(svg).itertext())  # noqa: S314  our own text
-
-
-def boxes(root: Box) -> list[Box]:
-    return [root, *(one for inner in root.boxes for one in boxes(inner))]
-
-
-def edges(root: Box) -> list[Edge]:
-    return [edge for box in boxes(root) for edge in box.edges]
 
 
 # -- random plots ------------------------------------------------------------------------------------------
@@ -97,20 +90,6 @@ plots = scopes().map(lambda states: ActionPlot.model_validate({"plot": "random",
 directions = st.sampled_from(["down", "right"])
 
 
-def apart(one: tuple[float, ...], other: tuple[float, ...], slack: float = 0.25) -> bool:
-    (x, y, w, h), (u, v, a, b) = one, other
-    return x + w <= u + slack or u + a <= x + slack or y + h <= v + slack or v + b <= y + slack
-
-
-def area(box: Box) -> tuple[float, ...]:
-    return box.x, box.y, box.width, box.height
-
-
-def inside(inner: tuple[float, ...], outer: tuple[float, ...], slack: float = 0.25) -> bool:
-    (x, y, w, h), (u, v, a, b) = inner, outer
-    return x >= u - slack and y >= v - slack and x + w <= u + a + slack and y + h <= v + b + slack
-
-
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(plots, directions)
 def test_boxes_and_labels_lie_inside_their_parent_and_overlap_nothing(plot: ActionPlot, direction: str) -> None:
@@ -145,15 +124,6 @@ def core(box: Box) -> tuple[float, ...]:
     if box.kind is not BoxKind.CHOICE:
         return area(box)
     return box.x + box.width / 4, box.y + box.height / 4, box.width / 2, box.height / 2
-
-
-def on_border(point: tuple[float, float], box: Box) -> bool:
-    x, y = point
-    if box.kind is BoxKind.CHOICE:
-        across, along = abs(x - box.x - box.width / 2), abs(y - box.y - box.height / 2)
-        return across / (box.width / 2) + along / (box.height / 2) == pytest.approx(1, abs=0.01)
-    on_side = min(abs(x - box.x), abs(x - box.x - box.width), abs(y - box.y), abs(y - box.y - box.height))
-    return inside((x, y, 0, 0), area(box)) and on_side < 0.25
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)

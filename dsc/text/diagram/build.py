@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from dsc.dynamic.library import Library
 from dsc.model.connectors import Connector
@@ -18,27 +18,18 @@ from dsc.model.states import (
     Region,
     State,
 )
-from dsc.text.diagram.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card, name_beside
-from dsc.text.diagram.edges import Bundle, bundles, initial_bundle, loop, room_for_loop
+from dsc.text.diagram.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card
+from dsc.text.diagram.crossing import join, way_to
+from dsc.text.diagram.edges import Bundle, bundles, initial_bundle
 from dsc.text.diagram.header import header, rules_note
-from dsc.text.diagram.layered.arrange import arrange
-from dsc.text.diagram.layered.graph import Link, Node
-from dsc.text.diagram.layout import Box, BoxKind, Edge, Text, TextStyle
+from dsc.text.diagram.layout import Box, BoxKind, Text, TextStyle
+from dsc.text.diagram.nesting import Nesting
+from dsc.text.diagram.scope import Inside, Span, arranged, widened
 from knowledge_base.errors import UnknownNameError
 
 PAD = 16.0
 REGION_TITLE = 22.0
 HULLS = frozenset({BoxKind.COMPOSITE, BoxKind.ORTHOGONAL})
-
-
-@dataclass(frozen=True, slots=True)
-class _Inside:
-    """What a scope holds, in a rectangle that begins at (0, 0)."""
-
-    width: float
-    height: float
-    boxes: tuple[Box, ...]
-    edges: tuple[Edge, ...] = ()
 
 
 def build(plot: ActionPlot, library: Library | None, *, rules: bool, sideways: bool) -> Box:
@@ -68,7 +59,7 @@ def _notes(plot: ActionPlot, *, shown: bool) -> Box | None:
     return rules_note(plot.rules, "rules, also for the steps of plans" if planned else "rules")
 
 
-def _frame(plot: ActionPlot, inside: _Inside, notes: Box | None) -> Box:
+def _frame(plot: ActionPlot, inside: Inside, notes: Box | None) -> Box:
     room = max(inside.width, notes.width if notes is not None else 0.0)
     top = header(plot, room)
     width = max(room + 2 * PAD, top.width)
@@ -81,7 +72,7 @@ def _frame(plot: ActionPlot, inside: _Inside, notes: Box | None) -> Box:
     return replace(frame, boxes=boxes, edges=content.edges)
 
 
-def _wrapped(inside: _Inside) -> Box:
+def _wrapped(inside: Inside) -> Box:
     return Box(BoxKind.REGION, "", 0, 0, inside.width, inside.height, boxes=inside.boxes, edges=inside.edges)
 
 
@@ -89,26 +80,50 @@ class _Builder:
     def __init__(self, plot: ActionPlot, library: Library | None, added: frozenset[str], *, sideways: bool) -> None:
         self._plot, self._library = plot, library
         self._added, self._sideways = added, sideways
+        self._nesting = Nesting(plot)
+        self._bundles = self._by_scope()
 
-    def scope(self, scope: Scope, path: Path) -> _Inside:
+    def _by_scope(self) -> dict[Path, list[Bundle]]:
+        """The edges of the whole plot, each in the innermost scope that holds all of its ends."""
+        states = {name: state for name, state, _ in self._plot.walk()}
+        paths = {name: path for name, _, path in self._plot.walk()}
+        among_regions = {name for name, path in paths.items() if path[-2] == "connectors"}
+        scopes: dict[Path, list[Bundle]] = {}
+        for one in bundles(states, self._added, terse=self._plot.generated):
+            for target in one.targets:
+                self._known(target, list(states), paths[one.source])
+            if one.source in among_regions:
+                continue
+            scopes.setdefault(self._nesting.common_scope((one.source, *one.targets)), []).append(one)
+        return scopes
+
+    def scope(self, scope: Scope, path: Path) -> Inside:
         """The states of a scope with their edges, laid out."""
-        states, initial = scope.states, initial_of(scope)
-        self._known(initial, states, (*path, "initial"))
-        links = bundles(states, self._added, terse=self._plot.generated)
-        for link in links:
-            self._known(link.target, states, (*path, "states", link.source))
-        boxes = {"": dot(), **{name: self._state(name, state, path) for name, state in states.items()}}
-        links.insert(0, initial_bundle(initial))
+        initial = initial_of(scope)
+        self._known(initial, self._nesting.inside(path), (*path, "initial"))
+        boxes = {"": dot(), **{name: self._state(name, state, path) for name, state in scope.states.items()}}
+        edges = (initial_bundle(initial), *self._bundles.get(path, ()))
+        spans = [span for one in edges for span in self._spans(path, one)]
         if not any(box.kind in HULLS for box in boxes.values()):
-            return _arranged(boxes, links, sideways=self._sideways)
+            return arranged(boxes, spans, sideways=self._sideways).finished()
         # Around large boxes, the direction in which the whole is closer to a square reads better.
-        both = [_arranged(boxes, links, sideways=sideways) for sideways in (self._sideways, not self._sideways)]
-        return min(both, key=lambda inside: max(inside.width, inside.height))
+        both = [arranged(boxes, spans, sideways=sideways) for sideways in (self._sideways, not self._sideways)]
+        return min(both, key=lambda draft: max(draft.width, draft.height)).finished()
 
-    def _known(self, target: str, states: Mapping[str, AnyState], path: Path) -> None:
-        if target not in states:
+    def _spans(self, scope: Path, bundle: Bundle) -> Iterator[Span]:
+        """One for all targets, unless the plot is wrong and they are not together in a state."""
+        holder = self._nesting.holder
+        start, end = holder(scope, bundle.source), holder(scope, bundle.target)
+        also = tuple(target for target in bundle.also if holder(scope, target) == end)
+        yield Span(replace(bundle, also=also), start, end)
+        for target in bundle.also:
+            if target not in also:
+                yield Span(Bundle(bundle.source, target, (), bundle.rule), start, holder(scope, target))
+
+    def _known(self, target: str, valid: list[str], path: Path) -> None:
+        if target not in valid:
             raise UnknownNameError(
-                f"there is no state '{target}' here", place=self._plot.place(path), found=target, valid=states
+                f"there is no state '{target}' here", place=self._plot.place(path), found=target, valid=valid
             )
 
     def _state(self, name: str, state: AnyState, path: Path) -> Box:
@@ -121,19 +136,22 @@ class _Builder:
             return self._hull(BoxKind.COMPOSITE, name, state, self.scope(state, here))
         if isinstance(state, OrthogonalState):
             regions = [self._region(key, one, (*here, "regions", key)) for key, one in state.regions.items()]
-            return self._hull(BoxKind.ORTHOGONAL, name, state, _side_by_side(regions))
+            inside = _below([history_card(*one) for one in state.connectors.items()], _side_by_side(regions))
+            hull = self._hull(BoxKind.ORTHOGONAL, name, state, inside)
+            joins = [join(hull, each, one.target) for each, one in state.connectors.items() if way_to(hull, one.target)]
+            return replace(hull, edges=tuple(joins))
         if isinstance(state, Connector):
             return diamond(name, state)
         return leaf_card(name, state, self._library, rule=name in self._added, told=self._plot.generated)
 
-    def _hull(self, kind: BoxKind, name: str, state: State, inside: _Inside) -> Box:
+    def _hull(self, kind: BoxKind, name: str, state: State, inside: Inside) -> Box:
         """A state around an inside; regions reach up to its border, states do not."""
         pad = 0.0 if kind is BoxKind.ORTHOGONAL else PAD
         head = card(kind, name, action_rows(state), about=state.about or "")
         width = max(head.width, inside.width + 2 * pad)
         moved = _wrapped(inside).moved((width - inside.width) / 2, head.height + pad)
         return replace(
-            _widened(head, width, head.height + inside.height + 2 * pad),
+            widened(head, width, head.height + inside.height + 2 * pad),
             lines=(*head.lines, head.height),
             boxes=moved.boxes,
             edges=moved.edges,
@@ -147,51 +165,7 @@ class _Builder:
         return replace(hull, name=name, x=0, y=0, width=width, height=height, texts=(title,))
 
 
-def _arranged(boxes: Mapping[str, Box], links: list[Bundle], *, sideways: bool) -> _Inside:
-    loops = {link.source: link for link in links if link.source == link.target}
-    others = [link for link in links if link.source != link.target]
-    roomy = [_roomy(box, loops.get(name), sideways=sideways) for name, box in boxes.items()]
-    if sideways:
-        roomy = [name_beside(box) if box.kind is BoxKind.FINAL else box for box in roomy]
-    number = {name: index for index, name in enumerate(boxes)}
-    drawing = arrange(
-        [_node(box, loops.get(box.name), sideways=sideways) for box in roomy],
-        [_link(number[one.source], number[one.target], one) for one in others],
-        sideways=sideways,
-    )
-    placed = [box.moved(*corner) for box, corner in zip(roomy, drawing.corners, strict=True)]
-    edges = [link.along(route) for link, route in zip(others, drawing.routes, strict=True)]
-    edges += [loop(one, placed[number[name]], sideways=sideways) for name, one in loops.items()]
-    return _Inside(drawing.width, drawing.height, tuple(placed), tuple(edges))
-
-
-def _link(source: int, target: int, bundle: Bundle) -> Link:
-    # What was foreseen is the thread to follow; what rules do about failures goes around it.
-    return Link(source, target, bundle.width, bundle.height, weight=0.1 if bundle.rule else 1.0)
-
-
-def _node(box: Box, own: Bundle | None, *, sideways: bool) -> Node:
-    beside = room_for_loop(own, sideways=sideways) if own is not None else 0.0
-    pointed, diamond = box.kind in {BoxKind.INITIAL, BoxKind.FINAL}, box.kind is BoxKind.CHOICE
-    return Node(
-        box.width, box.height, beside, pointed=pointed, diamond=diamond, last=box.kind is BoxKind.FINAL
-    )
-
-
-def _roomy(box: Box, own: Bundle | None, *, sideways: bool) -> Box:
-    """A box as large as the label of its loop, so that this keeps clear of other boxes."""
-    if own is None:
-        return box
-    width, height = (own.width, 0.0) if sideways else (0.0, own.height)
-    return _widened(box, max(box.width, width), max(box.height, height))
-
-
-def _widened(box: Box, width: float, height: float) -> Box:
-    texts = tuple(replace(text, x=text.x + (width - box.width) / 2) if text.centred else text for text in box.texts)
-    return replace(box, width=width, height=height, texts=texts)
-
-
-def _side_by_side(regions: list[Box]) -> _Inside:
+def _side_by_side(regions: list[Box]) -> Inside:
     """Regions in a row or in a column, whichever is closer to a square; all reach from border to border."""
     widths, heights = [one.width for one in regions], [one.height for one in regions]
     in_row = max(sum(widths), *heights) <= max(*widths, sum(heights))
@@ -202,4 +176,18 @@ def _side_by_side(regions: list[Box]) -> _Inside:
         full = replace(one, height=height) if in_row else replace(one, width=width)
         boxes.append(full.moved(x, y))
         x, y = (x + one.width, y) if in_row else (x, y + one.height)
-    return _Inside(width, height, tuple(boxes))
+    return Inside(width, height, tuple(boxes))
+
+
+def _below(histories: Sequence[Box], regions: Inside) -> Inside:
+    """Regions below the histories of the whole."""
+    if not histories:
+        return regions
+    boxes, x = [], PAD
+    for one in histories:
+        boxes.append(one.moved(x, PAD))
+        x += one.width + PAD
+    top = max(one.height for one in histories) + 2 * PAD
+    stretch = max(x / regions.width, 1.0)
+    boxes += [replace(one, width=one.width * stretch).moved(one.x * (stretch - 1), top) for one in regions.boxes]
+    return Inside(regions.width * stretch, regions.height + top, tuple(boxes))

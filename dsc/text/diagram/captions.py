@@ -103,7 +103,7 @@ def captions(transitions: Iterable[Labelled], *, terse: bool = False) -> list[Ca
 
 def _rest(one: Labelled, *, terse: bool) -> tuple[object, ...]:
     """What a caption says besides the trigger."""
-    return _guard(one, terse=terse), one.transition.rule, _brief(one.transition, terse=terse)
+    return _guard(one, terse=terse), one.transition.rule, one.transition.internal, _brief(one.transition, terse=terse)
 
 
 def _guard(one: Labelled, *, terse: bool) -> str:
@@ -133,7 +133,8 @@ def _caption(group: list[Labelled], *, terse: bool) -> Caption:
     else:
         triggers = list(dict.fromkeys(one.trigger for one in group if one.trigger))
         actions = _brief(first.transition, terse=terse)
-        words = [*_enumerated(triggers), _guard(first, terse=terse), *_enumerated(actions, ";", "/ ")]
+        kind = _kind(first.transition)
+        words = [*_enumerated(triggers), _guard(first, terse=terse), kind, *_enumerated(actions, ";", "/ ")]
     lines = pack([word for word in words if word], TextStyle.LABEL, WIDTH)
     return Caption(tuple(lines), "\n".join(filter(None, map(full_text, group))), rule is not None)
 
@@ -145,10 +146,16 @@ def full_text(one: Labelled, *, trigger: bool = True) -> str:
     parts = [
         one.trigger if trigger else "",
         _guard(one, terse=False),
+        _kind(one.transition),
         f"/ {effects}" if effects else "",
         f"(rule: {rule})" if rule else "",
     ]
     return " ".join(part for part in parts if part)
+
+
+def _kind(transition: Transition) -> str:
+    """As UML writes it: the state it leads away from is not left."""
+    return "{internal}" if transition.internal and transition.target is not None else ""
 
 
 def _enumerated(words: Sequence[str], separator: str = ",", before: str = "") -> list[str]:

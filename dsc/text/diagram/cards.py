@@ -9,7 +9,7 @@ from dsc.dynamic.library import Library
 from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, FinalState, HistoryState, State, SubmachineState
-from dsc.text.diagram.captions import block_texts, captions, content_text, labelled, seconds_text
+from dsc.text.diagram.captions import action_text, block_texts, captions, content_text, labelled, seconds_text
 from dsc.text.diagram.layout import Box, BoxKind, Text, TextStyle
 from dsc.text.diagram.measure import LINE_HEIGHT, shorten, text_width
 from knowledge_base.language.expression import Term
@@ -26,6 +26,7 @@ FINAL_SIZE = 20.0
 DIAMOND_HEIGHT = 44.0
 """With one line in it."""
 DOT_SIZE = 14.0
+CIRCLE_SIZE = 24.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +78,36 @@ def final_card(name: str, state: FinalState) -> Box:
 
 
 def history_card(name: str, state: HistoryState) -> Box:
-    """A history: H or H*, as UML writes it, and the state it begins with."""
+    """A history: a circle with H or H*, as UML writes it; beside it its name and what it does when it is empty."""
+    done = "; ".join(map(action_text, state.do))
+    rows = [Row(name, TextStyle.NAME, name), *([_row(f"/ {done}")] if done else [])]
+    aside = CIRCLE_SIZE / 2 + 7
+    half = aside + max(text_width(row.text, row.style) for row in rows)
+    height = max(CIRCLE_SIZE, LINE_HEIGHT * len(rows))
+    top = (height - LINE_HEIGHT * len(rows)) / 2 + 11.5
+    texts = tuple(
+        Text(half + aside, top + LINE_HEIGHT * number, row.text, row.style) for number, row in enumerate(rows)
+    )
     mark = "H*" if state.history == "deep" else "H"
-    return card(BoxKind.SIMPLE, name, [_row(f"{mark} → {state.target}")], about=state.about or "")
+    letter = Text(CIRCLE_SIZE / 2, CIRCLE_SIZE / 2 + 4, mark, TextStyle.DETAIL, centred=True)
+    circle = Box(BoxKind.CIRCLE, "", 0, 0, CIRCLE_SIZE, CIRCLE_SIZE, (letter,))
+    title = "\n".join(filter(None, [name, state.about, *(row.full for row in rows[1:])]))
+    # The circle is in the middle, since that is where edges meet it.
+    circle = circle.moved(half - CIRCLE_SIZE / 2, (height - CIRCLE_SIZE) / 2)
+    return Box(BoxKind.HISTORY, name, 0, 0, 2 * half, height, texts, title=title, boxes=(circle,))
+
+
+def name_below(history: Box) -> Box:
+    """A history with its texts below the circle, for edges that come from the left."""
+    width = max(CIRCLE_SIZE, *(text_width(text.text, text.style) for text in history.texts))
+    below = LINE_HEIGHT * len(history.texts)
+    texts = tuple(
+        replace(text, x=width / 2, y=below + CIRCLE_SIZE + 12 + LINE_HEIGHT * number, centred=True)
+        for number, text in enumerate(history.texts)
+    )
+    (circle,) = history.boxes
+    circle = circle.moved((width - CIRCLE_SIZE) / 2 - circle.x, below - circle.y)
+    return replace(history, width=width, height=CIRCLE_SIZE + 2 * below, texts=texts, boxes=(circle,))
 
 
 def diamond(name: str, connector: Connector) -> Box:

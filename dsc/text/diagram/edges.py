@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from dsc.model.states import AnyState
+from dsc.model.states import AnyState, HistoryState
 from dsc.model.transitions import Source
 from dsc.text.diagram.captions import Caption, Labelled, captions, labelled_by_value
 from dsc.text.diagram.layered.graph import Route
@@ -15,12 +15,14 @@ from dsc.text.diagram.measure import LINE_HEIGHT, text_width
 LOOP = 18.0
 """How far a loop leaves its state."""
 LOOP_HALF = 8.0
+LOOP_GAP = 8.0
+"""Between loops of one state."""
 CAPTION_GAP = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """All transitions from one state to another, with the size of their common label."""
+    """All transitions from one state to another (`also`: and more), with the size of their common label."""
 
     source: str
     target: str
@@ -28,6 +30,12 @@ class Bundle:
     rule: bool
     width: float = 0.0
     height: float = 0.0
+    also: tuple[str, ...] = ()
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """All states it leads to."""
+        return (self.target, *self.also)
 
     @property
     def title(self) -> str:
@@ -59,30 +67,34 @@ class Bundle:
 
 
 def bundles(states: Mapping[str, AnyState], recoveries: frozenset[str], *, terse: bool) -> list[Bundle]:
-    """The transitions of one scope, merged by source and target, in the order of the plot.
+    """The transitions of states and the defaults of histories, merged by their ends, in the order of the states.
 
     Args:
-        states: of the scope.
+        states: by name.
         recoveries: names of states that rules added.
         terse: see `captions`.
     """
-    groups: dict[tuple[str, str], list[Labelled]] = {}
+    groups: dict[tuple[str, tuple[str, ...]], list[Labelled]] = {}
     for name, state in states.items():
+        if isinstance(state, HistoryState):  # what it does then stands at its circle
+            groups[name, (state.target,)] = []
         for one in labelled_by_value(state) if isinstance(state, Source) else ():
             if one.transition.target is not None:
-                groups.setdefault((name, one.transition.target), []).append(one)
+                groups.setdefault((name, one.transition.targets), []).append(one)
     return [
         _bundle(*ends, group, tuple(captions(group, terse=terse)), recovery=ends[0] in recoveries)
         for ends, group in groups.items()
     ]
 
 
-def _bundle(source: str, target: str, group: list[Labelled], said: tuple[Caption, ...], *, recovery: bool) -> Bundle:
+def _bundle(
+    source: str, targets: tuple[str, ...], group: list[Labelled], said: tuple[Caption, ...], *, recovery: bool
+) -> Bundle:
     lines = [(line, caption.style) for caption in said for line in caption.lines]
-    rule = recovery or all(one.transition.rule is not None for one in group)
+    rule = recovery or (bool(group) and all(one.transition.rule is not None for one in group))
     width = max((text_width(line, style) for line, style in lines), default=0.0)
     height = LINE_HEIGHT * len(lines) + _gap(said) * max(len(said) - 1, 0)
-    return Bundle(source, target, said, rule, width, height)
+    return Bundle(source, targets[0], said, rule, width, height, targets[1:])
 
 
 def _gap(said: tuple[Caption, ...]) -> float:
@@ -95,17 +107,35 @@ def initial_bundle(target: str) -> Bundle:
     return Bundle("", target, (), rule=False)
 
 
-def room_for_loop(bundle: Bundle, *, sideways: bool) -> float:
-    """The space a loop with its label needs beside its state (below it if `sideways`)."""
-    return LOOP + 6 + (bundle.height if sideways else bundle.width)
+def room_for_loops(bundles: Sequence[Bundle], *, sideways: bool) -> float:
+    """The space that loops with their labels need beside their state (below it if `sideways`)."""
+    return max((LOOP + 6 + (one.height if sideways else one.width) for one in bundles), default=0.0)
 
 
-def loop(bundle: Bundle, box: Box, *, sideways: bool) -> Edge:
-    """A transition from a state to itself."""
-    x, y = box.x + box.width, box.y + box.height / 2
+def room_along_loops(bundles: Sequence[Bundle], *, sideways: bool) -> float:
+    """How high (wide if `sideways`) a state has to be for the labels of its loops."""
+    if len(bundles) < 2:  # one alone may reach beyond its state
+        return sum(one.width if sideways else one.height for one in bundles)
+    return sum(_extent(one, sideways=sideways) + LOOP_GAP for one in bundles)
+
+
+def _extent(bundle: Bundle, *, sideways: bool) -> float:
+    return max(bundle.width if sideways else bundle.height, 2 * LOOP_HALF)
+
+
+def loops(bundles: Sequence[Bundle], box: Box, *, sideways: bool) -> list[Edge]:
+    """Transitions that leave a state and come back to it or into it, side by side."""
+    extents = [_extent(one, sideways=sideways) + LOOP_GAP for one in bundles]
+    first = -sum(extents) / 2
+    offsets = [first + sum(extents[:number]) + extent / 2 for number, extent in enumerate(extents)]
+    return [_loop(one, box, offset, sideways=sideways) for one, offset in zip(bundles, offsets, strict=True)]
+
+
+def _loop(bundle: Bundle, box: Box, offset: float, *, sideways: bool) -> Edge:
+    x, y = box.x + box.width, box.y + box.height / 2 + offset
     slope = box.height / box.width if box.kind is BoxKind.CHOICE else 0.0
     if sideways:
-        x, y = box.x + box.width / 2, box.y + box.height
+        x, y = box.x + box.width / 2 + offset, box.y + box.height
         end = y - LOOP_HALF * slope
         ends = ((x - LOOP_HALF, end), (x - LOOP_HALF, y + LOOP), (x + LOOP_HALF, y + LOOP), (x + LOOP_HALF, end))
         return bundle.edge(ends, (x, y + LOOP + 6 + bundle.height / 2))

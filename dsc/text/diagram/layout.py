@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 Point = tuple[float, float]
+Area = tuple[float, float, float, float]
+"""x, y, width, height."""
 
 
 class TextStyle(StrEnum):
@@ -36,6 +38,8 @@ class BoxKind(StrEnum):
     FINAL = "final"
     CHOICE = "choice"
     BULLSEYE = "bullseye"
+    HISTORY = "history"
+    CIRCLE = "circle"
     INITIAL = "initial"
     NOTE = "note"
 
@@ -53,7 +57,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A transition, or several between the same two states.
+    """A transition, or several between the same two states, which may be deeper inside the boxes around.
 
     Attributes:
         source, target: names of the states; the initial pseudo-state has the name `""`.
@@ -67,7 +71,7 @@ class Edge:
     target: str
     points: tuple[Point, ...]
     label: tuple[Text, ...] = ()
-    area: tuple[float, float, float, float] | None = None
+    area: Area | None = None
     title: str = ""
     rule: bool = False
 

@@ -70,21 +70,31 @@ def _box(box: Box, around: str) -> Iterator[str]:
     yield from (_text(text) for text in box.texts)
     yield from _separators(box.boxes, stroke)
     yield "</g>"
+    names = {inner.name for inner in box.boxes}
+    flat = [edge for edge in box.edges if names.issuperset((edge.source, edge.target))]
+    over = [edge for edge in box.edges if not names.issuperset((edge.source, edge.target))]
     # All lines are under all labels; where lines of rules and others run together, the others are seen.
-    for edge in sorted(box.edges, key=lambda one: not one.rule):
+    for edge in sorted(flat, key=lambda one: not one.rule):
         yield from _edge(edge)
-    for edge in box.edges:
+    for edge in flat:
         yield from _label(edge, fill)
     for inner in box.boxes:
         yield from _box(inner, fill)
+    # What leads into inner boxes is drawn over them.
+    for edge in over:
+        yield from _edge(edge)
+    for edge in over:
+        yield from _label(edge, fill)
 
 
 def _shape(box: Box, fill: str, stroke: str) -> Iterator[str]:
-    if box.kind in {BoxKind.REGION, BoxKind.FINAL}:
+    if box.kind in {BoxKind.REGION, BoxKind.FINAL, BoxKind.HISTORY}:
         return
     centre = f'cx="{_n(box.x + box.width / 2)}" cy="{_n(box.y + box.height / 2)}"'
     if box.kind is BoxKind.INITIAL:
         yield f'<circle {centre} r="{_n(box.height / 2)}" fill="{_INK}"/>'
+    elif box.kind is BoxKind.CIRCLE:
+        yield f'<circle {centre} r="{_n(box.height / 2)}" fill="#ffffff" stroke="{_INK}" stroke-width="1.4"/>'
     elif box.kind is BoxKind.BULLSEYE:
         yield f'<circle {centre} r="9" fill="#ffffff" stroke="{_INK}" stroke-width="1.6"/>'
         yield f'<circle {centre} r="5" fill="{_INK}"/>'

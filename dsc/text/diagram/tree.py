@@ -70,13 +70,13 @@ def _add_content(branch: Tree, state: State) -> None:
     if isinstance(state, OrthogonalState):
         for name, region in state.regions.items():
             _add_states(branch.add(_line((f"region {name}", "italic"))), region.states, initial_of(region))
+        _add_states(branch, state.connectors, initial="")
 
 
 def _add_transitions(branch: Tree, transitions: Iterable[Labelled], *, unnamed: str = "") -> None:
     for one in transitions:
-        target = one.transition.target
         style = _RULE if one.transition.rule is not None else ""
-        arrow = f" → {target}" if target is not None else ""
+        arrow = f" → {', '.join(one.transition.targets)}" if one.transition.targets else ""
         led = f"{one.trigger or unnamed}{arrow}".strip()
         branch.add(_line((led, style), (full_text(one, trigger=False), _SOFT)))
 

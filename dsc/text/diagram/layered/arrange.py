@@ -112,7 +112,7 @@ class _Levels:
         points.append(self._end(chain[-1], chain[-2]))
         label = chain[1]
         middle = self._middles[self._grid.cells[label].layer]
-        return Route(_without_detours(points), (self._axes[label], middle) if link.height else points[0])
+        return Route(without_detours(points), (self._axes[label], middle) if link.height else points[0])
 
     def _end(self, node: int, neighbour: int) -> Point:
         cell = self._grid.cells[node]
@@ -123,7 +123,7 @@ class _Levels:
         return across, self._middles[cell.layer] + half
 
 
-def _without_detours(points: Sequence[Point]) -> tuple[Point, ...]:
+def without_detours(points: Sequence[Point]) -> tuple[Point, ...]:
     """Without points that lie on the straight line between their neighbours."""
     kept: list[Point] = []
     for point in points:

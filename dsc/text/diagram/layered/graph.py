@@ -35,6 +35,7 @@ class Link:
         source, target: positions of the nodes in the input.
         width, height: size of its label; 0 if it has none.
         weight: how much it matters that it is straight.
+        meant: what inside the target it leads to; links to the same share a line.
     """
 
     source: int
@@ -42,6 +43,7 @@ class Link:
     width: float = 0.0
     height: float = 0.0
     weight: float = 1.0
+    meant: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,9 @@ from dsc.text.diagram.layered.graph import Link, Node
 LABEL_GAP = 4.0
 """Free space around a label's text."""
 
+_Trunk = tuple[int, str, int, int]
+"""What links to one target share in a layer: the target, what is meant inside it, the direction, the layer."""
+
 
 @dataclass(slots=True)
 class Cell:
@@ -63,7 +66,7 @@ def build_grid(nodes: Sequence[Node], links: Sequence[Link]) -> Grid:
         Cell(layer, node.width / 2, node.width / 2 + node.beside, node.height, is_node=True)
         for node, layer in zip(nodes, layers, strict=True)
     ]
-    trunks: dict[tuple[int, int, int], int] = {}
+    trunks: dict[_Trunk, int] = {}
     chains = [_chain(link, cells, trunks) for link in links]
     return Grid(cells, chains, _in_order_of_visit(cells))
 
@@ -88,13 +91,13 @@ def _layers(rank: dict[int, int], links: Sequence[Link]) -> list[int]:
     return layer
 
 
-def _chain(link: Link, cells: list[Cell], trunks: dict[tuple[int, int, int], int]) -> list[int]:
+def _chain(link: Link, cells: list[Cell], trunks: dict[_Trunk, int]) -> list[int]:
     start, end = cells[link.source].layer, cells[link.target].layer
     step = 1 if end > start else -1
     chain = [link.source]
     for layer in range(start + step, end, step):
         labelled = layer == start + step and link.height > 0
-        chain.append(_label(link, layer, cells) if labelled else _bend(link.target, step, layer, cells, trunks))
+        chain.append(_label(link, layer, cells) if labelled else _bend(link, step, layer, cells, trunks))
     chain.append(link.target)
     short = abs(end - start) == 2
     for one, other in pairwise(chain):
@@ -108,8 +111,8 @@ def _label(link: Link, layer: int, cells: list[Cell]) -> int:
     return len(cells) - 1
 
 
-def _bend(target: int, step: int, layer: int, cells: list[Cell], trunks: dict[tuple[int, int, int], int]) -> int:
-    key = (target, step, layer)
+def _bend(link: Link, step: int, layer: int, cells: list[Cell], trunks: dict[_Trunk, int]) -> int:
+    key = (link.target, link.meant, step, layer)
     if key not in trunks:
         trunks[key] = len(cells)
         cells.append(Cell(layer, 0.0, 0.0, 0.0, bend=True))
