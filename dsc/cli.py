@@ -101,7 +101,7 @@ def import_(
     """Read an SCXML chart as a plot of profile `scxml`; what plots cannot say is named."""
     from dsc.text.plots import plot_to_yaml
     from dsc.text.scxml.reader import parse_scxml
-    from dsc.text.yaml import read_file
+    from dsc.text.files import read_file
 
     _write(out, plot_to_yaml(parse_scxml(read_file(file), str(file))))
 

@@ -10,7 +10,7 @@ from pydantic_core import ErrorDetails
 
 from dsc.model.language import MISNAMED, UNKNOWN_FORM
 from dsc.text.yaml import Document, FormPath
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError, shortened
 
 _Model = TypeVar("_Model", bound=BaseModel)
 _Schema = Mapping[str, Any]
@@ -36,7 +36,8 @@ def read_model(model: type[_Model], document: Document) -> _Model:
         InputError: something in it does not fit; the message has file, line, and the nearest valid key.
     """
     if not isinstance(document.data, Mapping):
-        raise InputError("a mapping of keys was expected", place=document.place(()))
+        found = _in_yaml(document.data)
+        raise InputError(f"a mapping of keys was expected; found {found}", place=document.place(()))
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
@@ -67,7 +68,7 @@ def _message(details: ErrorDetails) -> str:
     if kind == MISNAMED:
         return details["msg"]
     if kind == UNKNOWN_FORM:
-        return f"{details['msg']}; found {details['input']!r}"
+        return f"{details['msg']}; found {_in_yaml(details['input'])}"
     if kind in _PLAIN:
         found = "" if kind == "missing" else f"; found {_in_yaml(details['input'])}"
         return _PLAIN[kind].format(key=details["loc"][-1]) + found
@@ -76,8 +77,14 @@ def _message(details: ErrorDetails) -> str:
 
 
 def _in_yaml(value: Any) -> str:
-    """The value as people write it: `true` and `null`, not Python's words."""
-    return {True: "true", False: "false", None: "nothing"}[value] if isinstance(value, bool | None) else repr(value)
+    """The value as people write it, or only its kind if it is a collection."""
+    if isinstance(value, bool | None):
+        return {True: "true", False: "false", None: "nothing"}[value]
+    if isinstance(value, Mapping):
+        return f"a mapping with the keys {', '.join(map(str, list(value)[:5]))}" if value else "an empty mapping"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}" if value else "an empty list"
+    return shortened(repr(value), 100)
 
 
 def _said_by(error: ValueError) -> str:

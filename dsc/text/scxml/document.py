@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
+from dsc.text.files import check_size
 from knowledge_base.errors import ParseError, Place
 
 NAMESPACE = "http://www.w3.org/2005/07/scxml"
-MAX_BYTES = 500_000
 MAX_DEPTH = 64
 
 
@@ -38,8 +38,7 @@ def read_xml(text: str, source: str | None = None) -> Element:
         ParseError: it is not well-formed XML, has a document type or an entity of its own, or is too large or deep.
     """
     data = text.encode()
-    if len(data) > MAX_BYTES:
-        raise ParseError(f"the text is larger than {MAX_BYTES} bytes", place=Place(source))
+    check_size(len(data), Place(source))
     reader = _Reader(source)
     try:
         reader.parser.Parse(data, True)  # noqa: FBT003  # expat takes no names here
