@@ -182,7 +182,7 @@ class ActionPlot(Frozen):
 
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
         """All states in document order, with their names and paths."""
-        yield from _walk(self.states, ("states",))
+        yield from walk_states(self.states, ("states",))
 
     def scopes(self) -> Iterator[Mapping[str, AnyState]]:
         """The states that stand side by side: of the plot, of each composite and region; transitions stay in one."""
@@ -233,15 +233,16 @@ class ActionPlot(Frozen):
         return json.dumps(self.to_form())
 
 
-def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, AnyState, Path]]:
+def walk_states(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, AnyState, Path]]:
+    """These states, which stand at `path`, and all inside them, in document order."""
     for name, state in states.items():
         here = (*path, name)
         yield name, state, here
         if isinstance(state, CompositeState):
-            yield from _walk(state.states, (*here, "states"))
+            yield from walk_states(state.states, (*here, "states"))
         elif isinstance(state, OrthogonalState):
             for region_name, region in state.regions.items():
-                yield from _walk(region.states, (*here, "regions", region_name, "states"))
+                yield from walk_states(region.states, (*here, "regions", region_name, "states"))
             yield from ((each, history, (*here, "connectors", each)) for each, history in state.connectors.items())
 
 

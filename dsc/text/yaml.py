@@ -34,7 +34,7 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 from dsc.text.files import check_size
 from knowledge_base.errors import ParseError, Place
 
-MAX_DEPTH = 64
+MAX_DEPTH = 128
 MAX_PARTS = 12_000
 """Keys, values and collections; reading that many takes half a second."""
 

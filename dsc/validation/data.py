@@ -14,6 +14,7 @@ from dsc.model.states import AnyState, DynamicState, FinalState, State, Submachi
 from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.wiring import Skills
 from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.binding import unbound_error
 from knowledge_base.language.check import check, check_effect
 from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, When
 from knowledge_base.language.effect import Assign as Change
@@ -41,6 +42,8 @@ class _Data:
         self._skills = skills
         declared: dict[str, Parameter | Variable] = {**plot.parameters, **plot.variables}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
+        self._sources = [outcomes for _, state, _ in plot.walk() if (outcomes := outcomes_of(state, library))]
+        self._sources += [other.emits for other in library if other.implements]
 
     def findings(self) -> Iterator[Finding]:
         yield from self._declarations()
@@ -192,8 +195,9 @@ class _Data:
     # -- the language ------------------------------------------------------------------------------------
 
     def _condition(self, condition: Expression, scope: Types, path: Path) -> Iterator[Finding]:
-        states = {name for name, _, _ in self._plot.walk()}
-        for name in asked_states(condition):
+        asked = asked_states(condition)
+        states = {name for name, _, _ in self._plot.walk()} if asked else set()
+        for name in asked:
             if name not in states:
                 error = UnknownNameError(
                     f"there is no state '{name}'", place=self._plot.place(path), found=name, valid=states
@@ -206,6 +210,9 @@ class _Data:
                 check(condition, self._schema, scope)
             except InputError as error:
                 yield Finding(_at(error, self._plot, path), "condition")
+            return
+        for name in sorted(free_variables(condition) - scope.keys()):
+            yield Finding(_at(unbound_error(name, None, scope), self._plot, path), "condition")
 
     def _effect(self, effect: Effect, scope: Types, path: Path) -> Iterator[Finding]:
         if self._schema is not None:
@@ -213,6 +220,9 @@ class _Data:
                 check_effect(effect, self._schema, scope)
             except InputError as error:
                 yield Finding(_at(error, self._plot, path), "effect")
+            return
+        for name in sorted(mentioned(effect) - scope.keys()):
+            yield Finding(_at(unbound_error(name, None, scope), self._plot, path), "effect")
 
     def _terms(
         self, terms: Iterable[tuple[str, Term]], attributes: Types | None, path: Path
@@ -264,9 +274,7 @@ class _Data:
         """The attributes a rule's event has wherever it can come from, also from steps of a plan."""
         found: dict[str, str | None] = {}
         known = False
-        sources = [outcomes_of(state, self._library) for _, state, _ in self._plot.walk()]
-        sources += [plot.emits for plot in self._library if plot.implements]
-        for outcomes in sources:
+        for outcomes in self._sources:
             if event in outcomes:
                 known = True
                 for name, kind in (outcomes[event] or {}).items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.engine.compiler import compile_plot
@@ -21,6 +22,8 @@ from dsc.model.states import (
 from dsc.validation.profile import check_profile
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 
+Paths = Mapping[str, Path]
+"""All states of a plot by name -> where they stand."""
 RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 """What a rule may do besides going to a named state."""
 
@@ -28,20 +31,20 @@ RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
     yield from check_profile(plot)
-    yield from _scope(plot, plot, ())
-    names = {name for name, _, _ in plot.walk()}
+    names = {name: path for name, _, path in plot.walk()}
+    yield from _scope(plot, plot, (), names)
     for name, state, path in plot.walk():
         if isinstance(state, CompositeState):
-            yield from _scope(plot, state, path)
+            yield from _scope(plot, state, path, names)
         if isinstance(state, OrthogonalState):
             for key, region in state.regions.items():
-                yield from _scope(plot, region, (*path, "regions", key))
+                yield from _scope(plot, region, (*path, "regions", key), names)
         yield from _uses(plot, state, path, library)
         if plot.profile == "dsc":
             yield from _dead_end(plot, name, state, path)
         if isinstance(state, HistoryState):
-            yield from _history(plot, state, path)
-    yield from _rules(plot, names, library)
+            yield from _history(plot, state, path, names)
+    yield from _rules(plot, set(names), library)
     if plot.profile == "scxml":
         yield from _tables(plot)
 
@@ -58,30 +61,32 @@ def _tables(plot: ActionPlot) -> Iterator[Finding]:
 
 
 def _scope(
-    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path
+    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path, names: Paths
 ) -> Iterator[Finding]:
-    valid = _within(plot, path) if plot.profile == "scxml" else set(scope.states)
-    if scope.initial is not None and scope.initial not in valid:
+    first = scope.initial
+    deeper = plot.profile == "scxml" and first is not None and _is_within(names.get(first, ()), path)
+    if first is not None and first not in scope.states and not deeper:
         error = UnknownNameError(
-            f"there is no state '{scope.initial}' to begin with",
-            place=plot.place((*path, "initial")), found=scope.initial, valid=valid,
+            f"there is no state '{first}' to begin with", place=plot.place((*path, "initial")), found=first,
+            valid=_within(plot, path) if plot.profile == "scxml" else scope.states,
         )  # fmt: skip
         yield Finding(error, "initial")
     for name, state in scope.states.items():
         if isinstance(state, State):
-            yield from _targets(plot, state, (*path, "states", name), scope.states)
+            yield from _targets(plot, state, (*path, "states", name), scope.states, names)
 
 
-def _targets(plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState]) -> Iterator[Finding]:
-    everywhere = {name for name, _, _ in plot.walk()}
+def _targets(
+    plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState], names: Paths
+) -> Iterator[Finding]:
     for inside, _, transition in state.placed_transitions():
         place = plot.place((*path, *inside, "to"))
         for target in transition.targets:
-            yield from _target(plot, target, siblings, everywhere, place)
+            yield from _target(plot, target, siblings, names, place)
 
 
 def _target(
-    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: set[str], place: Place | None
+    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: Paths, place: Place | None
 ) -> Iterator[Finding]:
     if target not in siblings and not (plot.profile == "scxml" and target in everywhere):
         if target in everywhere:
@@ -96,17 +101,20 @@ def _target(
 
 
 def _within(plot: ActionPlot, path: Path) -> set[str]:
-    return {name for name, _, other in plot.walk() if other[: len(path)] == path and other != path}
+    return {name for name, _, other in plot.walk() if _is_within(other, path)}
 
 
-def _history(plot: ActionPlot, state: HistoryState, path: Path) -> Iterator[Finding]:
+def _is_within(path: Path, around: Path) -> bool:
+    return len(path) > len(around) and path[: len(around)] == around
+
+
+def _history(plot: ActionPlot, state: HistoryState, path: Path, names: Paths) -> Iterator[Finding]:
     """What a history leads to is inside the state that the history belongs to (SCXML 3.10)."""
     around = path[:-2]
-    valid = _within(plot, around)
-    if state.target not in valid:
+    if not _is_within(names.get(state.target, ()), around):
         error = UnknownNameError(
             f"there is no state '{state.target}' beside the history", place=plot.place((*path, "to")),
-            found=state.target, valid=valid,
+            found=state.target, valid=_within(plot, around),
         )  # fmt: skip
         yield Finding(error, "target")
 
@@ -130,9 +138,11 @@ def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str]) -> Findin
 
 def around(plot: ActionPlot, path: Path) -> Iterator[State]:
     """The composite and orthogonal states around the one at `path`."""
-    for _, state, other in plot.walk():
-        if isinstance(state, State) and other != path and path[: len(other)] == other:
-            yield state
+    scope: Any = plot
+    for kind, name in zip(path[:-2:2], path[1:-2:2], strict=True):
+        scope = getattr(scope, str(kind))[name]
+        if isinstance(scope, State):
+            yield scope
 
 
 def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path) -> Iterator[Finding]:

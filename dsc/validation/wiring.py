@@ -9,7 +9,7 @@ from dsc.dynamic.outcomes import outcomes_of
 from dsc.errors import Finding
 from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED
 from dsc.model.actions import Trigger
-from dsc.model.plot import ActionPlot, Path
+from dsc.model.plot import ActionPlot, Path, walk_states
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -37,6 +37,7 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         yield Finding(error, "rules")
         return
     wired = {name: state for name, state, _ in expanded.walk()}
+    local, listened = _local_events(plot), _listened(plot)
     yield from _declared_events(plot)
     yield from _rule_targets(plot, library)
     for name, state, path in plot.walk():
@@ -49,8 +50,8 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         yield from _skills(plot, name, state, path, handled, skills)
         if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
             yield from _completion(plot, name, state, wired[name], path, library)
-            yield from _known_events(plot, state, path, library, skills)
-            yield from _emissions(plot, state, path)
+            yield from _known_events(plot, name, state, path, library, skills, local)
+            yield from _emissions(plot, state, path, listened)
 
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:
@@ -71,10 +72,11 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
+    scopes = [(siblings, [(n, outcomes_of(s, library)) for n, s in siblings.items()]) for siblings in plot.scopes()]
     for number, rule in enumerate(plot.rules):
-        for siblings in plot.scopes():
-            for name, state in siblings.items():
-                answers = (not rule.of or name in rule.of) and rule.on in outcomes_of(state, library)
+        for siblings, states in scopes:
+            for name, outcomes in states:
+                answers = rule.on in outcomes and (not rule.of or name in rule.of)
                 if answers and rule.do.then not in RESPONSES and rule.do.then not in siblings:
                     error = SchemaError(
                         f"the rule's way from '{name}' to '{rule.do.then}' crosses a border",
@@ -182,14 +184,13 @@ def _ends_silently(plot: ActionPlot | None) -> bool:
 
 
 def _known_events(
-    plot: ActionPlot, state: AnyState, path: Path, library: Library, skills: Skills
+    plot: ActionPlot, name: str, state: AnyState, path: Path, library: Library, skills: Skills, local: set[str]
 ) -> Iterator[Finding]:
-    if not isinstance(state, State) or (isinstance(state, SubmachineState) and state.use.startswith("?")):
+    if not isinstance(state, State) or not state.on or (isinstance(state, SubmachineState) and state.use.startswith("?")):
         return
-    known = RESERVED | set(plot.receives) | _local_events(plot)
-    for _, inner, inner_path in plot.walk():
-        if inner_path[: len(path)] == path:
-            known = known | set(outcomes_of(inner, library)) | _skill_events(inner, skills)
+    known = RESERVED | set(plot.receives) | local
+    for _, inner, _ in walk_states({name: state}, path[:-1]):
+        known = known | set(outcomes_of(inner, library)) | _skill_events(inner, skills)
     if skills is None and any(isinstance(a, Trigger) for a in state.entry):
         return
     for event in state.on:
@@ -213,10 +214,13 @@ def _skill_events(state: AnyState, skills: Skills) -> set[str]:
     return {t.names.get(event, event) for t in triggers for event in skills[t.trigger].outcomes}
 
 
-def _emissions(plot: ActionPlot, state: AnyState, path: Path) -> Iterator[Finding]:
+def _listened(plot: ActionPlot) -> set[str]:
+    return {event for _, state, _ in plot.walk() if isinstance(state, State) for event in state.on}
+
+
+def _emissions(plot: ActionPlot, state: AnyState, path: Path, listened: set[str]) -> Iterator[Finding]:
     if not isinstance(state, State):
         return
-    listened = {event for _, s, _ in plot.walk() if isinstance(s, State) for event in s.on}
     for inside, _, transition in state.placed_transitions():
         for fired in transition.emitted:
             here = (*path, *inside, "emit")

@@ -1,4 +1,4 @@
-"""XML read into elements that know their line; no DTD, no entities, bounded in size and depth."""
+"""XML read into elements that know their line; no DTD, no entities, no instructions, bounded in size and depth."""
 
 from __future__ import annotations
 
@@ -10,19 +10,30 @@ from dsc.text.files import check_size
 from knowledge_base.errors import ParseError, Place
 
 NAMESPACE = "http://www.w3.org/2005/07/scxml"
-MAX_DEPTH = 64
+MAX_DEPTH = 30
+"""Of elements; a `parallel` in a `parallel` makes a plot four levels deeper, which must be readable as YAML."""
 
 
 @dataclass(slots=True)
 class Element:
-    """An element of the SCXML namespace (or of none), or of another, whose `foreign` is then true."""
+    """An element of the SCXML namespace (or of none), or of another, which is then `foreign`."""
 
     name: str
     attributes: Mapping[str, str]
     place: Place
-    foreign: bool = False
+    namespace: str = NAMESPACE
     children: list[Element] = field(default_factory=list)
-    text: str = ""
+    texts: list[str] = field(default_factory=list)
+
+    @property
+    def foreign(self) -> bool:
+        """Whether it is no element of SCXML."""
+        return self.namespace not in {"", NAMESPACE}
+
+    @property
+    def text(self) -> str:
+        """What stands in it besides elements, without the blanks around it."""
+        return "".join(self.texts).strip()
 
     def walk(self) -> Iterator[Element]:
         """The element and all inside it."""
@@ -48,6 +59,11 @@ def read_xml(text: str, source: str | None = None) -> Element:
     return reader.root
 
 
+def written(element: Element) -> str:
+    """How messages call an element; one of another namespace with that namespace."""
+    return f"<{element.name}>" + (f" of the namespace '{element.namespace}'" if element.foreign else "")
+
+
 class _Reader:
     def __init__(self, source: str | None) -> None:
         self._source = source
@@ -58,6 +74,7 @@ class _Reader:
         self.parser.EndElementHandler = self._end
         self.parser.CharacterDataHandler = self._text
         self.parser.StartDoctypeDeclHandler = self._doctype
+        self.parser.ProcessingInstructionHandler = self._instruction
 
     def _place(self) -> Place:
         return Place(self._source, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1)
@@ -65,7 +82,7 @@ class _Reader:
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         space, _, name = tag.rpartition(" ")
         own = {key: value for key, value in attributes.items() if " " not in key}
-        element = Element(name, own, self._place(), foreign=space not in {"", NAMESPACE})
+        element = Element(name, own, self._place(), namespace=space)
         if len(self._open) >= MAX_DEPTH:
             raise ParseError(f"nested deeper than {MAX_DEPTH} levels", place=element.place)
         if self._open:
@@ -78,7 +95,11 @@ class _Reader:
         self._open.pop()
 
     def _text(self, data: str) -> None:
-        self._open[-1].text += data
+        self._open[-1].texts.append(data)
 
     def _doctype(self, *_: object) -> None:
         raise ParseError("a document type (and with it entities) is not read", place=self._place())
+
+    def _instruction(self, target: str, _: str) -> None:
+        message = f"the processing instruction <?{target}?> has no counterpart"
+        raise ParseError(message, place=self._place(), found=target)
