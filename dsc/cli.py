@@ -33,7 +33,7 @@ PIPE_WIDTH = 160
 
 @app.command()
 def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Plot files (YAML).")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Plots (YAML) or charts (.scxml).")],
     domain: Annotated[
         Path | None,
         typer.Option(
@@ -48,7 +48,8 @@ def check(
 
     A plot may use the other plots in its folder. Exit status: 0 nothing found, 2 findings.
     """
-    found = [(file, finding) for file in files for finding in _findings(file, domain)]
+    folders = _Folders()
+    found = [(file, finding) for file in files for finding in _findings(file, domain, folders)]
     if json:
         _print_json([_as_data(file, finding) for file, finding in found])
     else:
@@ -99,11 +100,15 @@ def import_(
     ] = "-",
 ) -> None:
     """Read an SCXML chart as a plot of profile `scxml`; what plots cannot say is named."""
+    from dsc.dynamic.library import Library
+    from dsc.text.files import read_file
     from dsc.text.plots import plot_to_yaml
     from dsc.text.scxml.reader import parse_scxml
-    from dsc.text.files import read_file
+    from dsc.validation import raise_findings, validate_plot
 
-    _write(out, plot_to_yaml(parse_scxml(read_file(file), str(file))))
+    plot = parse_scxml(read_file(file), str(file))
+    raise_findings(validate_plot(plot, Library([plot])))
+    _write(out, plot_to_yaml(plot))
 
 
 @app.command()
@@ -138,17 +143,16 @@ def schema() -> None:
     _print_json(json_schema())
 
 
-def _findings(file: Path, domain: Path | None) -> list[Finding]:
-    """All that is wrong with one file; what cannot be read at all is one finding."""
+def _findings(file: Path, domain: Path | None, folders: _Folders) -> list[Finding]:
+    """What is wrong with one file; what cannot be read at all is one finding."""
     from dsc.errors import Finding
-    from dsc.text.plots import load_plot
     from dsc.validation import validate_plot
     from knowledge_base.errors import InputError
 
     known = _schema(file, domain)
     try:
-        plot = load_plot(file)
-        library, broken = _neighbours(file, plot)
+        plot = _load(file)
+        library, broken = _neighbours(file, plot, folders)
         findings = validate_plot(plot, library, known)
     except InputError as error:
         return [Finding(error, "readable")]
@@ -157,18 +161,57 @@ def _findings(file: Path, domain: Path | None) -> list[Finding]:
     return findings
 
 
-def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
-    """The plot with the others of its folder, and why some of those are not among them."""
-    from dsc.dynamic.library import Library
+def _load(file: Path) -> ActionPlot:
+    """A plot, whose file says by its name if it is a chart in SCXML."""
+    from dsc.text.files import read_file
     from dsc.text.plots import load_plot
+    from dsc.text.scxml.reader import parse_scxml
+
+    return parse_scxml(read_file(file), str(file)) if file.suffix == ".scxml" else load_plot(file)
+
+
+class _Folders:
+    """The plots of folders, each file read once in a command, however many of its neighbours are checked."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, dict[Path, ActionPlot | InputError]] = {}
+
+    def plots(self, folder: Path) -> dict[Path, ActionPlot | InputError]:
+        """Each file of the folder with its plot, or with what is wrong with it."""
+        if folder not in self._known:
+            self._known[folder] = {file.resolve(): _plot_or_error(file) for file in sorted(folder.glob("*.yaml"))}
+        return self._known[folder]
+
+
+def _plot_or_error(file: Path) -> ActionPlot | InputError:
     from knowledge_base.errors import InputError
 
-    library, broken = Library([plot]), []
-    for other in sorted(file.parent.glob("*.yaml")):
-        if other.resolve() == file.resolve():
+    try:
+        return _load(file)
+    except InputError as error:
+        return error
+
+
+def _neighbours(
+    file: Path, plot: ActionPlot, folders: _Folders | None = None
+) -> tuple[Library, list[InputError]]:
+    """The plot with the others of its folder, and why some of those are not among them."""
+    from dsc.dynamic.library import Library
+    from dsc.model.states import DynamicState
+    from knowledge_base.errors import InputError
+
+    library, broken = Library([plot]), list[InputError]()
+    planned = any(isinstance(state, DynamicState) for _, state, _ in plot.walk())
+    if not (plot.uses() or plot.rules or planned):  # then nothing in it depends on the others
+        return library, broken
+    here = file.resolve()
+    for other, found in (folders or _Folders()).plots(file.parent).items():
+        if other == here:
             continue
         try:
-            library.add(load_plot(other))
+            if isinstance(found, InputError):
+                raise found
+            library.add(found)
         except InputError as error:
             broken.append(error)
     return library, broken

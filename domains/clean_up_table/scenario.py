@@ -39,8 +39,8 @@ from domains.clean_up_table.items import (
 )
 from domains.clean_up_table.places import OPERATOR, PLACES
 from domains.clean_up_table.world import World
-from dsc.text.form import read_model
 from dsc.text.files import read_file
+from dsc.text.form import read_model
 from dsc.text.yaml import load_document
 from knowledge_base.errors import InputError, Place, UnknownNameError
 

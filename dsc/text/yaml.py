@@ -39,6 +39,7 @@ MAX_PARTS = 12_000
 """Keys, values and collections; reading that many takes half a second."""
 
 FormPath = tuple[str | int, ...]
+"""Names of keys and positions in lists."""
 
 _SPACES = "\0 \t\r\n\x85\u2028\u2029"
 
@@ -145,6 +146,7 @@ class _Reader:
                     raise ParseError("another document begins here; a file holds one", place=self._place(event))
                 begun = True
             elif isinstance(event, NodeEvent):
+                self._places[()] = self._place(event)
                 data = self._node(event, ())
         return data
 
@@ -156,8 +158,8 @@ class _Reader:
             return self._sequence(path)
         return self._scalar(event)
 
-    def _mapping(self, path: FormPath) -> dict[str | int, Any]:
-        found: dict[str | int, Any] = {}
+    def _mapping(self, path: FormPath) -> dict[str, Any]:
+        found: dict[str, Any] = {}
         while not isinstance(event := next(self._events), MappingEndEvent):
             name = self._key(event, path)
             here = (*path, name)
@@ -169,10 +171,10 @@ class _Reader:
             found[name] = self._node(next(self._events), here)
         return found
 
-    def _key(self, event: Event, path: FormPath) -> str | int:
+    def _key(self, event: Event, path: FormPath) -> str:
         self._refuse_surprises(event, path)
         key = self._scalar(event) if isinstance(event, ScalarEvent) else None
-        if not isinstance(key, str | int) or isinstance(key, bool):
+        if not isinstance(key, str):
             written = f"'{event.value}'" if isinstance(event, ScalarEvent) and event.value else "this"
             message = f"a key is a name; {written} is none (in quotes it would be)"
             raise ParseError(message, place=self._place(event))
@@ -257,15 +259,19 @@ def _quoted(data: Any) -> Any:
 
 
 _PLAINER = {
-    "found character '\\t' that cannot start any token": "a tab stands where YAML wants spaces",
-    "found a tab character that violates indentation": "a tab stands where YAML wants spaces",
-    "expected <block end>, but found '<block mapping start>'": "the line is indented differently from those above it",
-    "expected <block end>, but found '<block sequence start>'": "the line is indented differently from those above it",
-    "expected <block end>, but found '-'": "a list goes on where the keys of a mapping stand",
-    "expected <block end>, but found '?'": "a key stands where the entries of a list do",
-    "could not find expected ':'": "a key without ':'",
-    "mapping values are not allowed here": "a ':' stands where no key can be; is the indentation right?",
-    "found unexpected end of stream": "a quote is never closed",
+    r"found character '\\t' that cannot start any token": "a tab stands where YAML wants spaces",
+    r"found a tab character that violates indentation": "a tab stands where YAML wants spaces",
+    r"expected <block end>, but found '<block \w+ start>'": "the line is indented differently from those above it",
+    r"expected <block end>, but found '-'": "a list goes on where the keys of a mapping stand",
+    r"expected <block end>, but found '\?'": "a key stands where the entries of a list do",
+    r"expected <block end>, but found (.*)": r"\1 does not belong there",
+    r"expected ',' or '(.)', but got .*": r"a ',' or '\1' is missing",
+    r"expected the node content, but found (.*)": r"no value begins with \1",
+    r"expected '<document start>', but found .*": "something goes on after the end",
+    r"could not find expected ':'": "a key without ':'",
+    r"mapping values are not allowed here": "a ':' stands where no key can be; is the indentation right?",
+    r"found unexpected end of stream": "a quote is never closed",
+    r"'<stream end>'": "the end of the text",
 }
 """The library's words -> ours."""
 
@@ -276,6 +282,7 @@ def _parse_error(error: MarkedYAMLError, source: str | None) -> ParseError:
     problem = str(error.problem or error.context or "").strip().split("\n")[0]
     if problem == _TOO_DEEP:
         return ParseError(problem, place=place)
-    problem = _PLAINER.get(problem, problem)
+    for jargon, plainer in _PLAINER.items():
+        problem = re.sub(jargon, plainer, problem)
     since = f" (of what begins in line {begun.line + 1})" if begun and mark and begun.line != mark.line else ""
     return ParseError(f"not readable as YAML: {problem}{since}", place=place)

@@ -15,7 +15,7 @@ from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.wiring import Skills
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.binding import unbound_error
-from knowledge_base.language.check import check, check_effect
+from knowledge_base.language.check import check, check_effect, check_term
 from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, When
 from knowledge_base.language.effect import Assign as Change
 from knowledge_base.language.expression import Expression, Term, free_variables
@@ -232,12 +232,21 @@ class _Data:
 
     def _only(self, terms: Mapping[str, Term], scope: Types, path: Path) -> Iterator[Finding]:
         for key, term in terms.items():
-            for name in sorted(free_variables(term) - set(scope)):
+            unknown = sorted(free_variables(term) - set(scope))
+            if not unknown and self._schema is not None and self._plot.profile == "dsc":
+                yield from self._term(term, scope, (*path, key))
+            for name in unknown:
                 error = UnknownNameError(
                     f"there is no variable '?{name}' here", place=self._plot.place((*path, key)),
                     found=name, valid=scope,
                 )  # fmt: skip
                 yield Finding(error, "declared variable")
+
+    def _term(self, term: Term, scope: Types, path: Path) -> Iterator[Finding]:
+        try:
+            check_term(term, self._schema or Schema(), scope)
+        except InputError as error:
+            yield Finding(_at(error, self._plot, path), "term")
 
     def _scope(self, attributes: Types | None, used: Expression | Term | Effect | None) -> dict[str, str | None]:
         """Visible variables; where the event cannot be known, any of its attributes may be used."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from itertools import chain, islice
 
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, PlotError
@@ -10,9 +11,14 @@ from dsc.model.plot import ActionPlot
 from dsc.skills import SkillSignature
 from dsc.validation.components import check_components
 from dsc.validation.data import check_data
+from dsc.validation.kinds import check_kinds
+from dsc.validation.reach import check_reach
 from dsc.validation.structure import check_structure
 from dsc.validation.wiring import check_wiring
 from knowledge_base.schema import Schema
+
+MAX_FINDINGS = 50
+"""For one plot; more are not read, and each takes a search for the name that was meant."""
 
 
 def validate_library(
@@ -33,7 +39,7 @@ def validate_plot(
     skills: Iterable[SkillSignature] | None = None,
     components: Collection[str] | None = None,
 ) -> list[Finding]:
-    """What is wrong with a plot; empty if nothing is.
+    """What is wrong with a plot, at most `MAX_FINDINGS`; empty if nothing is.
 
     Args:
         plot: the plot.
@@ -43,14 +49,17 @@ def validate_plot(
         components: names of the components that are deployed; without them, `set` and `switch` are not checked.
     """
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
-    findings = list(check_structure(plot, library))
+    findings = list(islice(check_structure(plot, library), MAX_FINDINGS))
     if findings:  # what follows would only repeat them in other words
         return findings
-    findings = list(check_wiring(plot, library, signatures))
-    findings += check_data(plot, library, schema, signatures)
-    if components is not None:
-        findings += check_components(plot, components)
-    return findings
+    checks = [
+        check_reach(plot, library),
+        check_wiring(plot, library, signatures),
+        check_data(plot, library, schema, signatures),
+        check_kinds(plot, library, schema, signatures),
+        check_components(plot, components) if components is not None else (),
+    ]
+    return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 
 
 def raise_findings(findings: list[Finding]) -> None:

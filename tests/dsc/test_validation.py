@@ -50,6 +50,8 @@ HELPERS = [
     """),
     plot("{plot: wait, states: {s: {after: {seconds: 1, to: over}}, over: {final: true}}}"),
     plot("{plot: talk, emits: {said: }, states: {s: {after: {seconds: 1, to: over}}, over: {final: true, emit: said}}}"),
+    plot("{plot: ring, states: {s: {use: p, on: {done: over}}, over: {final: true}}}"),
+    plot("{plot: endless, states: {s: {use: endless, on: {done: over}}, over: {final: true}}}"),
 ]  # fmt: skip
 
 
@@ -249,6 +251,34 @@ WRONG = [
         11, "?item", "",
     ),
     ("rule event", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lots\n    do: {then: e}\n", 10, "mean 'lost'", ""),
+    ("value fits", ITEM + "  a:\n    use: grasp\n    with: {item: ?item, speed: fast}\n" + WIRED + E, 6, "'speed' is of type number", ""),
+    ("value fits", S + "  a:\n    use: grasp\n    with: {item: table}\n" + WIRED + E, 5, "table is of type place", ""),
+    ("value fits", "plot: p\nparameters:\n  n: {type: number, default: x}\nstates: {e: {final: true}}\n", 3, "of type number", ""),
+    ("value fits", ITEM + "  a:\n    after: {seconds: ?item, to: e}\n" + E, 5, "?item is of type item", ""),
+    (
+        "value fits",
+        "plot: p\nvariables: {n: number}\nstates:\n  a:\n    on:\n      done: {to: e, assign: {n: true}}\n" + E,
+        6, "true is of type boolean", "",
+    ),
+    (
+        "value fits",
+        "plot: p\nemits: {lost: {n: number}}\nstates:\n  a: {on: {done: e}}\n  e: {final: true, emit: lost, with: {n: x}}\n",
+        5, "'n' is of type number", "",
+    ),
+    ("value fits", S + "  a:\n    entry:\n      - {trigger: arm.grasp, with: {item: 5}}\n    on: {grasped: e, slipped: e}\n" + E, 5, "5 is of type number", ""),
+    (
+        "term",
+        "plot: p\nvariables: {n: number}\nstates:\n  a:\n    on:\n      done: {to: e, assign: {n: (failurs table)}}\n" + E,
+        6, "mean 'failures'", "",
+    ),
+    # -- what can be entered
+    ("reachable", S + "  a: {on: {done: e}}\n  b: {on: {done: e}}\n" + E, 4, "nothing leads to the state 'b'", "`initial`"),
+    ("reachable", S + "  a:\n    on: {done: e}\n    states: {b: {final: true}, c: {final: true}}\n" + E, 5, "state 'c'", ""),
+    ("reachable", S + "  a:\n    on: {done: e}\n    regions: {r: {states: {b: {final: true}, c: {final: true}}}}\n" + E, 5, "state 'c'", ""),
+    ("no circle", S + "  a:\n    use: p\n    on: {done: e}\n" + E, 4, "in a circle: p -> p", "in a dynamic state"),
+    ("no circle", S + "  a:\n    use: ring\n    on: {done: e}\n" + E, 4, "in a circle: p -> ring -> p", "in a dynamic state"),
+    ("no circle", S + "  a:\n    use: endless\n    on: {done: e}\n" + E, 4, "in a circle: endless -> endless", ""),
+    ("something to choose", S + "  a:\n    dynamic: []\n    on: {no_candidate: e}\n" + E, 4, "'a' has nothing to choose", "a `goal`"),
     # -- rules are transitions too
     (
         "no border crossing",

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from dsc_charts import plot
 
-from dsc.text.plots import json_schema, load_library, load_plot, parse_plot, plot_to_yaml
 from dsc.text.files import MAX_BYTES
+from dsc.text.plots import json_schema, load_library, load_plot, parse_plot, plot_to_yaml
 from dsc.text.yaml import load_document
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.expression import Variable
@@ -69,7 +69,7 @@ BROKEN = [
     ("plot: p\nconfirm: later" + END, 2, "number"),
     ("plot: p\nconfirm: .inf" + END, 2, "finite"),
     ("plot: p\nwhen: (or" + END, 2, "'(' is never closed"),
-    ("plot: p\n1: 5" + END, 2, "found 1"),
+    ("plot: p\n1: 5" + END, 2, "a key is a name; '1' is none"),
     ("plot: p\nparameters:\n  Item: item" + END, 3, "'Item' is no name for a variable"),
     ("plot: p\nvariables:\n  two words: item" + END, 3, "'two words' is no name for a variable"),
     ("plot: p\nemits:\n  failed:\n    itemName: item" + END, 4, "'itemName' is no name for a variable"),

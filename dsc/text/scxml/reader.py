@@ -48,7 +48,8 @@ class _Reader:
         check(root)
         self._root, self._source = root, source
         self._names: dict[str, str] = {}
-        self._places: dict[Path, Place] = {(): root.place}
+        self._places: dict[Path, Place] = {}
+        self._note((), root.place)
         self._unnamed = 0
 
     def plot(self) -> ActionPlot:
@@ -59,10 +60,18 @@ class _Reader:
             raise NotExpressibleError("scxml/@binding", "data are bound early", place=root.place)
         if root.attributes.get("version", "1.0") != "1.0":
             raise InputError("the version of SCXML is 1.0", place=root.place, found=root.attributes["version"])
+        if not any(child.name in STATES for child in root.children):
+            raise InputError("a chart needs at least one state", place=root.place)
         form: Form = {"plot": self._name(), "profile": "scxml", "variables": self._variables()}
         form |= self._scope(root, ())
         form["receives"] = dict.fromkeys(self._received())
         return read_model(ActionPlot, Document(form, self._places)).written_at(self._places)
+
+    def _note(self, path: Path, place: Place) -> None:
+        """Remember where a part stands; the parts around it that are no elements stand where those do."""
+        for length in range(1, len(path)):
+            self._places.setdefault(path[:length], self._places[path[: length - 1]])
+        self._places[path] = place
 
     def _name(self) -> str:
         given = self._root.attributes.get("name") or (PurePath(self._source).stem if self._source else "chart")
@@ -80,7 +89,7 @@ class _Reader:
             if name.lower() in self._names.values():
                 raise InputError(f"two data are named '{name}', in lower case", place=element.place, found=name)
             self._names[name] = name.lower()
-            self._places["variables", name.lower()] = element.place
+            self._note(("variables", name.lower()), element.place)
         return {self._names[element.attributes["id"]]: self._variable(element) for element in data}
 
     def _variable(self, element: Element) -> Form:
@@ -131,7 +140,7 @@ class _Reader:
         if len(name.split()) != 1:
             raise InputError(f"the id '{name}' has a blank", place=element.place, found=name)
         path = (*around, name)
-        self._places[path] = element.place
+        self._note(path, element.place)
         if element.name == "history":
             return name, self._history(element)
         form: Form = {"final": True} if element.name == "final" else {}
@@ -186,13 +195,13 @@ class _Reader:
         for child in (child for child in element.children if child.name == "transition"):
             words = _descriptors(child)
             if not words:
-                self._places[(*path, "always", len(always))] = child.place
+                self._note((*path, "always", len(always)), child.place)
                 always.append(self._transition(child))
                 continue
             if AFTER in words:
                 raise NotExpressibleError("transition/@event", f"'{AFTER}' is the name of timeouts", place=child.place)
             key = _key(" ".join(words), on)
-            self._places[(*path, "on", key, len(on.setdefault(key, [])))] = child.place
+            self._note((*path, "on", key, len(on.setdefault(key, []))), child.place)
             on[key].append(self._transition(child))
         form |= {key: value for key, value in (("on", on), ("always", always)) if value}
 
