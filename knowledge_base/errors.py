@@ -9,6 +9,7 @@ import difflib
 import heapq
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +59,9 @@ def shortened(text: str, longest: int = MAX_MESSAGE) -> str:
     return text if len(text) <= longest else f"{text[:half]} … {text[-half:]}"
 
 
-def _pairs(name: str) -> set[str]:
-    return {name[at : at + 2] for at in range(len(name))}
+@lru_cache(maxsize=4096)  # the many errors of one text have the same valid names
+def _pairs(name: str) -> frozenset[str]:
+    return frozenset(name[at : at + 2] for at in range(len(name)))
 
 
 class InputError(Exception):
@@ -100,8 +102,9 @@ class InputError(Exception):
     def __str__(self) -> str:
         """One line: place, message, and the nearest valid name or the short list of them."""
         text = f"{self.place}: {self.message}" if self.place else self.message
-        if self.nearest is not None:
-            return f"{text}; did you mean '{printable(self.nearest)}'?"
+        meant = self.nearest
+        if meant is not None:
+            return f"{text}; did you mean '{printable(meant)}'?"
         if self.valid:
             names = [printable(shortened(name, MAX_NAME)) for name in self.valid[:8]]
             shown = ", ".join(names) + (", …" if len(self.valid) > 8 else "")

@@ -50,14 +50,17 @@ HELPERS = [
     """),
     plot("{plot: wait, states: {s: {after: {seconds: 1, to: over}}, over: {final: true}}}"),
     plot("{plot: talk, emits: {said: }, states: {s: {after: {seconds: 1, to: over}}, over: {final: true, emit: said}}}"),
+]  # fmt: skip
+RINGS = [
     plot("{plot: ring, states: {s: {use: p, on: {done: over}}, over: {final: true}}}"),
     plot("{plot: endless, states: {s: {use: endless, on: {done: over}}, over: {final: true}}}"),
-]  # fmt: skip
+    plot("{plot: choice, states: {s: {dynamic: [p], on: {done: over, no_candidate: over}}, over: {final: true}}}"),
+]
 
 
 def findings_of(text, schema=SCHEMA, skills=SKILLS):
     made = parse_plot(text, "p.yaml")
-    return validate_plot(made, Library([made, *HELPERS]), schema, skills, {"arm", "base"})
+    return validate_plot(made, Library([made, *HELPERS, *RINGS]), schema, skills, {"arm", "base"})
 
 
 S = "plot: p\nstates:\n"
@@ -327,6 +330,14 @@ RIGHT = [
     .replace("item: cup", "item: ?i").replace("states:", "parameters: {i: item}\nstates:") + E,
     # a plot that never ends silently needs no `done`
     S + "  a: {use: talk, on: {said: e}}\n" + E,
+    # a choice may lead back
+    S + "  a: {use: choice, on: {done: e}}\n" + E,
+    # a response to the steps of a plan leads to a state
+    S + "  a:\n    goal: (free)\n    on: {done: e, no_plan: e, gave_up: e}\n  help: {use: wait, on: {done: e}}\n" + E
+    + "rules:\n  - {on: failed, do: {then: help}}\n",
+    # words are things, text and symbols alike; a variable may hold a thing of a type below
+    "plot: p\nparameters: {o: object, w: {type: symbol, default: up}}\nvariables: {t: {type: text, initial: any text}}\nstates:\n"
+    "  a: {use: grasp, with: {item: ?o, speed: (+ 1 2)}, on: {done: {to: e, assign: {t: ?w}}, failed: e, lost: e}}\n" + E,
     # a plot in a variable may end with anything
     "plot: p\nvariables: {plan: plot}\nstates:\n  a: {use: ?plan, on: {done: e, whatever: e}}\n" + E,
     # outcomes of plans may be passed on
