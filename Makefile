@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check conformance soak bench-startup pictures clean
+.PHONY: help demo test check conformance soak bench-startup bench-broken pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -37,6 +37,9 @@ soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every re
 
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py
+
+bench-broken: $(VENV)/.run   ## how long the error in a broken plot takes, median and longest (RUNS=N)
+	$(BIN)/python benchmarks/broken_plots.py --runs $(or $(RUNS),3)
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dsc.dynamic.library import Library
     from dsc.errors import Finding
     from dsc.model.plot import ActionPlot
+    from dsc.text.neighbours import Neighbours
     from knowledge_base.errors import InputError
     from knowledge_base.schema import Schema
 
@@ -48,8 +49,10 @@ def check(
 
     A plot may use the other plots in its folder. Exit status: 0 nothing found, 2 findings.
     """
-    folders = _Folders()
-    found = [(file, finding) for file in files for finding in _findings(file, domain, folders)]
+    from dsc.text.neighbours import Neighbours
+
+    neighbours = Neighbours()
+    found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours)]
     if json:
         _print_json([_as_data(file, finding) for file, finding in found])
     else:
@@ -143,7 +146,7 @@ def schema() -> None:
     _print_json(json_schema())
 
 
-def _findings(file: Path, domain: Path | None, folders: _Folders) -> list[Finding]:
+def _findings(file: Path, domain: Path | None, neighbours: Neighbours) -> list[Finding]:
     """What is wrong with one file; what cannot be read at all is one finding."""
     from dsc.errors import Finding
     from dsc.validation import validate_plot
@@ -152,7 +155,7 @@ def _findings(file: Path, domain: Path | None, folders: _Folders) -> list[Findin
     known = _schema(file, domain)
     try:
         plot = _load(file)
-        library, broken = _neighbours(file, plot, folders)
+        library, broken = neighbours.of(file, plot)
         findings = validate_plot(plot, library, known)
     except InputError as error:
         return [Finding(error, "readable")]
@@ -170,51 +173,10 @@ def _load(file: Path) -> ActionPlot:
     return parse_scxml(read_file(file), str(file)) if file.suffix == ".scxml" else load_plot(file)
 
 
-class _Folders:
-    """The plots of folders, each file read once in a command, however many of its neighbours are checked."""
+def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
+    from dsc.text.neighbours import Neighbours
 
-    def __init__(self) -> None:
-        self._known: dict[Path, dict[Path, ActionPlot | InputError]] = {}
-
-    def plots(self, folder: Path) -> dict[Path, ActionPlot | InputError]:
-        """Each file of the folder with its plot, or with what is wrong with it."""
-        if folder not in self._known:
-            self._known[folder] = {file.resolve(): _plot_or_error(file) for file in sorted(folder.glob("*.yaml"))}
-        return self._known[folder]
-
-
-def _plot_or_error(file: Path) -> ActionPlot | InputError:
-    from knowledge_base.errors import InputError
-
-    try:
-        return _load(file)
-    except InputError as error:
-        return error
-
-
-def _neighbours(
-    file: Path, plot: ActionPlot, folders: _Folders | None = None
-) -> tuple[Library, list[InputError]]:
-    """The plot with the others of its folder, and why some of those are not among them."""
-    from dsc.dynamic.library import Library
-    from dsc.model.states import DynamicState
-    from knowledge_base.errors import InputError
-
-    library, broken = Library([plot]), list[InputError]()
-    planned = any(isinstance(state, DynamicState) for _, state, _ in plot.walk())
-    if not (plot.uses() or plot.rules or planned):  # then nothing in it depends on the others
-        return library, broken
-    here = file.resolve()
-    for other, found in (folders or _Folders()).plots(file.parent).items():
-        if other == here:
-            continue
-        try:
-            if isinstance(found, InputError):
-                raise found
-            library.add(found)
-        except InputError as error:
-            broken.append(error)
-    return library, broken
+    return Neighbours().of(file, plot)
 
 
 def _schema(file: Path, domain: Path | None) -> Schema | None:

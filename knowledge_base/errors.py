@@ -49,7 +49,7 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
 
 
 def printable(text: str) -> str:
-    """The text on one line: line breaks, control characters and half characters as escapes such as `\\n`."""
+    r"""The text on one line: line breaks, control characters and half characters as escapes such as `\\n`."""
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 

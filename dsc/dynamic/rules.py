@@ -9,6 +9,7 @@ In a generated plot, what no rule takes leads to `replan`.
 from __future__ import annotations
 
 import itertools
+from collections import ChainMap
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -128,7 +129,7 @@ class _Expansion:
         limit = rule.do.limit or (DEFAULT_RETRIES if bounded else None)
         if limit is None:
             return rule.when, {}
-        taken = {*self.plot.parameters, *self.plot.variables, *self.counters}
+        taken = ChainMap[str, object](self.counters, self.plot.variables, self.plot.parameters)  # type: ignore[arg-type]
         counter = _unused(f"tries_{key}".lower().replace("-", "_"), taken)
         self.counters[counter] = Variable.model_validate({"type": "number", "initial": 0})
         tries = lang.Variable(counter)

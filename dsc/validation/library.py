@@ -13,6 +13,7 @@ from dsc.validation.components import check_components
 from dsc.validation.data import check_data
 from dsc.validation.kinds import check_kinds
 from dsc.validation.reach import check_reach
+from dsc.validation.size import check_size
 from dsc.validation.structure import check_structure
 from dsc.validation.wiring import check_wiring
 from knowledge_base.schema import Schema
@@ -49,9 +50,10 @@ def validate_plot(
         components: names of the components that are deployed; without them, `set` and `switch` are not checked.
     """
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
-    findings = list(islice(check_structure(plot, library), MAX_FINDINGS))
-    if findings:  # what follows would only repeat them in other words
-        return findings
+    for check in (check_structure, check_size):
+        findings = list(islice(check(plot, library), MAX_FINDINGS))
+        if findings:  # what follows would only repeat them in other words, or take too long
+            return findings
     checks = [
         check_reach(plot, library),
         check_wiring(plot, library, signatures),

@@ -61,7 +61,8 @@ def _unreached_in(scope: Scope, around: Path, responses: set[str]) -> Iterator[P
 def _empty_choices(plot: ActionPlot) -> Iterator[Finding]:
     for name, state, path in plot.walk():
         if isinstance(state, DynamicState) and not state.dynamic and state.goal is None:
-            error = SchemaError(f"the dynamic state '{name}' has nothing to choose from", place=plot.place((*path, "dynamic")))
+            place = plot.place((*path, "dynamic"))
+            error = SchemaError(f"the dynamic state '{name}' has nothing to choose from", place=place)
             yield Finding(error, "something to choose", "name candidates, or a `goal`")
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import outcomes_of
@@ -38,6 +39,7 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         return
     wired = {name: state for name, state, _ in expanded.walk()}
     local, listened = _local_events(plot), _listened(plot)
+    silent = cache(lambda used: _ends_silently(library.plot(used)))
     yield from _declared_events(plot)
     yield from _rule_targets(plot, library)
     for name, state, path in plot.walk():
@@ -49,7 +51,7 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         yield from _outcomes(plot, name, outcomes_of(state, library), handled, path)
         yield from _skills(plot, name, state, path, handled, skills)
         if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
-            yield from _completion(plot, name, state, wired[name], path, library)
+            yield from _completion(plot, name, state, wired[name], path, silent)
             yield from _known_events(plot, name, state, path, library, skills, local)
             yield from _emissions(plot, state, path, listened)
 
@@ -143,11 +145,11 @@ def _skills(
 
 
 def _completion(
-    plot: ActionPlot, name: str, state: AnyState, wired: AnyState, path: Path, library: Library
+    plot: ActionPlot, name: str, state: AnyState, wired: AnyState, path: Path, silent: Callable[[str], bool]
 ) -> Iterator[Finding]:
     completes = (
-        (isinstance(state, SubmachineState) and _ends_silently(_used(state, library)))
-        or (isinstance(state, DynamicState) and _dynamic_completes(state, library))
+        (isinstance(state, SubmachineState) and (state.use.startswith("?") or silent(state.use)))
+        or (isinstance(state, DynamicState) and (state.goal is not None or any(map(silent, state.dynamic))))
         or (isinstance(state, CompositeState) and any(isinstance(s, FinalState) for s in state.states.values()))
         or isinstance(state, OrthogonalState)
     )
@@ -162,18 +164,8 @@ def _completion(
         yield Finding(error, "completion is wired", "add `done: STATE` under `on`")
 
 
-def _used(state: SubmachineState, library: Library) -> ActionPlot | None:
-    return None if state.use.startswith("?") else library.plot(state.use)
-
-
-def _dynamic_completes(state: DynamicState, library: Library) -> bool:
-    return state.goal is not None or any(_ends_silently(library.plot(name)) for name in state.dynamic)
-
-
-def _ends_silently(plot: ActionPlot | None) -> bool:
+def _ends_silently(plot: ActionPlot) -> bool:
     """Whether the plot can reach a top-level final state without firing a declared outcome."""
-    if plot is None:
-        return True
     silent = {name for name, s in plot.states.items() if isinstance(s, FinalState) and s.emit is None}
     return any(
         transition.target in silent and not set(transition.emitted) & set(plot.emits)
@@ -186,7 +178,7 @@ def _ends_silently(plot: ActionPlot | None) -> bool:
 def _known_events(
     plot: ActionPlot, name: str, state: AnyState, path: Path, library: Library, skills: Skills, local: set[str]
 ) -> Iterator[Finding]:
-    if not isinstance(state, State) or not state.on or (isinstance(state, SubmachineState) and state.use.startswith("?")):
+    if not isinstance(state, State) or (isinstance(state, SubmachineState) and state.use.startswith("?")):
         return
     known = RESERVED | set(plot.receives) | local
     for _, inner, _ in walk_states({name: state}, path[:-1]):

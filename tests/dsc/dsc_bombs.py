@@ -61,6 +61,31 @@ BOMBS = {
         f'{XML}<datamodel><data id="x" expr="{"Math.pow(" * 20}2{",8)" * 20}"/></datamodel><state id="a"/></scxml>', 2, "more than 100 operations",
     ),
     "attributes.scxml": (XML + "<state " + " ".join(f"a{n}=''" for n in range(10_000)) + "/></scxml>", 2, "has no attribute 'a0'"),
+    "many_unknown_targets.scxml": (
+        XML + "".join(f'<state id="s{n}"><transition event="e" target="s{n}x"/></state>\n' for n in range(3_000)) + "</scxml>",
+        2, "did you mean 's0'?",
+    ),
+    "many_exclusive_targets.scxml": (
+        XML + "".join(f'<state id="s{n}"><transition event="e" target="s{n} s{n + 1}"/></state>\n' for n in range(2_000))
+        + '<state id="s2000"/></scxml>', 2, "exclude each other",
+    ),
+    "many_rules.yaml": (
+        "plot: p\nstates:\n" + "".join(f"  s{n}: {{goal: (p), on: {{done: s{n + 1}}}}}\n" for n in range(300)) + "  s300: {final: true}\nrules:\n"
+        + "".join("  - {on: no_plan, when: (q), do: {then: retry}}\n" for n in range(300)), 304, "the rules would make 90000 transitions; at most 1000",
+    ),
+    "many_circles.yaml": (
+        "plot: p\nstates:\n" + "".join(f"  s{n}: {{use: p, on: {{done: s{n + 1}}}}}\n" for n in range(1_400)) + "  s1400: {final: true}\n",
+        3, "in a circle: p -> p",
+    ),
+    "many_variables.yaml": (
+        "plot: p\nvariables: {" + ", ".join(f"v{n}: number" for n in range(1_000)) + "}\nstates:\n"
+        + "".join(f"  s{n}: {{on: {{done: {{to: s{n + 1}, assign: {{w{n}: ?v{n}}}}}}}}}\n" for n in range(700)) + "  s700: {final: true}\n",
+        4, "there is no variable 'w0'",
+    ),
+    "many_free_variables.yaml": (
+        "plot: p\nwhen: (and " + " ".join(f"(p ?v{n})" for n in range(10_000)) + ")\nstates: {a: {final: true}}\n",
+        2, "the variable '?v0' is not bound",
+    ),
     "elements_and_open.scxml": (XML + "<log/>\n" * 25_000, 25_002, "not readable as XML"),
 }  # fmt: skip
 """Name of a file -> its text, the line of the fault, and what is said about it."""

@@ -281,6 +281,12 @@ WRONG = [
     ("no circle", S + "  a:\n    use: p\n    on: {done: e}\n" + E, 4, "in a circle: p -> p", "in a dynamic state"),
     ("no circle", S + "  a:\n    use: ring\n    on: {done: e}\n" + E, 4, "in a circle: p -> ring -> p", "in a dynamic state"),
     ("no circle", S + "  a:\n    use: endless\n    on: {done: e}\n" + E, 4, "in a circle: endless -> endless", ""),
+    (
+        "bounded rules",
+        S + "  a:\n    goal: (free)\n    on: {done: e, no_plan: e, gave_up: e}\n" + E + "rules:\n"
+        + "  - {on: no_plan, when: (free), do: {then: e}}\n" * 1001,
+        7, "the rules would make 1001 transitions; at most 1000", "with `of`",
+    ),
     ("something to choose", S + "  a:\n    dynamic: []\n    on: {no_candidate: e}\n" + E, 4, "'a' has nothing to choose", "a `goal`"),
     # -- rules are transitions too
     (
