@@ -255,7 +255,9 @@ def _quoted(data: Any) -> Any:
         return {_quoted(key): _quoted(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
         return [_quoted(one) for one in data]
-    return DoubleQuotedScalarString(data) if isinstance(data, str) and _plain(data) != data else data
+    if isinstance(data, str) and (_plain(data) != data or not data.isprintable()):  # other quotes fold line breaks
+        return DoubleQuotedScalarString(data)
+    return data
 
 
 _PLAINER = {

@@ -48,7 +48,7 @@ def read_xml(text: str, source: str | None = None) -> Element:
     Raises:
         ParseError: it is not well-formed XML, has a document type or an entity of its own, or is too large or deep.
     """
-    data = text.encode()
+    data = text.encode(errors="surrogatepass")  # half a character is refused with its place
     check_size(len(data), Place(source))
     reader = _Reader(source)
     try:
