@@ -28,6 +28,8 @@ BAD_INPUT = 2
 """Exit status of `check` with findings, and of bad input to any command."""
 UNKNOWN_PLOT = "known plot"
 """The rule of findings that may be there because a neighbouring file cannot be read."""
+MAX_BROKEN = 3
+"""Of those files, as many are named."""
 PIPE_WIDTH = 160
 """Columns of a tree that is not printed on a terminal."""
 
@@ -160,7 +162,7 @@ def _findings(file: Path, domain: Path | None, neighbours: Neighbours) -> list[F
     except InputError as error:
         return [Finding(error, "readable")]
     if any(finding.rule == UNKNOWN_PLOT for finding in findings):
-        findings += [Finding(error, "readable") for error in broken]
+        findings += [Finding(error, "readable") for error in broken[:MAX_BROKEN]]
     return findings
 
 

@@ -63,6 +63,12 @@ class _Scanner(Scanner):
             raise ScannerError(None, None, _TOO_DEEP, self.reader.get_mark())
         super().fetch_flow_collection_start(*args, **named)
 
+    def scan_yaml_directive_number(self, *args: Any) -> Any:
+        try:
+            return super().scan_yaml_directive_number(*args)
+        except ValueError:
+            raise ScannerError(None, None, "the version is too long", self.reader.get_mark()) from None
+
     def scan_flow_scalar_non_spaces(self, *args: Any) -> Any:
         try:
             return super().scan_flow_scalar_non_spaces(*args)

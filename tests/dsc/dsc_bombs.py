@@ -69,6 +69,10 @@ BOMBS = {
         XML + "".join(f'<state id="s{n}"><transition event="e" target="s{n} s{n + 1}"/></state>\n' for n in range(2_000))
         + '<state id="s2000"/></scxml>', 2, "exclude each other",
     ),
+    "many_turns.scxml": (
+        XML + '<state id="a">' + '<transition event="e"/><transition event="f"/>' * 2_500 + '\n<transition event="e" target="b"/></state></scxml>',
+        3, "there is no state 'b'",
+    ),
     "many_rules.yaml": (
         "plot: p\nstates:\n" + "".join(f"  s{n}: {{goal: (p), on: {{done: s{n + 1}}}}}\n" for n in range(300)) + "  s300: {final: true}\nrules:\n"
         + "".join("  - {on: no_plan, when: (q), do: {then: retry}}\n" for n in range(300)), 304, "the rules would make 90000 transitions; at most 1000",

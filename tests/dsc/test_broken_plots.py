@@ -37,6 +37,7 @@ BYTES = {
     "control_character.yaml": (2, "the character U+001B cannot stand in a text"),
     "picture.yaml": (1, "the file is not UTF-8"),
     "yaml_1_1.yaml": (2, "only YAML 1.2"),
+    "version_too_long.yaml": (1, "the version is too long"),
     "tag_directive.yaml": (2, "only YAML 1.2 without tags"),
     "crlf_and_a_fault.yaml": (3, "did you mean 'final'?"),
 }

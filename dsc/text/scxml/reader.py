@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import PurePath
 from typing import Any
 
@@ -192,6 +193,7 @@ class _Reader:
         """Document order is kept also where transitions with the same descriptors have others between them."""
         on: dict[str, list[Form]] = {}
         always: list[Form] = []
+        repeats: Counter[str] = Counter()
         for child in (child for child in element.children if child.name == "transition"):
             words = _descriptors(child)
             if not words:
@@ -200,7 +202,7 @@ class _Reader:
                 continue
             if AFTER in words:
                 raise NotExpressibleError("transition/@event", f"'{AFTER}' is the name of timeouts", place=child.place)
-            key = _key(" ".join(words), on)
+            key = _key(" ".join(words), on, repeats)
             self._note((*path, "on", key, len(on.setdefault(key, []))), child.place)
             on[key].append(self._transition(child))
         form |= {key: value for key, value in (("on", on), ("always", always)) if value}
@@ -223,11 +225,15 @@ def _descriptors(transition: Element) -> list[str]:
     return transition.attributes.get("event", "").split()
 
 
-def _key(event: str, on: dict[str, list[Form]]) -> str:
+def _key(event: str, on: dict[str, list[Form]], repeats: Counter[str]) -> str:
+    """A key for a transition after those in `on`: new unless the last of them has the same descriptors."""
     # A list of descriptors means the same with one of them repeated, and is another key.
-    while event in on and event != next(reversed(on)):
-        event = f"{event} {event.split(maxsplit=1)[0]}"
-    return event
+    again = f" {event.split(maxsplit=1)[0]}"
+    key = event + again * repeats[event]
+    while key in on and key != next(reversed(on)):
+        repeats[event] += 1
+        key = event + again * repeats[event]
+    return key
 
 
 def _new(name: str, known: Form, element: Element) -> None:
