@@ -2,9 +2,10 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
+BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check conformance soak bench-startup bench-broken pictures clean
+.PHONY: help demo test check conformance soak bench-startup bench-broken bench-engine pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -16,6 +17,11 @@ $(VENV)/.run: pyproject.toml
 
 $(VENV)/.test: $(VENV)/.run
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,check]'
+	@touch $@
+
+$(BENCH)/.peers: pyproject.toml   # apart, so that what the peers pin does not disturb ours
+	$(PYTHON) -m venv $(BENCH)
+	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	@touch $@
 
 demo: $(VENV)/.run   ## clear a table: designed where foreseen, planned where not
@@ -40,6 +46,8 @@ bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare i
 
 bench-broken: $(VENV)/.run   ## how long the error in a broken plot takes, median and longest (RUNS=N)
 	$(BIN)/python benchmarks/broken_plots.py --runs $(or $(RUNS),3)
+bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this engine, four peers (WRITE=1 writes the docs)
+	$(BENCH)/bin/python benchmarks/engine.py $(if $(WRITE),--write)
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg
@@ -47,4 +55,4 @@ pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show planning/plots/achieve.yaml --svg docs/pictures/achieve.svg
 
 clean:   ## forget the environment and caches
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) $(BENCH) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -143,7 +143,7 @@ def export(
 @app.command()
 def schema() -> None:
     """Print the JSON Schema of plot files, for editors."""
-    from dsc.text.plots import json_schema
+    from dsc.text.schema import json_schema
 
     _print_json(json_schema())
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 DONE = "done"
 """Completion of a state's content (S0.11)."""
 AFTER = "after"
 """A timeout of a state; `index` says which."""
+EVERY = "every"
+"""A period of a state has passed again; `index` says which of its cyclic transitions."""
+AT_LEAST = "at_least"
+"""The time that a state stays at least has passed."""
 NO_CANDIDATE = "no_candidate"
 """A dynamic state without goal found no candidate that fits (S0.4)."""
 NO_PLAN = "no_plan"
@@ -28,14 +32,15 @@ EXECUTION_ERROR = "error.execution"
 """What `error` is called in profile `scxml` (SCXML 3.13)."""
 ERRORS = frozenset({ERROR, EXECUTION_ERROR})
 
-RESERVED = frozenset({DONE, AFTER, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR})
+TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
+"""What the executive's clock says to one state; no transition has them under `on`."""
+RESERVED = TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR}
 """Events the executive fires itself. Nobody else declares any of them, except that plots and skills that plan may end
 with `no_plan` and `gave_up`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened.
+class Event(NamedTuple):
+    """Something that happened; a named tuple, since many are made and a frozen dataclass takes four times as long.
 
     Attributes:
         name: what transitions are labelled with.
@@ -44,15 +49,15 @@ class Event:
             around it in the same plot see it, nobody else. An event for a state that was left is dropped.
         exact: with `to`: that state alone may take it.
         frame: the plot instance inside which it is visible; with neither, everybody sees it.
-        index: which of the state's timeouts.
+        number: which of the state's timeouts or periods.
     """
 
     name: str
-    attributes: Mapping[str, Any] = field(default_factory=dict)
+    attributes: Mapping[str, Any] = MappingProxyType({})
     to: int | None = None
     exact: bool = False
     frame: int | None = None
-    index: int | None = None
+    number: int | None = None
 
     def bindings(self) -> dict[str, Any]:
         """Its attributes under the names charts use, `event.attribute`."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 Value = str | int | float | bool
+VALUE_TYPES = frozenset({str, int, float, bool})
 """What a fact's argument or a bound variable may be: an object's name, a number, a truth value."""
 
 

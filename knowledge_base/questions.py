@@ -45,7 +45,9 @@ class Questions:
 
     def _checked(self, text: str | Expression, params: Mapping[str, Value], world: World, free: Free) -> Expression:
         e = _parsed(text) if isinstance(text, str) else text
-        passed = self._passed.get(e, world.schema, set)
+        passed = self._passed.find(e, world.schema)
+        if passed is None:
+            passed = self._passed.keep(e, world.schema, set())
         kind = (free, frozenset(params))
         if kind not in passed:
             check(e, world.schema, dict.fromkeys(params), free, objects=_Things(world))

@@ -34,14 +34,14 @@ def test_help_is_light(argv):
 
 def test_importing_the_packages_loads_nothing_heavy():
     code = (
-        "import sys, dsc, planning, knowledge_base, domains\n"
+        "import sys, dsc, dsc.testing, planning, knowledge_base, domains\n"
         f"print([name for name in {HEAVY!r} if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "[]"
 
 
-@pytest.mark.parametrize("package", ["dsc", "planning", "knowledge_base", "domains.clean_up_table"])
+@pytest.mark.parametrize("package", ["dsc", "dsc.testing", "planning", "knowledge_base", "domains.clean_up_table"])
 def test_every_public_name_can_be_imported(package):
     code = f"import {package} as p\nfor name in p.__all__: getattr(p, name)"
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)

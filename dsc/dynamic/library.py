@@ -9,9 +9,14 @@ from typing import Any
 from pydantic import ValidationError
 
 from dsc.dynamic.rules import expand_rules
-from dsc.engine.compiler import CompiledPlot, compile_plot
+from dsc.dynamic.substitution import stand_in
+from dsc.engine.compiler import compile_plot
+from dsc.engine.tables import CompiledPlot
 from dsc.model.plot import ActionPlot
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+
+MOST_BOUND = 64
+"""Plots given as data whose tables are kept: a retry binds the same plan again, a long run makes ever new ones."""
 
 
 class Library:
@@ -21,7 +26,6 @@ class Library:
         self._plots: dict[str, ActionPlot] = {}
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
-        self._bound_by_identity: dict[int, tuple[Mapping[str, Any], CompiledPlot]] = {}
         for plot in plots:
             self.add(plot)
 
@@ -52,6 +56,18 @@ class Library:
             raise UnknownNameError(f"there is no plot '{name}'", found=name, valid=self._plots)
         return found
 
+    def substitute(self, name: str, plot: ActionPlot) -> Library:
+        """A new library in which `plot` stands in place of the plot of that name; this one stays as it is.
+
+        Everything that used the old plot uses the new one: a whole branch is replaced, for a test or for good.
+
+        Raises:
+            UnknownNameError: there is no plot of that name.
+            SchemaError: who holds the old plot could not hold the new one; see `substitution.stand_in`.
+        """
+        other = stand_in(self.plot(name), plot)
+        return Library(other if own.name == name else own for own in self)
+
     def expanded(self, plot: ActionPlot) -> ActionPlot:
         """The plot with its rules as states and transitions; raises `UnknownNameError`."""
         return expand_rules(plot, self)
@@ -74,15 +90,11 @@ class Library:
         """
         if not isinstance(form, Mapping):  # whatever a variable may hold
             raise InputError(f"the value to be bound is no plot: {form!r}")
-        # The engine hands back the very same object at every step; comparing contents is for the first time.
-        kept = self._bound_by_identity.get(id(form))
-        if kept is not None and kept[0] is form:
-            return kept[1]
         key = json.dumps(form)  # the order of states counts
-        if key not in self._bound:
-            self._bound[key] = compile_plot(self.expanded(_read(form)), form)
-        compiled = self._bound[key]
-        self._bound_by_identity[id(form)] = (form, compiled)
+        compiled = self._bound.pop(key, None) or compile_plot(self.expanded(_read(form)), form)
+        self._bound[key] = compiled  # the last one is kept longest
+        if len(self._bound) > MOST_BOUND:
+            del self._bound[next(iter(self._bound))]
         return compiled
 
 

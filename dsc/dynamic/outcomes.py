@@ -1,4 +1,4 @@
-"""Which outcome events a state can end with, found from the plots and skills it uses."""
+"""How a state can end, found from the plots it uses: its outcome events, and what its completion hands on."""
 
 from __future__ import annotations
 
@@ -19,6 +19,26 @@ class Plots(Protocol):
     def plot(self, name: str) -> ActionPlot:
         """Raises `UnknownNameError`."""
         ...
+
+
+def outputs_of(state: AnyState, plots: Plots) -> Mapping[str, str] | None:
+    """What the completion of a state hands on: name -> type (S2.1); `None` if nobody can know it beforehand.
+
+    A dynamic state has what all its candidates have, with the same type; a plan for a goal has nothing.
+
+    Raises:
+        UnknownNameError: the state names a plot that is not there.
+    """
+    if isinstance(state, SubmachineState):
+        return None if state.use.startswith("?") else _outputs(plots.plot(state.use))
+    if not isinstance(state, DynamicState) or state.goal is not None:
+        return {}
+    first, *others = [set(_outputs(plots.plot(name)).items()) for name in state.dynamic] or [set()]
+    return dict(sorted(first.intersection(*others)))
+
+
+def _outputs(plot: ActionPlot) -> dict[str, str]:
+    return {name: output.type for name, output in plot.outputs.items()}
 
 
 def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:

@@ -12,7 +12,6 @@ import itertools
 from collections import ChainMap
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from dsc.dynamic.outcomes import Plots, outcomes_of
 from dsc.events import DONE, GAVE_UP, NO_CANDIDATE
@@ -25,8 +24,8 @@ from dsc.model.states import (
     OrthogonalState,
     State,
     SubmachineState,
-    Transition,
 )
+from dsc.model.transitions import Transition
 from knowledge_base.errors import SchemaError
 from knowledge_base.language import expression as lang
 from knowledge_base.language.effect import substitute_effect
@@ -129,7 +128,8 @@ class _Expansion:
         limit = rule.do.limit or (DEFAULT_RETRIES if bounded else None)
         if limit is None:
             return rule.when, {}
-        taken = ChainMap[str, object](self.counters, self.plot.variables, self.plot.parameters)  # type: ignore[arg-type]
+        declared = self.plot.parameters, self.plot.variables, self.plot.outputs
+        taken = ChainMap[str, object](self.counters, *declared)  # type: ignore[arg-type]
         counter = _unused(f"tries_{key}".lower().replace("-", "_"), taken)
         self.counters[counter] = Variable.model_validate({"type": "number", "initial": 0})
         tries = lang.Variable(counter)
@@ -165,6 +165,7 @@ def _because(outcome: str, giving_up: Transition) -> Transition:
         "guard": None if giving_up.guard is None else lang.substitute(giving_up.guard, reason),
         "assign": _filled(giving_up.assign, reason),
         "arguments": _filled(giving_up.arguments, reason),
+        "passed": _filled(giving_up.passed, reason),
         "tell": None if giving_up.tell is None else substitute_effect(giving_up.tell, reason),
         "do": tuple(_action_because(action, reason) for action in giving_up.do),
     })
@@ -197,18 +198,13 @@ def _joined(
 ) -> Transition:
     """One transition that does what the rule says and then what comes after it."""
     both = [part for part in (guard, after.guard) if part is not None]
-    actions: list[dict[str, Any]] = []
+    actions: list[AnyInternal] = []
     if rule.do.tell is not None:
-        actions.append({"tell": rule.do.tell})
+        actions.append(Tell(tell=rule.do.tell))
     if counting:
-        actions.append({"assign": dict(counting)})
-    return Transition.model_validate({
-        "to": after.target,
-        "when": None if not both else both[0] if len(both) == 1 else lang.And(tuple(both)),
+        actions.append(Assign(assign=dict(counting)))
+    return after.model_copy(update={
+        "guard": None if not both else both[0] if len(both) == 1 else lang.And(tuple(both)),
         "do": (*actions, *after.do),
         "rule": rule.label,
-        "assign": after.assign,
-        "tell": after.tell,
-        "emit": after.emit,
-        "with": after.arguments,
     })

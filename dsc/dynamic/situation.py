@@ -23,11 +23,11 @@ class KnowledgeSituation:
 
     def holds(self, expression: Expression, bindings: Bindings) -> bool:
         """See `Situation`."""
-        return holds(expression, self._world, scalars(bindings))
+        return holds(expression, self._world, bindings)
 
     def value(self, term: Term, bindings: Bindings) -> Value:
         """See `Situation`."""
-        return evaluate_term(term, self._world, scalars(bindings))
+        return evaluate_term(term, self._world, bindings)
 
     def tell(self, effect: Effect, bindings: Bindings) -> Delta:
         """See `Situation`."""

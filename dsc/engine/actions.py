@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.engine.situation import Situation
+from dsc.engine.state import NOTHING
 from dsc.engine.steps import Output, SetParameter, Start, SwitchMode
 from dsc.model.actions import Configure, ExternalAction, Trigger
 from dsc.model.plot import ActionPlot
@@ -31,19 +32,22 @@ def evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> A
     return situation.value(term, bindings)
 
 
-def delay_of(seconds: Any) -> float:
-    """Seconds of a timeout; raises `InputError` if the value is no duration."""
-    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 <= seconds < math.inf:
-        raise InputError(f"a timeout needs a number of seconds; found {seconds!r}")
+def delay_of(seconds: Any, least: float = 0) -> float:
+    """Seconds of a timer; raises `InputError` if the value is no duration, or shorter than `least`."""
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not least <= seconds < math.inf:
+        bound = f" of at least {least:g}" if least else ""
+        raise InputError(f"a timer needs a number of seconds{bound}; found {seconds!r}")
     return float(seconds)
 
 
-def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: Situation) -> dict[str, Any]:
+def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: Situation) -> Mapping[str, Any]:
     """The variables of a new instance: arguments, defaults, and initial values.
 
     Raises:
         InputError: a parameter is missing, or an argument is not a parameter.
     """
+    if not (arguments or plot.parameters or plot.variables or plot.outputs):
+        return NOTHING
     for given in arguments:
         if given not in plot.parameters:
             raise UnknownNameError(
@@ -57,7 +61,7 @@ def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: S
             variables[name] = evaluate(parameter.default, variables, situation)
         else:
             raise InputError(f"plot '{plot.name}' needs its parameter '{name}'")
-    for name, variable in plot.variables.items():
+    for name, variable in (*plot.variables.items(), *plot.outputs.items()):
         variables[name] = None if variable.initial is None else evaluate(variable.initial, variables, situation)
     return variables
 

@@ -1,152 +1,17 @@
-"""A plot as tables: nodes in document order, edges by event. Done once for a plot, shared by all its instances."""
+"""From a plot to its tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import combinations
-from typing import Any, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations, islice
+from typing import Any
 
-from dsc.model.actions import ExternalAction, Internal
-from dsc.model.language import TermField
+from dsc.engine.tables import CompiledPlot, Default, Edge, Node, Timed
+from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, initial_of
-from dsc.model.states import (
-    AnyState,
-    CompositeState,
-    FinalState,
-    HistoryState,
-    OrthogonalState,
-    Region,
-    State,
-    Transition,
-)
+from dsc.model.states import AnyState, CompositeState, FinalState, HistoryState, OrthogonalState, Region, State
+from dsc.model.transitions import Transition
 from knowledge_base.errors import SchemaError, UnknownNameError
-from knowledge_base.language.expression import Expression
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """A transition between nodes, by their indices; no target means that nothing is left or entered.
-
-    `internal` is only true where it makes a difference: a composite source with all targets inside it.
-    `place` is where it stands in its source, e.g. `("on", "grasped", 0)`.
-    """
-
-    source: int
-    trigger: str
-    target: int | None
-    guard: Expression | None
-    effect: tuple[Internal, ...]
-    rule: str | None = None
-    also: tuple[int, ...] = ()
-    internal: bool = False
-    place: tuple[str | int, ...] = ()
-
-    @property
-    def targets(self) -> tuple[int, ...]:
-        """All nodes to enter."""
-        return () if self.target is None else (self.target, *self.also)
-
-
-@dataclass(frozen=True, slots=True)
-class Default:
-    """Where a history leads that remembers nothing, and what happens on the way."""
-
-    target: int
-    effect: tuple[Internal, ...]
-
-
-@dataclass(slots=True)
-class Node:
-    """A state, a region or (index 0) the plot itself.
-
-    Attributes:
-        index: position in document order.
-        parent: index of the node around it; -1 for the plot.
-        children: indices of the nodes directly inside.
-        initial: the child entered by default; -1 where none or all are.
-        state: the model value; `None` for the plot and for regions.
-        edges: event name -> transitions in order.
-        timeouts: delay and transition of each timeout.
-        always: transitions without trigger.
-        histories: indices of the history nodes that remember what is inside.
-        transparent: a region that stands for its only state (profile `scxml`), no scope for transitions.
-    """
-
-    index: int
-    name: str
-    parent: int
-    state: AnyState | None
-    children: list[int] = field(default_factory=list)
-    initial: int = -1
-    entry: tuple[ExternalAction | Internal, ...] = ()
-    exit: tuple[ExternalAction | Internal, ...] = ()
-    edges: dict[str, tuple[Edge, ...]] = field(default_factory=dict)
-    timeouts: tuple[tuple[TermField, Edge], ...] = ()
-    always: tuple[Edge, ...] = ()
-    histories: list[int] = field(default_factory=list)
-    transparent: bool = False
-
-    @property
-    def final(self) -> bool:
-        """Whether it is a final state."""
-        return isinstance(self.state, FinalState)
-
-    @property
-    def orthogonal(self) -> bool:
-        """Whether all its children are active together."""
-        return isinstance(self.state, OrthogonalState)
-
-
-@dataclass(frozen=True, slots=True)
-class CompiledPlot:
-    """A plot with its tables.
-
-    Attributes:
-        plot: the model.
-        nodes: all nodes in document order; a node comes after the one around it.
-        index: state name -> node index.
-        form: the plot as data if it was bound as a value, else `None`.
-        defaults: history node -> what it stands for at first.
-        entries: what is entered, by domain and targets, as far as it was worked out; at most one for each edge.
-    """
-
-    plot: ActionPlot
-    nodes: tuple[Node, ...]
-    index: Mapping[str, int]
-    form: Mapping[str, Any] | None = None
-    defaults: Mapping[int, Default] = field(default_factory=dict)
-    entries: dict[tuple[int, tuple[int, ...]], Any] = field(default_factory=dict, compare=False, repr=False)
-
-    @property
-    def scxml(self) -> bool:
-        """Whether the plot is in profile `scxml`: events match by prefix and keep SCXML's names."""
-        return self.plot.profile == "scxml"
-
-    def ancestors(self, index: int) -> list[int]:
-        """The nodes around a node, innermost first, the plot last."""
-        return _ancestors(self.nodes, index)
-
-    def way(self, around: int, index: int) -> list[int]:
-        """The nodes from one around it, which is not part of the way, down to a node."""
-        ancestors = self.ancestors(index)
-        return [*reversed(ancestors[: ancestors.index(around)]), index]
-
-    def inside(self, index: int, around: int) -> bool:
-        """Whether a node is (properly) inside another."""
-        return around in self.ancestors(index)
-
-
-class Chart(Protocol):
-    """Where the engine finds plots: by name, or bound as a value."""
-
-    def compiled(self, name: str) -> CompiledPlot:
-        """The plot of that name; raises `UnknownNameError`."""
-        ...
-
-    def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
-        """A plot given as data, e.g. one made from a plan; raises `InputError`."""
-        ...
 
 
 def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> CompiledPlot:
@@ -156,113 +21,124 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
         UnknownNameError: a transition or a scope names a state that is not there.
         SchemaError: targets that cannot be active together, or a history that does not lead to a state beside it.
     """
-    nodes = [Node(0, plot.name, -1, None)]
-    initials: list[tuple[int, str]] = []
-    _add_states(nodes, 0, plot, initials)
-    index = {node.name: node.index for node in nodes if node.state is not None}
-    for parent, first in initials:
-        nodes[parent].initial = _initial(nodes, parent, first, index, deep=plot.profile == "scxml")
-    for node in nodes:
-        if isinstance(node.state, State):
-            _add_edges(node, node.state, index, nodes)
-        node.transparent = plot.profile == "scxml" and _stands_for_its_state(nodes, node)
-    defaults = {
-        node.index: _default(nodes, node, node.state, index)
-        for node in nodes
-        if isinstance(node.state, HistoryState)
-    }
-    return CompiledPlot(plot, tuple(nodes), index, form, defaults)
+    layout = _Layout(plot)
+    for node in layout.nodes:
+        if isinstance(node.state, State | Connector):
+            layout.add_edges(node, node.state)
+        node.settle()
+    return CompiledPlot(
+        plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml=plot.profile == "scxml"
+    )
 
 
-def _default(nodes: list[Node], node: Node, history: HistoryState, index: Mapping[str, int]) -> Default:
-    target = _target(node, history.target, index)
-    if isinstance(nodes[target].state, HistoryState) or node.parent not in _ancestors(nodes, target):
-        raise SchemaError(f"the history '{node.name}' does not lead to a state beside it", found=node.name)
-    return Default(target, history.do)
+class _Layout:
+    """The nodes of a plot; edges are added when all nodes have their places."""
 
+    def __init__(self, plot: ActionPlot) -> None:
+        self._scxml = plot.profile == "scxml"
+        self._initials: list[tuple[Node, str]] = []
+        self.nodes = [Node(0, plot.name, (), None)]
+        self._add_states(self.nodes[0], plot)
+        self.index = {node.name: node.index for node in self.nodes[1:] if node.state is not None}
+        for node, first in self._initials:
+            node.initial = self._initial(node, first)
 
-def _together(nodes: Sequence[Node], targets: Sequence[int]) -> bool:
-    """Whether all targets can be active at once: any two are in different regions (SCXML 3.11)."""
-    ways = [[*reversed(_ancestors(nodes, target)), target] for target in targets]
-    for first, second in combinations(ways, 2):
-        split = sum(1 for one, other in zip(first, second, strict=False) if one == other)
-        if split in {len(first), len(second)} or not nodes[first[split - 1]].orthogonal:
-            return False
-    return True
+    def _add_states(self, parent: Node, scope: ActionPlot | CompositeState | Region) -> None:
+        self._initials.append((parent, initial_of(scope)))
+        for name, state in scope.states.items():
+            node = self._append(name, parent, state)
+            if isinstance(state, CompositeState):
+                self._add_states(node, state)
+            elif isinstance(state, OrthogonalState):
+                self._add_regions(node, state)
+            node.last = len(self.nodes) - 1
+        parent.last = len(self.nodes) - 1
 
+    def _add_regions(self, node: Node, state: OrthogonalState) -> None:
+        for name, region in state.regions.items():
+            inner = self._append(f"#{len(self.nodes)}", node, None)
+            # What was made only to hold one state, which it is named after, is no scope of its own in SCXML.
+            inner.transparent = self._scxml and [*region.states] == [name]
+            self._add_states(inner, region)
+        for name, history in state.connectors.items():
+            self._append(name, node, history)
 
-def _initial(nodes: list[Node], parent: int, first: str, index: Mapping[str, int], *, deep: bool) -> int:
-    found = index.get(first, -1)
-    around = [] if found < 0 else _ancestors(nodes, found)
-    if parent not in (around if deep else around[:1]):
-        valid = [name for name, at in index.items() if nodes[at].parent == parent]
-        raise UnknownNameError(f"there is no state '{first}' to begin with", found=first, valid=valid)
-    return found
+    def _append(self, name: str, parent: Node, state: AnyState | None) -> Node:
+        index = len(self.nodes)
+        node = Node(index, name, (parent.index, *parent.around), state, last=index)
+        if isinstance(state, State):
+            node.entry, node.exit, node.broken = state.entry, state.exit, state.on_break or state.exit
+            node.at_least = state.at_least
+        elif isinstance(state, FinalState):
+            node.entry = state.entry
+        self.nodes.append(node)
+        (parent.histories if isinstance(state, HistoryState) else parent.children).append(index)
+        return node
 
+    def _initial(self, parent: Node, first: str) -> int:
+        found = self.index.get(first, -1)
+        around = () if found < 0 else self.nodes[found].around
+        if parent.index not in (around if self._scxml else around[:1]):
+            valid = [name for name, at in self.index.items() if self.nodes[at].parent == parent.index]
+            raise UnknownNameError(f"there is no state '{first}' to begin with", found=first, valid=valid)
+        return found
 
-def _ancestors(nodes: Sequence[Node], index: int) -> list[int]:
-    found = []
-    while (index := nodes[index].parent) >= 0:
-        found.append(index)
-    return found
+    def defaults(self) -> dict[int, Default]:
+        """What each history stands for at first."""
+        histories = [(node, node.state) for node in self.nodes if isinstance(node.state, HistoryState)]
+        return {node.index: self._default(node, history) for node, history in histories}
 
+    def _default(self, node: Node, history: HistoryState) -> Default:
+        target = self._target(node, history.target)
+        if isinstance(self.nodes[target].state, HistoryState) or node.parent not in self.nodes[target].around:
+            raise SchemaError(f"the history '{node.name}' does not lead to a state beside it", found=node.name)
+        return Default(target, history.do)
 
-def _stands_for_its_state(nodes: list[Node], node: Node) -> bool:
-    is_region = node.state is None and node.index > 0
-    return is_region and [nodes[child].name for child in node.children] == [node.name]
+    def add_edges(self, node: Node, state: State | Connector) -> None:
+        """The transitions of one state, in all tables of its node."""
+        # They come in the order of the tables, so none is looked up by its place: large plots have many.
+        edges = (self._edge(node, place, trigger, one) for place, trigger, one in state.placed_transitions())
+        if isinstance(state, State):
+            node.edges = {event: tuple(islice(edges, len(many))) for event, many in state.on.items()}
+            node.timeouts = tuple(Timed(timed.seconds, next(edges)) for timed in state.after)
+            node.cycles = tuple(Timed(timed.seconds, next(edges)) for timed in state.every)
+        node.always = tuple(edges)
 
-
-def _add_states(
-    nodes: list[Node],
-    parent: int,
-    scope: ActionPlot | CompositeState | Region,
-    initials: list[tuple[int, str]],
-) -> None:
-    initials.append((parent, initial_of(scope)))
-    for name, state in scope.states.items():
-        node = _append(nodes, name, parent, state)
-        if isinstance(state, CompositeState):
-            _add_states(nodes, node.index, state, initials)
-        elif isinstance(state, OrthogonalState):
-            for region_name, region in state.regions.items():
-                inner = _append(nodes, region_name, node.index, None)
-                _add_states(nodes, inner.index, region, initials)
-            for history_name, history in state.connectors.items():
-                _append(nodes, history_name, node.index, history)
-
-
-def _append(nodes: list[Node], name: str, parent: int, state: AnyState | None) -> Node:
-    node = Node(len(nodes), name, parent, state)
-    if isinstance(state, State):
-        node.entry, node.exit = state.entry, state.exit
-    elif isinstance(state, FinalState):
-        node.entry = state.entry
-    nodes.append(node)
-    inside = nodes[parent].histories if isinstance(state, HistoryState) else nodes[parent].children
-    inside.append(node.index)
-    return node
-
-
-def _add_edges(node: Node, state: State, index: Mapping[str, int], nodes: Sequence[Node]) -> None:
-    def edge(place: tuple[str | int, ...], trigger: str, transition: Transition) -> Edge:
-        targets = [_target(node, name, index) for name in transition.targets]
-        if not _together(nodes, targets):
+    def _edge(self, node: Node, place: tuple[str | int, ...], trigger: str, transition: Transition) -> Edge:
+        targets = tuple([self._target(node, name) for name in transition.targets])
+        if len(targets) > 1 and not self._together(targets):
             raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
-        within = isinstance(state, CompositeState) and all(node.index in _ancestors(nodes, at) for at in targets)
         return Edge(
-            node.index, trigger, targets[0] if targets else None, transition.guard, transition.effect,
-            transition.rule, tuple(targets[1:]), transition.internal and within, place,
+            node.index, trigger, targets, transition.guard, transition.effect, transition.rule,
+            transition.internal and self._stays(node, targets), place, transition.passed,
+            tuple(self._cleared(node, transition)) if transition.clear else (),
         )  # fmt: skip
 
-    edges = {place: edge(place, trigger, transition) for place, trigger, transition in state.placed_transitions()}
-    node.edges = {event: tuple(edges["on", event, n] for n in range(len(many))) for event, many in state.on.items()}
-    node.timeouts = tuple((timed.seconds, edges["after", n]) for n, timed in enumerate(state.after))
-    node.always = tuple(edges["always", n] for n in range(len(state.always)))
+    def _stays(self, node: Node, targets: Sequence[int]) -> bool:
+        return isinstance(node.state, CompositeState) and all(node.index < at <= node.last for at in targets)
 
+    def _together(self, targets: Sequence[int]) -> bool:
+        """Whether all targets can be active at once: any two are in different regions (SCXML 3.11)."""
+        ways = [[*reversed(self.nodes[target].around), target] for target in targets]
+        for first, second in combinations(ways, 2):
+            split = sum(1 for one, other in zip(first, second, strict=False) if one == other)
+            if split in {len(first), len(second)} or not self.nodes[first[split - 1]].orthogonal:
+                return False
+        return True
 
-def _target(source: Node, name: str, index: Mapping[str, int]) -> int:
-    if name not in index:
-        raise UnknownNameError(
-            f"there is no state '{name}' for a transition of '{source.name}'", found=name, valid=index
-        )
-    return index[name]
+    def _target(self, source: Node, name: str) -> int:
+        found = self.index.get(name)
+        if found is None:
+            raise UnknownNameError(
+                f"there is no state '{name}' for a transition of '{source.name}'", found=name, valid=self.index
+            )
+        return found
+
+    def _cleared(self, source: Node, transition: Transition) -> Iterator[int]:
+        """The histories that forget: of the state, with `*` also those of all states inside it."""
+        for name in transition.clear:
+            node = self.nodes[self._target(source, name.removesuffix("*"))]
+            regions = [self.nodes[child] for child in node.children] if node.orthogonal else []
+            everything = self.nodes[node.index : node.last + 1]
+            for one in everything if name.endswith("*") else [node, *regions]:
+                yield from one.histories

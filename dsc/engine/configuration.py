@@ -1,115 +1,112 @@
-"""The machine's state as a frozen value that goes to JSON and back exactly."""
+"""Configurations of one plot, each made once and shared by all instances, with what was worked out about it.
+
+A configuration's reactions are found when they are first needed and kept (lazy determinisation): from then on
+a step is a look-up. What is kept is bounded, and forgetting it changes nothing but the time that a step takes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from dsc.engine.tables import CompiledPlot
+
+if TYPE_CHECKING:
+    from dsc.engine.state import MachineState
+    from dsc.engine.steps import Step
+
+Remembered = tuple[tuple[int, tuple[int, ...]], ...]
+"""History node and the nodes that were active when the node around it was last left, in order."""
+
+MOST_CONFIGURATIONS = 4096
+"""Kept for one plot: four regions of eight states each; a few KiB each."""
+MOST_TRIGGERS = 256
+"""Kept for one configuration: names of events come from outside, and there is no end to them."""
 
 
-@dataclass(frozen=True, slots=True)
-class FrameState:
-    """One running plot.
-
-    Attributes:
-        serial: number of this instance, never used again in the same run.
-        plot: name of the plot in the library.
-        form: the plot itself, if it was bound as a value (a generated plot); `None` otherwise.
-        variables: parameters and variables with their values.
-        active: the configuration, state name -> activation serial, in document order.
-        children: plots inside active submachine and dynamic states, by the state's name.
-        history: what the plot's history states remember: names of the states (or regions) that were active.
-    """
-
-    serial: int
-    plot: str
-    form: Mapping[str, Any] | None
-    variables: Mapping[str, Any]
-    active: Mapping[str, int]
-    children: Mapping[str, FrameState] = field(default_factory=dict)
-    history: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            "serial": self.serial,
-            "plot": self.plot,
-            "form": self.form,
-            "variables": dict(self.variables),
-            "active": dict(self.active),
-            "children": {name: child.to_json() for name, child in self.children.items()},
-            "history": {name: list(remembered) for name, remembered in self.history.items()},
-        }
-
-    @staticmethod
-    def from_json(data: Mapping[str, Any]) -> FrameState:
-        """The inverse of `to_json`."""
-        children = {name: FrameState.from_json(child) for name, child in data["children"].items()}
-        history = {name: tuple(remembered) for name, remembered in data["history"].items()}
-        return FrameState(
-            data["serial"], data["plot"], data["form"], data["variables"], data["active"], children, history
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class MachineState:
-    """Everything a machine has to remember between two events.
+class Configuration:
+    """The active nodes of a plot and all else that decides which transitions can be taken.
 
     Attributes:
-        root: the outermost plot; `None` before the start and after the end.
-        serials: the last serial number given out.
-        finished: whether the outermost plot has reached its final state.
+        active: the active nodes, in document order, without the plot itself.
+        waiting: those of them whose transitions have to wait, because their least time has not passed.
+        history: what the plot's history states remember.
+        choices: trigger -> what is decided there (see `choice`).
+        reactions: transitions taken together -> what follows (see `reaction`).
+        questions: how many guards `choices` ask.
+        bare: the machine's state in which this is all there is, if it was ever reached.
+        steps: the last step from there for each event that only moves on.
     """
 
-    root: FrameState | None = None
-    serials: int = 0
-    finished: bool = False
+    def __init__(
+        self, compiled: CompiledPlot, active: tuple[int, ...], waiting: frozenset[int], history: Remembered
+    ) -> None:
+        self.compiled = compiled
+        self.active = active
+        self.waiting = waiting
+        self.history = history
+        self.choices: dict[Any, Any] = {}
+        self.reactions: dict[Any, Any] = {}
+        self.questions = 0
+        self.bare: MachineState | None = None
+        self.steps: dict[str, Step] = {}
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            "root": self.root.to_json() if self.root else None,
-            "serials": self.serials,
-            "finished": self.finished,
-        }
+    def __eq__(self, other: object) -> bool:
+        """Whether the same is active, waiting and remembered; of which plot, the frame says."""
+        return self is other or (isinstance(other, Configuration) and self._key == other._key)
 
-    @staticmethod
-    def from_json(data: Mapping[str, Any]) -> MachineState:
-        """The inverse of `to_json`."""
-        root = FrameState.from_json(data["root"]) if data["root"] else None
-        return MachineState(root, data["serials"], data["finished"])
+    def __hash__(self) -> int:
+        return hash(self._key)
 
-    def configuration(self) -> tuple[str, ...]:
-        """Paths of all active states, outermost first."""
-        return tuple(_paths(self.root, "")) if self.root else ()
+    def __repr__(self) -> str:
+        return f"Configuration({', '.join(self.names)})"
 
-    def has_activation(self, serial: int) -> bool:
-        """Whether the state that was entered with this serial number is still active."""
-        return self.root is not None and any(serial in frame.active.values() for frame in _frames(self.root))
+    @property
+    def _key(self) -> tuple[tuple[int, ...], frozenset[int], Remembered]:
+        return self.active, self.waiting, self.history
 
-    def activations_inside(self, serial: int) -> frozenset[int]:
-        """The serial numbers of everything active inside that activation's content, and its own."""
-        for frame in _frames(self.root) if self.root else ():
-            for name, own in frame.active.items():
-                if own == serial:
-                    content = _frames(frame.children[name]) if name in frame.children else ()
-                    return frozenset({own, *(inner for one in content for inner in one.active.values())})
-        return frozenset()
+    @cached_property
+    def members(self) -> frozenset[int]:
+        """The active nodes as a set."""
+        return frozenset(self.active)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the active states; regions have none."""
+        nodes = self.compiled.nodes
+        return tuple([nodes[index].name for index in self.active if nodes[index].state is not None])
+
+    @cached_property
+    def leaves(self) -> tuple[int, ...]:
+        """The active nodes without an active node inside, in document order."""
+        inner = {self.compiled.nodes[index].parent for index in self.active}
+        return tuple([index for index in self.active if index not in inner])
+
+    @cached_property
+    def spontaneous(self) -> bool:
+        """Whether a transition without trigger may be enabled."""
+        return any(self.compiled.nodes[index].always for index in self.active)
+
+    def forget(self) -> None:
+        """Drop what was worked out; it is worked out again when it is needed."""
+        self.choices.clear()
+        self.reactions.clear()
+        self.steps.clear()
+        self.questions = 0
 
     def is_active(self, state: str) -> bool:
-        """Whether a state of that name or path is active."""
-        return any(path == state or path.endswith("/" + state) for path in self.configuration())
+        """Whether the state of that name is active."""
+        return self.compiled.index.get(state) in self.members
 
 
-def _frames(frame: FrameState) -> Iterator[FrameState]:
-    yield frame
-    for child in frame.children.values():
-        yield from _frames(child)
-
-
-def _paths(frame: FrameState, prefix: str) -> Iterator[str]:
-    for name in frame.active:
-        if not name.startswith("#"):  # a region
-            yield prefix + name
-        if name in frame.children:
-            yield from _paths(frame.children[name], f"{prefix}{name}/")
+def configuration_of(
+    compiled: CompiledPlot, active: tuple[int, ...], waiting: frozenset[int] = frozenset(), history: Remembered = ()
+) -> Configuration:
+    """The plot's configuration with these contents: always the same one, as long as it is kept."""
+    key = (active, waiting, history)
+    found: Configuration | None = compiled.cache.get(key)
+    if found is None:
+        if len(compiled.cache) >= MOST_CONFIGURATIONS:
+            compiled.cache.clear()
+        found = compiled.cache[key] = Configuration(compiled, active, waiting, history)
+    return found

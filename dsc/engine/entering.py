@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from dsc.engine.compiler import CompiledPlot
+from dsc.engine.tables import CompiledPlot
 from dsc.model.actions import Internal
 
 Remembered = Mapping[int, tuple[int, ...]]
@@ -29,16 +29,7 @@ class Entry:
 
 
 def entry_set(compiled: CompiledPlot, domain: int, targets: tuple[int, ...], remembered: Remembered) -> Entry:
-    """Everything to enter inside `domain` to reach all targets; worked out once where nothing is remembered."""
-    if compiled.defaults:
-        return _entry_set(compiled, domain, targets, remembered)
-    if (domain, targets) not in compiled.entries:
-        compiled.entries[domain, targets] = _entry_set(compiled, domain, targets, remembered)
-    found: Entry = compiled.entries[domain, targets]
-    return found
-
-
-def _entry_set(compiled: CompiledPlot, domain: int, targets: tuple[int, ...], remembered: Remembered) -> Entry:
+    """Everything to enter inside `domain` to reach all targets."""
     work = _Work(compiled, remembered)
     reached = [real for target in targets for real in work.resolved(target)]
     for target in reached:

@@ -1,355 +1,223 @@
-"""One macrostep at work: microsteps, entering and leaving, internal events, until the chart rests (SCXML 3.13)."""
+"""Reactions carried out: plots' states are left and entered, plots bound and unbound (SCXML appendix D)."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Mapping
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from dsc.engine.actions import delay_of, evaluate, fill_parameters, output_of
-from dsc.engine.compiler import Chart, CompiledPlot, Edge
-from dsc.engine.configuration import MachineState
-from dsc.engine.entering import Entry, entry_set
-from dsc.engine.frames import Frame, freeze, thaw
-from dsc.engine.membership import settle
-from dsc.engine.selection import Enabled, everything, is_addressed, select
+from dsc.engine.actions import fill_parameters
+from dsc.engine.frames import Frame
+from dsc.engine.performing import Performer
+from dsc.engine.reaction import Entrance, Exit, Part, Reaction, initial_reaction, leaving_reaction
 from dsc.engine.situation import Decision, Situation
-from dsc.engine.steps import Bound, Cancel, DecisionMade, Microstep, Note, Output, SendLater, StartTimer, Step, Taken
+from dsc.engine.state import NOTHING
+from dsc.engine.steps import Bound, Cancel, DecisionMade
+from dsc.engine.tables import Chart, CompiledPlot
 from dsc.errors import RunawayError
-from dsc.events import DONE, DONE_STATE, ERROR, ERRORS, EXECUTION_ERROR, NO_CANDIDATE, Event
-from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Tell, Trigger
-from dsc.model.states import DynamicState, FinalState, State, SubmachineState
+from dsc.events import DONE, DONE_STATE, NO_CANDIDATE, Event
+from dsc.model.states import DynamicState, SubmachineState
 from knowledge_base.errors import InputError
-from knowledge_base.facts import Delta
-from knowledge_base.language.expression import Expression
+from knowledge_base.language.expression import Variable
 
-MAX_MICROSTEPS = 1000
-"""A macrostep that takes more is going round in circles."""
 MAX_NESTING = 40
 """Plots inside plots; deeper than that, a plot contains itself without end."""
 
 
-class Execution:
-    """Works on thawed frames; `finish` freezes them into the next state."""
+class Execution(Performer):
+    """Changes running plots as reactions say.
 
-    def __init__(self, chart: Chart, situation: Situation, state: MachineState | None = None) -> None:
-        state = state or MachineState()
-        self._chart = chart
-        self._situation = situation
-        self._serials = state.serials
-        self._root = thaw(state.root, chart) if state.root else None
-        self._finished = state.finished
-        self._internal: deque[Event] = deque()
-        self._event: Event | None = None
-        self._microsteps: list[Microstep] = []
-        self._decisions: list[DecisionMade] = []
-        self._output: list[Output] = []
-        self._emitted: list[Event] = []
-        self._errors: list[str] = []
-        self._broken_guards: set[tuple[int, int]] = set()
-        self._knowledge = Delta()
-        self._exited: list[str] = []
-        self._entered: list[str] = []
-        self._bound: list[Bound] = []
+    Attributes:
+        chart: where plots are found.
+        finished: whether the outermost plot has reached its final state.
+    """
 
-    # -- the macrostep -----------------------------------------------------------------------------------
+    __slots__ = ("chart", "finished")
 
-    def start(self, plot: str, arguments: Mapping[str, Any]) -> None:
-        """Enter the outermost plot."""
-        compiled = self._chart.compiled(plot)
-        self._root = self._new_frame(compiled, arguments, None, -1)
-        self._enter_initial(self._root)
-        self._record(None, ())
-        self._rest()
+    def __init__(self, chart: Chart, situation: Situation, serials: int) -> None:
+        super().__init__(situation, serials)
+        self.chart = chart
+        self.finished = False
 
-    def react(self, event: Event | None) -> bool:
-        """Take the event, then run to completion; returns whether a transition took the event."""
-        assert self._root is not None  # noqa: S101  # `step` answers for a finished machine
-        handled = False
-        if event is not None and is_addressed(self._root, event):
-            handled = self._microstep(event)
-        self._rest()
-        return handled
+    def enter_plot(self, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> Frame:
+        """A plot as the outermost one; raises `InputError` if the arguments do not fit."""
+        frame = self._new_frame(compiled, arguments)
+        self._enter_initial(frame, initial_reaction(compiled))
+        return frame
 
-    def leave(self) -> None:
-        """Leave all active states of all plots."""
-        assert self._root is not None  # noqa: S101
-        self._exit(everything(self._root))
-        self._record(None, ())
-        self._root = None
-        self._errors += [_reason(event) for event in self._internal if event.name in ERRORS]
+    def leave_plot(self, frame: Frame) -> None:
+        """Leave all states of a plot and of the plots inside."""
+        self.exit(frame, leaving_reaction(frame.configuration).exits)
 
-    def finish(self, event: Event | None, *, handled: bool) -> Step:
-        """The step as a value."""
-        if self._finished and self._root is not None:
-            self.leave()
-        root = freeze(self._root) if self._root else None
-        return Step(
-            state=MachineState(root, self._serials, self._finished),
-            event=event,
-            handled=handled,
-            microsteps=tuple(self._microsteps),
-            decisions=tuple(self._decisions),
-            knowledge=self._knowledge,
-            output=tuple(self._output),
-            emitted=tuple(self._emitted),
-            errors=tuple(self._errors),
-        )
+    def take(self, frame: Frame, reaction: Reaction) -> None:
+        """Leave, act and enter as a reaction of one plot says."""
+        if reaction.exits:
+            self.exit(frame, reaction.exits)
+        frame.configuration = reaction.following
+        passed = [self._act(frame, part) if part.acts else NOTHING for part in reaction.parts]
+        for part, arguments in zip(reaction.parts, passed, strict=True):
+            self._enter_part(frame, part, arguments)
 
-    def _rest(self) -> None:
-        while not self._finished:
-            if self._microstep(None):
-                continue
-            if not self._internal:
-                return
-            event = self._internal.popleft()
-            if not self._microstep(event) and event.name in ERRORS:
-                self._errors.append(_reason(event))
+    def take_together(self, reactions: Mapping[Frame, Reaction], parts: Sequence[tuple[Frame, Part]]) -> None:
+        """The same for several plots at once; `parts` are those of all of them, in the order in which they act."""
+        leaving = [(frame, one) for frame, reaction in reactions.items() for one in reaction.exits]
+        for frame, one in sorted(leaving, key=lambda at: at[0].position(at[1].node.index), reverse=True):
+            self.exit(frame, (one,))
+        for frame, reaction in reactions.items():
+            frame.configuration = reaction.following
+        passed = [self._act(frame, part) if part.acts else NOTHING for frame, part in parts]
+        for (frame, part), arguments in zip(parts, passed, strict=True):
+            self._enter_part(frame, part, arguments)
 
-    def _microstep(self, event: Event | None) -> bool:
-        assert self._root is not None  # noqa: S101
-        self._event = event or self._event
-        enabled = select(self._root, event, self._guard)
-        if not enabled:
-            return False
-        if len(self._microsteps) >= MAX_MICROSTEPS:
-            trail = [path for micro in self._microsteps[-6:] for path in micro.entered]
-            raise RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
-        taken = tuple(self._taken(one) for one in enabled)
-        self._exit(set().union(*(one.left() for one in enabled)))
-        for one in enabled:
-            self._perform(one.frame, one.edge.effect)
-        for one in enabled:
-            if one.edge.target is not None:
-                self._enter(one.frame, one.domain, one.edge.targets)
-        self._record(event, taken)
-        return True
-
-    def _guard(self, frame: Frame, edge: Edge) -> bool:
-        if edge.guard is None:
-            return True
+    def _act(self, frame: Frame, part: Part) -> Mapping[str, Any]:
+        """The internal actions of a transition; returns what it passes to its target."""
+        assert part.edge is not None  # noqa: S101  # what has no transition does not act
+        source = frame.compiled.nodes[part.edge.source].name
+        self.act(frame, source, part.effect)
         try:
-            return self._holds(frame, edge.guard)
+            return self.values(frame, part.edge.passed)
         except InputError as error:
-            # Once in a macrostep: a guard without trigger is looked at again after every microstep.
-            if (frame.serial, id(edge)) not in self._broken_guards:
-                self._broken_guards.add((frame.serial, id(edge)))
-                self._fail(frame, f"guard of '{edge.trigger}' in {frame.path(edge.source)}: {error}")
-            return False
-
-    def _holds(self, frame: Frame, condition: Expression) -> bool:
-        if frame.compiled.scxml:
-            condition = settle(condition, frame.is_active)
-        return self._situation.holds(condition, self._bindings(frame, self._event))
-
-    def _bindings(self, frame: Frame, event: Event | None) -> dict[str, Any]:
-        return {**frame.variables, **event.bindings()} if event else frame.variables
-
-    def _taken(self, one: Enabled) -> Taken:
-        target = None if one.edge.target is None else one.frame.path(one.edge.target)
-        source, edge = one.frame.path(one.edge.source), one.edge
-        return Taken(source, edge.trigger, target, edge.rule, one.frame.compiled.plot.name, edge.place)
-
-    def _record(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
-        happened = Microstep(event, taken, tuple(self._exited), tuple(self._entered), tuple(self._bound))
-        self._microsteps.append(happened)
-        self._exited, self._entered, self._bound = [], [], []
+            self.fail(frame, f"{frame.prefix}{source}: {error}")
+            return {}
 
     # -- leaving -----------------------------------------------------------------------------------------
 
-    def _exit(self, left: Iterable[tuple[Frame, int]]) -> None:
-        """Inner before outer, later before earlier: the reverse of document order, through all plots."""
-        leaving = sorted(left, key=lambda at: at[0].position(at[1]), reverse=True)
-        for frame, index in leaving:
-            frame.remember(index)
-        for frame, index in leaving:
-            node = frame.node(index)
+    def exit(self, frame: Frame, exits: Iterable[Exit]) -> None:
+        """Leave nodes in this order; what runs inside one is left just before it."""
+        for one in exits:
+            node, name = one.node, one.node.name
+            if node.holds_plot:
+                self._empty(frame, name)
             if node.state is not None:
-                self._exited.append(frame.path(index))
-            if node.timeouts or any(isinstance(action, Trigger) for action in node.entry):
-                self._output.append(Cancel(frame.active[index]))
-            self._act(frame, index, node.exit)
-            frame.children.pop(index, None)
-            del frame.active[index]
+                self.exited.append(frame.prefix + name)
+            if node.addressed:
+                self._exit_addressed(frame, one)
+            elif one.actions:
+                self.act(frame, name, one.actions)
+
+    def _empty(self, frame: Frame, host: str) -> None:
+        """Leave what runs inside a state; where that is no more than leaving, nothing has to be thawed for it."""
+        resting = frame.resting.get(host)
+        if resting is not None and not resting.children:
+            reaction = leaving_reaction(resting.configuration)
+            if reaction.silent:
+                self.exited += [f"{frame.prefix}{host}/{name}" for name in reaction.exited]
+                frame.forget(host)
+                return
+        inner = frame.child(host)
+        if inner is not None:
+            self.leave_plot(inner)
+            inner.take_out()
+
+    def _exit_addressed(self, frame: Frame, one: Exit) -> None:
+        name = one.node.name
+        activation = frame.activations[name]
+        if one.cancels:
+            self.output.append(Cancel(activation))
+        self.act(frame, name, one.actions, activation, first=len(one.node.entry))
+        frame.activations = {other: serial for other, serial in frame.activations.items() if other != name}
+        if frame.kept:
+            frame.kept = tuple([waiting for waiting in frame.kept if waiting[0] != name])
 
     # -- entering ----------------------------------------------------------------------------------------
 
-    def _enter_initial(self, frame: Frame) -> None:
-        self._enter(frame, 0, (frame.node(0).initial,))
+    def _enter_initial(self, frame: Frame, reaction: Reaction) -> None:
+        frame.configuration = reaction.following
+        for part in reaction.parts:
+            self._enter_part(frame, part, NOTHING)
 
-    def _enter(self, frame: Frame, domain: int, targets: tuple[int, ...]) -> None:
-        """Enter what leads to the targets, the other regions on the way, and what is inside, in document order."""
-        entry = entry_set(frame.compiled, domain, targets, frame.history)
-        for index in sorted(entry.nodes):
-            self._enter_one(frame, index, entry)
-            self._enter_content(frame, index)
+    def _enter_part(self, frame: Frame, part: Part, passed: Mapping[str, Any]) -> None:
+        if not passed:
+            for entrance in part.entrances:
+                self._enter(frame, entrance, NOTHING)
+        elif part.edge is not None:
+            target = part.edge.targets[0]
+            for entrance in part.entrances:
+                self._enter(frame, entrance, passed if entrance.node.index == target else NOTHING)
 
-    def _enter_one(self, frame: Frame, index: int, entry: Entry) -> None:
-        node = frame.node(index)
-        frame.active[index] = self._next_serial()
-        if node.state is not None:
-            self._entered.append(frame.path(index))
-        self._act(frame, index, node.entry)
-        self._perform(frame, entry.after.get(index, ()))
-        for number, (seconds, _) in enumerate(node.timeouts):
-            try:
-                delay = delay_of(self._value(frame, seconds))
-            except InputError as error:
-                self._fail(frame, f"{frame.path(index)}: {error}")
-            else:
-                self._output.append(StartTimer(frame.active[index], number, delay))
-
-    def _enter_content(self, frame: Frame, index: int) -> None:
-        state = frame.node(index).state
-        if isinstance(state, FinalState):
-            if state.emit is not None:
-                self._perform(frame, (Emit(emit=state.emit, arguments=state.arguments),))
-            self._complete_around(frame, index)
-        elif isinstance(state, SubmachineState):
-            self._bind_submachine(frame, index, state)
+    def _enter(self, frame: Frame, entrance: Entrance, passed: Mapping[str, Any]) -> None:
+        node, state = entrance.node, entrance.node.state
+        activation = 0
+        if node.addressed:
+            activation = self.next_serial()
+            frame.activations = {**frame.activations, node.name: activation}
+        if state is not None:
+            self.entered.append(frame.prefix + node.name)
+        if entrance.actions:
+            self.act(frame, node.name, entrance.actions, activation)
+        if entrance.after:
+            self.act(frame, node.name, entrance.after)
+        if node.timed:
+            self.start_timers(frame, node, activation)
+        if isinstance(state, SubmachineState):
+            self._bind_submachine(frame, node.name, state, passed)
         elif isinstance(state, DynamicState):
-            self._bind_dynamic(frame, index, state)
-        elif type(state) is State and not frame.compiled.scxml:
-            self._done(frame, index)
+            self._bind_dynamic(frame, node.name, state, passed)
+        if entrance.emits is not None:
+            self.act(frame, node.name, (entrance.emits,))
+        if entrance.completes is not None:
+            self._complete(frame, entrance.completes)
 
-    def _bind_submachine(self, frame: Frame, index: int, state: SubmachineState) -> None:
+    def _bind_submachine(self, frame: Frame, name: str, state: SubmachineState, passed: Mapping[str, Any]) -> None:
         try:
-            arguments = {k: self._value(frame, v) for k, v in state.arguments.items()}
+            arguments = passed
+            if state.arguments:
+                own = {key: term for key, term in state.arguments.items() if key not in passed}
+                arguments = {**self.values(frame, own), **passed}
             if state.use.startswith("?"):
-                compiled = self._chart.bind(frame.variables[state.use[1:]])
+                compiled = self.chart.bind(frame.variables[state.use[1:]])
             else:
-                compiled = self._chart.compiled(state.use)
-            inner = self._new_frame(compiled, arguments, frame, index)
+                compiled = self.chart.compiled(state.use)
+            self._bind(frame, name, compiled, arguments)
         except InputError as error:
-            self._fail(frame, f"{frame.path(index)}: {error}")
-            return
-        self._enter_initial(inner)
+            self.fail(frame, f"{frame.prefix}{name}: {error}")
 
-    def _bind_dynamic(self, frame: Frame, index: int, state: DynamicState) -> None:
-        bindings = self._bindings(frame, self._event)
+    def _bind_dynamic(self, frame: Frame, name: str, state: DynamicState, passed: Mapping[str, Any]) -> None:
+        bindings = self.bindings(frame)
+        if passed:
+            places = {given: Variable(f"passed.{given}") for given in passed}
+            state = state.model_copy(update={"arguments": {**state.arguments, **places}})
+            bindings = {**bindings, **{f"passed.{given}": value for given, value in passed.items()}}
         try:
-            decision = self._situation.choose(state, frame.compiled.plot.name, bindings)
-            self._decisions.append(DecisionMade(frame.path(index), decision))
-            self._bind_decision(frame, index, decision)
+            decision = self.situation.choose(state, frame.compiled.plot.name, bindings)
+            self.decisions.append(DecisionMade(frame.prefix + name, decision))
+            self._bind_decision(frame, name, decision)
         except InputError as error:
-            self._fail(frame, f"{frame.path(index)}: {error}")
+            self.fail(frame, f"{frame.prefix}{name}: {error}")
 
-    def _bind_decision(self, frame: Frame, index: int, decision: Decision) -> None:
+    def _bind_decision(self, frame: Frame, name: str, decision: Decision) -> None:
         if decision.satisfied:
-            self._done(frame, index)
+            self._done(frame, frame.compiled.index[name], {})
         elif decision.chosen is None:
-            self._internal.append(Event(NO_CANDIDATE, to=frame.active[index]))
+            self.internal.append(Event(NO_CANDIDATE, to=frame.activations[name]))
         else:
-            compiled = self._chart.compiled(decision.chosen)
-            inner = self._new_frame(compiled, decision.arguments, frame, index)
-            self._enter_initial(inner)
+            self._bind(frame, name, self.chart.compiled(decision.chosen), decision.arguments)
 
-    def _new_frame(
-        self, compiled: CompiledPlot, arguments: Mapping[str, Any], parent: Frame | None, host: int
-    ) -> Frame:
-        variables = fill_parameters(compiled.plot, arguments, self._situation)
-        frame = Frame(self._next_serial(), compiled, variables, parent, host)
-        if parent is not None:
-            if parent.depth >= MAX_NESTING:
-                raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [parent.path(host)])
-            parent.children[host] = frame
-        self._bound.append(Bound(parent.path(host) if parent else "", compiled.plot))
-        return frame
+    def _bind(self, frame: Frame, name: str, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> None:
+        if frame.depth >= MAX_NESTING:
+            raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [frame.prefix + name])
+        inner = self._new_frame(compiled, arguments, frame.prefix + name)
+        inner.put_into(frame, name)
+        self._enter_initial(inner, initial_reaction(compiled))
+
+    def _new_frame(self, compiled: CompiledPlot, arguments: Mapping[str, Any], path: str = "") -> Frame:
+        variables = fill_parameters(compiled.plot, arguments, self.situation)
+        self.bound.append(Bound(path, compiled.plot))
+        return Frame(self.next_serial(), compiled, initial_reaction(compiled).following, variables)
 
     # -- completion --------------------------------------------------------------------------------------
 
-    def _complete_around(self, frame: Frame, final: int) -> None:
-        around = frame.node(final).parent
-        if around == 0:
-            self._plot_finished(frame)
-        elif frame.node(around).state is not None:
-            self._done(frame, around)
-        else:
-            orthogonal = frame.node(around).parent
-            if all(self._region_finished(frame, region) for region in frame.node(orthogonal).children):
-                self._done(frame, orthogonal)
-
-    def _region_finished(self, frame: Frame, region: int) -> bool:
-        return any(child in frame.active and frame.node(child).final for child in frame.node(region).children)
-
-    def _plot_finished(self, frame: Frame) -> None:
-        if frame.parent is None:
-            self._finished = True
-        else:
-            self._done(frame.parent, frame.host)
-
-    def _done(self, frame: Frame, index: int) -> None:
-        if frame.compiled.scxml:
-            self._internal.append(Event(DONE_STATE + frame.node(index).name, frame=frame.serial))
-        elif DONE in frame.node(index).edges:
-            self._internal.append(Event(DONE, to=frame.active[index], exact=True))
-
-    # -- actions -----------------------------------------------------------------------------------------
-
-    def _act(self, frame: Frame, index: int, actions: tuple[ExternalAction | Internal, ...]) -> None:
-        activation = frame.active[index]
-        for number, action in enumerate(actions):
-            try:
-                if isinstance(action, Internal):
-                    self._internal_action(frame, action)
-                else:
-                    value = partial(self._value, frame)
-                    self._output.append(output_of(action, activation, number, value))
-            except InputError as error:
-                self._fail(frame, f"{frame.path(index)}: {error}")
-                if frame.compiled.scxml:  # an error ends the block (SCXML 4.9)
-                    return
-
-    def _perform(self, frame: Frame, actions: Iterable[Internal]) -> None:
-        for action in actions:
-            try:
-                self._internal_action(frame, action)
-            except InputError as error:
-                self._fail(frame, f"{frame.compiled.plot.name}: {error}")
-                if frame.compiled.scxml:
-                    return
-
-    def _internal_action(self, frame: Frame, action: Internal) -> None:
-        match action:
-            case Assign(assign=terms):
-                frame.variables.update({name: self._value(frame, term) for name, term in terms.items()})
-            case Tell(tell=effect):
-                told = self._situation.tell(effect, self._bindings(frame, self._event))
-                self._knowledge = self._knowledge.then(told)
-            case Emit():
-                attributes = {name: self._value(frame, term) for name, term in action.arguments.items()}
-                delay = None if action.delay is None else delay_of(self._value(frame, action.delay))
-                self._emit(frame, action.emit, attributes, delay)
-            case Log(log=parts, label=label):
-                self._output.append(Note(label, "".join(str(self._value(frame, part)) for part in parts)))
-            case Choose():
-                for inner in action.then if self._holds(frame, action.condition) else action.otherwise:
-                    self._internal_action(frame, inner)
-
-    def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any], delay: float | None = None) -> None:
-        if delay is not None:
-            self._output.append(SendLater(Event(name, attributes, frame=frame.serial), delay))
-        elif name not in frame.compiled.plot.emits:
-            self._internal.append(Event(name, attributes, frame=frame.serial))
+    def _complete(self, frame: Frame, index: int) -> None:
+        if index:
+            self._done(frame, index, {})
         elif frame.parent is None:
-            self._emitted.append(Event(name, attributes))
-        elif frame.host in frame.parent.active:
-            self._internal.append(Event(name, attributes, to=frame.parent.active[frame.host]))
-        # Else the host was left by another transition of this microstep: nobody waits for an outcome any more.
+            self.finished = True
+        else:
+            outputs = {name: frame.variables[name] for name in frame.compiled.plot.outputs}
+            self._done(frame.parent, frame.parent.compiled.index[frame.host], outputs)
 
-    def _value(self, frame: Frame, term: Any) -> Any:
-        return evaluate(term, self._bindings(frame, self._event), self._situation)
-
-    def _fail(self, frame: Frame, reason: str) -> None:
-        name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
-        self._internal.append(Event(name, {"reason": reason}, frame=frame.serial))
-
-    def _next_serial(self) -> int:
-        self._serials += 1
-        return self._serials
-
-
-def _reason(error: Event) -> str:
-    # A chart may fire `error` itself, and say nothing.
-    return str(error.attributes.get("reason", "the chart fired 'error' without a reason"))
+    def _done(self, frame: Frame, index: int, outputs: Mapping[str, Any]) -> None:
+        node = frame.compiled.nodes[index]
+        if frame.compiled.scxml:
+            self.internal.append(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
+        elif DONE in node.edges:
+            self.internal.append(Event(DONE, outputs, to=frame.activations[node.name], exact=True))

@@ -2,122 +2,145 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from dsc.engine.compiler import Chart, CompiledPlot, Node
-from dsc.engine.configuration import FrameState
-from dsc.model.states import HistoryState
-from knowledge_base.errors import UnknownNameError
+from dsc.engine.configuration import Configuration
+from dsc.engine.state import NOTHING, FrameState
+from dsc.engine.tables import CompiledPlot
+from dsc.events import Event
 
 
-@dataclass(slots=True, eq=False)
 class Frame:
-    """One running plot; `active` maps node index to activation serial."""
+    """One running plot; see `FrameState`. Mappings are replaced, not changed: the state keeps the old ones.
 
-    serial: int
-    compiled: CompiledPlot
-    variables: dict[str, Any]
-    parent: Frame | None = None
-    host: int = -1
-    active: dict[int, int] = field(default_factory=dict)
-    children: dict[int, Frame] = field(default_factory=dict)
-    history: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    Attributes:
+        children: the plots inside that this step has to do with, by the name of the state that holds each.
+        resting: the other plots inside, as they were.
+        parent, host: the frame around it and the name of the state there that holds it.
+        prefix: what its states' paths begin with.
+        depth: how many plots it is inside of.
+        gone: whether the state that holds it was left.
+    """
 
-    def node(self, index: int) -> Node:
-        """The node of that index."""
-        return self.compiled.nodes[index]
+    __slots__ = (
+        "activations", "children", "compiled", "configuration", "depth", "gone", "host", "kept", "parent",
+        "prefix", "resting", "serial", "variables", "was",
+    )  # fmt: skip
 
-    def path(self, index: int) -> str:
-        """The state's path from the outermost plot."""
-        name = self.node(index).name
-        return f"{self.parent.path(self.host)}/{name}" if self.parent else name
+    def __init__(
+        self, serial: int, compiled: CompiledPlot, configuration: Configuration, variables: Mapping[str, Any]
+    ) -> None:
+        self.serial = serial
+        self.compiled = compiled
+        self.configuration = configuration
+        self.variables = variables
+        self.activations: Mapping[str, int] = NOTHING
+        self.children: dict[str, Frame] = {}
+        self.resting: Mapping[str, FrameState] = NOTHING
+        self.kept: tuple[tuple[str, Event], ...] = ()
+        self.parent: Frame | None = None
+        self.host = ""
+        self.prefix = ""
+        self.depth = 0
+        self.gone = False
+        self.was: FrameState | None = None
+
+    def put_into(self, parent: Frame, host: str) -> None:
+        """Make it the content of a state of another frame."""
+        self.parent, self.host = parent, host
+        self.prefix = f"{parent.prefix}{host}/"
+        self.depth = parent.depth + 1
+        parent.children[host] = self
+
+    def take_out(self) -> None:
+        """Its state was left."""
+        self.gone = True
+        if self.parent is not None:
+            del self.parent.children[self.host]
+
+    def forget(self, host: str) -> None:
+        """A plot inside at rest was left, without this step having to do anything in it."""
+        self.resting = {name: state for name, state in self.resting.items() if name != host}
+
+    def child(self, host: str) -> Frame | None:
+        """The plot inside that state, if there is one."""
+        found = self.children.get(host)
+        if found is None and host in self.resting:
+            found = thaw(self.resting[host], self, host)
+            self.forget(host)
+        return found
+
+    def inner(self) -> list[Frame]:
+        """The frames directly inside, in document order."""
+        for host in self.resting:
+            self.child(host)
+        found = list(self.children.values())
+        if len(found) > 1:
+            found.sort(key=lambda frame: self.compiled.index[frame.host])
+        return found
+
+    def frames(self) -> list[Frame]:
+        """This frame and all inside it, in document order."""
+        return [self, *(frame for child in self.inner() for frame in child.frames())]
 
     def position(self, index: int) -> tuple[int, ...]:
         """Its place in document order through all plots: what is inside comes after, with a longer tuple."""
-        return (*self.parent.position(self.host), index) if self.parent else (index,)
+        if self.parent is None:
+            return (index,)
+        return (*self.parent.position(self.parent.compiled.index[self.host]), index)
 
-    @property
-    def depth(self) -> int:
-        """How many plots it is inside of."""
-        return 1 + self.parent.depth if self.parent else 0
-
-    def around(self, index: int) -> list[int]:
-        """The node and the nodes around it in this plot, innermost first, without the plot itself."""
-        return [index, *self.compiled.ancestors(index)[:-1]]
-
-    def is_active(self, state: str) -> bool:
-        """Whether the state of that name is active in this plot."""
-        return self.compiled.index.get(state) in self.active
-
-    def remember(self, index: int) -> None:
-        """Record what is active inside a node that is about to be left, for its histories (SCXML 3.10)."""
-        for history in self.node(index).histories:
-            state = self.node(history).state
-            if isinstance(state, HistoryState) and state.history == "deep":
-                holders = {self.node(active).parent for active in self.active}
-                kept = [at for at in self.active if at not in holders and self.compiled.inside(at, index)]
-            else:
-                kept = [child for child in self.node(index).children if child in self.active]
-            self.history[history] = tuple(sorted(kept))
-
-    def leaves(self) -> Iterator[tuple[Frame, int]]:
-        """All active states, here and in plots inside, that have no active state inside; document order."""
-        inner = {self.node(index).parent for index in self.active}
-        for index in sorted(self.active):
-            if index in self.children:
-                yield from self.children[index].leaves()
-            elif index not in inner:
-                yield self, index
-
-    def frames(self) -> Iterator[Frame]:
-        """This frame and all inside it."""
-        yield self
-        for child in self.children.values():
-            yield from child.frames()
+    def that(self, wanted: Callable[[Frame | FrameState], bool]) -> list[Frame]:
+        """This frame and those inside it, as far as they are wanted; only these are thawed."""
+        found = [self] if wanted(self) else []
+        if self.children:
+            for child in self.children.values():
+                found += child.that(wanted)
+        for host, state in self.resting.items():
+            if wanted(state) or (state.children and any(map(wanted, state.frames()))):
+                self.forget(host)
+                found += thaw(state, self, host).that(wanted)
+        return found
 
 
-def thaw(state: FrameState, chart: Chart, parent: Frame | None = None, host: int = -1) -> Frame:
-    """A frame to work on; raises `UnknownNameError` if the chart no longer has the plot or the state."""
-    compiled = chart.compiled(state.plot) if state.form is None else chart.bind(state.form)
-    index = compiled.index
-    frame = Frame(state.serial, compiled, dict(state.variables), parent, host)
-    frame.active = {_index(index, name, compiled): serial for name, serial in state.active.items()}
-    for name, remembered in state.history.items():
-        frame.history[_index(index, name, compiled)] = tuple(_index(index, one, compiled) for one in remembered)
-    for name, child in state.children.items():
-        at = _index(index, name, compiled)
-        frame.children[at] = thaw(child, chart, frame, at)
+def thaw(state: FrameState, parent: Frame | None = None, host: str = "") -> Frame:
+    """A frame to work on; what runs inside it stays at rest until it is asked for."""
+    frame = Frame(state.serial, state.compiled, state.configuration, state.variables)
+    if parent is not None:
+        frame.put_into(parent, host)
+    frame.activations = state.activations
+    frame.resting = state.children
+    frame.kept = state.kept
+    frame.was = state
     return frame
 
 
-def _index(index: Mapping[str, int], name: str, compiled: CompiledPlot) -> int:
-    # Regions have no name of their own in the table: they are stored as `#index`.
-    found = int(name[1:]) if name.startswith("#") else index.get(name)
-    if found is None:
-        raise UnknownNameError(
-            f"plot '{compiled.plot.name}' no longer has the state '{name}'", found=name, valid=index
-        )
-    return found
-
-
 def freeze(frame: Frame) -> FrameState:
-    """The frame as a value."""
+    """The frame as a value: the very one it was made from, if nothing has changed."""
+    children = _frozen(frame) if frame.children else frame.resting
+    was = frame.was
+    if (
+        was is not None
+        and frame.configuration is was.configuration
+        and frame.variables is was.variables
+        and frame.activations is was.activations
+        and frame.kept is was.kept
+        and _same(children, was.children)
+    ):
+        return was
     return FrameState(
-        serial=frame.serial,
-        plot=frame.compiled.plot.name,
-        form=frame.compiled.form,
-        variables=dict(frame.variables),
-        active={_name(frame, index): frame.active[index] for index in sorted(frame.active)},
-        children={frame.node(index).name: freeze(frame.children[index]) for index in sorted(frame.children)},
-        history={
-            frame.node(index).name: tuple(_name(frame, one) for one in frame.history[index])
-            for index in sorted(frame.history)
-        },
+        frame.serial, frame.compiled, frame.configuration, frame.variables, frame.activations, children, frame.kept
     )
 
 
-def _name(frame: Frame, index: int) -> str:
-    node = frame.node(index)
-    return node.name if node.state is not None else f"#{index}"
+def _frozen(frame: Frame) -> Mapping[str, FrameState]:
+    """The plots inside, in document order."""
+    children = {**frame.resting, **{host: freeze(child) for host, child in frame.children.items()}}
+    if len(children) > 1:
+        index = frame.compiled.index
+        return {host: children[host] for host in sorted(children, key=lambda host: index[host])}
+    return children
+
+
+def _same(one: Mapping[str, FrameState], other: Mapping[str, FrameState]) -> bool:
+    return one is other or (len(one) == len(other) and all(child is other.get(name) for name, child in one.items()))

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from dsc.engine.compiler import Chart
-from dsc.engine.configuration import MachineState
-from dsc.engine.execution import Execution
+from dsc.engine.macrostep import Macrostep
+from dsc.engine.moving import move
 from dsc.engine.situation import Situation
+from dsc.engine.state import MachineState
 from dsc.engine.steps import Step
+from dsc.engine.tables import Chart
 from dsc.events import Event
 
 
@@ -21,9 +22,9 @@ def start(chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situ
         InputError: the plot is unknown, or a parameter is missing or unknown.
         RunawayError: the chart does not come to rest.
     """
-    execution = Execution(chart, situation)
-    execution.start(plot, arguments)
-    return execution.finish(None, handled=True)
+    macrostep = Macrostep(chart, situation, MachineState())
+    macrostep.start(plot, arguments)
+    return macrostep.finish(None, handled=True)
 
 
 def step(chart: Chart, state: MachineState, event: Event | None, situation: Situation) -> Step:
@@ -36,18 +37,22 @@ def step(chart: Chart, state: MachineState, event: Event | None, situation: Situ
     """
     if state.root is None:
         return Step(state, event, handled=False)
-    execution = Execution(chart, situation, state)
-    handled = execution.react(event)
-    return execution.finish(event, handled=handled)
+    if event is not None and event.to is None and event.frame is None:
+        moved = move(state, state.root, event, situation)
+        if moved is not None:
+            return moved
+    macrostep = Macrostep(chart, situation, state)
+    handled = macrostep.react(event)
+    return macrostep.finish(event, handled=handled)
 
 
 def leave(chart: Chart, state: MachineState, situation: Situation) -> Step:
     """Leave all active states without reaching the end: their exit actions put the skills at rest (S0.15)."""
     if state.root is None:
         return Step(state, None, handled=False)
-    execution = Execution(chart, situation, state)
-    execution.leave()
-    return execution.finish(None, handled=False)
+    macrostep = Macrostep(chart, situation, state)
+    macrostep.leave()
+    return macrostep.finish(None, handled=False)
 
 
 @dataclass(slots=True)

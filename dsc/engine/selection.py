@@ -1,4 +1,4 @@
-"""Which transitions are taken: inner before outer, document order, over all running plots at once.
+"""Which transitions are taken: inner before outer, document order, over running plots inside each other at once.
 
 SCXML 1.0, section 3.13 (selectTransitions, removeConflictingTransitions), with plots inside plots as part of
 one tree and with the scopes of events (S0.6, S2.5).
@@ -8,14 +8,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from dsc.engine.compiler import Edge
 from dsc.engine.entering import effective_targets
 from dsc.engine.frames import Frame
-from dsc.events import AFTER, Event
+from dsc.engine.tables import CompiledPlot, Edge, Node
+from dsc.events import AFTER, EVERY
 
 Guard = Callable[[Frame, Edge], bool]
 """Whether an edge's guard holds in its frame."""
+
+
+class Addressed(NamedTuple):
+    """The trigger that is an event for one state: that state alone may take it, or those around it as well."""
+
+    event: str
+    node: int
+    exact: bool
+    number: int | None
+
+
+Trigger = str | Addressed | None
+"""What sets transitions off in a plot: an event that all its states see, one for a state, or a change of the world."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,107 +39,117 @@ class Enabled:
     frame: Frame
     edge: Edge
 
-    @property
-    def domain(self) -> int:
-        """Index of the innermost composite (or plot) around source and targets; -1 if nothing is left.
-
-        SCXML appendix D: getTransitionDomain, findLCCA. A source that is only left internally is its own domain.
-        """
-        if self.edge.target is None:
-            return -1
-        if self.edge.internal:
-            return self.edge.source
-        compiled = self.frame.compiled
-        real = effective_targets(compiled, self.edge.targets, self.frame.history)
-        around = set.intersection(*(set(compiled.ancestors(target)) for target in real))
-        return next(
-            index for index in compiled.ancestors(self.edge.source) if index in around and _is_scope(self.frame, index)
-        )
-
     def left(self) -> set[tuple[Frame, int]]:
         """Everything that is exited: active states inside the domain, and all plots inside those."""
-        if self.edge.target is None:
-            return set()
-        domain = self.domain
-        found = set()
-        for index in self.frame.active:
-            if self.frame.compiled.inside(index, domain):
-                found.add((self.frame, index))
-                if index in self.frame.children:
-                    found.update(everything(self.frame.children[index]))
+        compiled, configuration = self.frame.compiled, self.frame.configuration
+        indices = left_by(compiled, self.edge, configuration.active, dict(configuration.history))
+        found = {(self.frame, index) for index in indices}
+        for child in self.frame.inner():
+            if compiled.index[child.host] in indices:
+                found.update(everything(child))
         return found
 
 
-def _is_scope(frame: Frame, index: int) -> bool:
-    node = frame.node(index)
+def left_by(
+    compiled: CompiledPlot, edge: Edge, active: Iterable[int], remembered: dict[int, tuple[int, ...]]
+) -> set[int]:
+    """The active nodes of its own plot that an edge leaves."""
+    if not edge.targets:
+        return set()
+    around = domain(compiled, edge, remembered)
+    return {index for index in active if compiled.inside(index, around)}
+
+
+def domain(compiled: CompiledPlot, edge: Edge, remembered: dict[int, tuple[int, ...]]) -> int:
+    """Index of the innermost composite (or plot) around source and targets.
+
+    SCXML appendix D: getTransitionDomain, findLCCA. A source that is only left internally is its own domain.
+    """
+    if edge.internal:
+        return edge.source
+    real = effective_targets(compiled, edge.targets, remembered)
+    around = set.intersection(*(set(compiled.nodes[target].around) for target in real))
+    return next(
+        index for index in compiled.nodes[edge.source].around if index in around and _is_scope(compiled.nodes[index])
+    )
+
+
+def _is_scope(node: Node) -> bool:
     return not node.orthogonal and not node.transparent
 
 
 def everything(frame: Frame) -> Iterable[tuple[Frame, int]]:
     """All active states of a frame and of the frames inside it."""
-    return [(inner, index) for inner in frame.frames() for index in inner.active]
+    return [(inner, index) for inner in frame.frames() for index in inner.configuration.active]
 
 
-def select(root: Frame, event: Event | None, guard: Guard) -> list[Enabled]:
-    """The transitions that `event` (or, with `None`, a change of the world) enables, free of conflicts."""
-    visible = _scope(root, event)
-    chosen: dict[tuple[int, int], Enabled] = {}
-    for leaf_frame, leaf in root.leaves():
-        enabled = _first_enabled(leaf_frame, leaf, event, visible, guard)
-        if enabled is not None:
-            chosen.setdefault((enabled.frame.serial, id(enabled.edge)), enabled)
-    return _without_conflicts(list(chosen.values()))
+def select(root: Frame, trigger: Trigger, guard: Guard) -> tuple[list[Enabled], list[Enabled]]:
+    """The transitions that a trigger enables in a frame and all frames inside it.
+
+    Returns:
+        Those that are taken, free of conflicts; and those whose states have to wait before they can be left.
+    """
+    enabled: dict[tuple[Frame, Edge], Enabled] = {}
+    for frame, leaf in _leaves(root):
+        found = _first_enabled(frame, leaf, trigger, guard)
+        if found is not None:
+            enabled.setdefault((found.frame, found.edge), found)
+    taken = _without_conflicts([one for one in enabled.values() if not _has_to_wait(one)])
+    late = [one for one in enabled.values() if _has_to_wait(one)]
+    return taken, [one for one in late if not any(_is_inside(other, one) for other in taken)]
 
 
-def is_addressed(root: Frame, event: Event) -> bool:
-    """Whether the activation or plot that the event is for is still there."""
-    if event.to is not None:
-        return any(event.to in frame.active.values() for frame in root.frames())
-    return event.frame is None or any(frame.serial == event.frame for frame in root.frames())
+def _has_to_wait(one: Enabled) -> bool:
+    return one.edge.source in one.frame.configuration.waiting and bool(one.edge.targets)
 
 
-def _scope(root: Frame, event: Event | None) -> Callable[[Frame, int], bool]:
-    if event is None or (event.to is None and event.frame is None):
-        return lambda _frame, _index: True
-    if event.to is None:
-        return lambda frame, _index: frame.serial == event.frame
-    for frame in root.frames():
-        for index, serial in frame.active.items():
-            if serial == event.to:
-                seen = {index} if event.exact else set(frame.around(index))
-                return lambda other, at, frame=frame: other is frame and at in seen  # type: ignore[misc]
-    return lambda _frame, _index: False
+def _leaves(frame: Frame) -> Iterator[tuple[Frame, int]]:
+    """All active states, here and in plots inside, that have no active state inside; document order."""
+    for index in frame.configuration.leaves:
+        inner = frame.child(frame.compiled.nodes[index].name)
+        if inner is None:
+            yield frame, index
+        else:
+            yield from _leaves(inner)
 
 
-def _first_enabled(
-    frame: Frame, leaf: int, event: Event | None, visible: Callable[[Frame, int], bool], guard: Guard
-) -> Enabled | None:
+def _first_enabled(frame: Frame, leaf: int, trigger: Trigger, guard: Guard) -> Enabled | None:
     for at, index in _outwards(frame, leaf):
-        for around in at.around(index):
-            if visible(at, around):
-                for edge in _edges(at, around, event):
-                    if guard(at, edge):
-                        return Enabled(at, edge)
+        for around in (index, *at.compiled.nodes[index].around[:-1]):
+            for edge in edges_of(at.compiled, around, trigger):
+                if guard(at, edge):
+                    return Enabled(at, edge)
     return None
 
 
 def _outwards(frame: Frame, index: int) -> Iterator[tuple[Frame, int]]:
     """The node, then the state that holds its plot, and so on to the outermost plot."""
-    at: Frame | None = frame
-    while at is not None:
-        yield at, index
-        index, at = at.host, at.parent
+    yield frame, index
+    while frame.parent is not None:
+        index, frame = frame.parent.compiled.index[frame.host], frame.parent
+        yield frame, index
 
 
-def _edges(frame: Frame, index: int, event: Event | None) -> tuple[Edge, ...]:
-    node = frame.node(index)
-    if event is None:
+def edges_of(compiled: CompiledPlot, index: int, trigger: Trigger) -> tuple[Edge, ...]:
+    """The transitions of a node that have the trigger, in order."""
+    node = compiled.nodes[index]
+    if trigger is None:
         return node.always
-    if event.name == AFTER:
-        return (node.timeouts[event.index][1],) if event.index is not None else ()
-    if frame.compiled.scxml:
-        return tuple(edge for name, edges in node.edges.items() if matches(name, event.name) for edge in edges)
-    return node.edges.get(event.name, ())
+    if isinstance(trigger, Addressed):
+        return _addressed_edges(compiled, index, trigger)
+    if compiled.scxml:
+        return tuple([edge for name, edges in node.edges.items() if matches(name, trigger) for edge in edges])
+    return node.edges.get(trigger, ())
+
+
+def _addressed_edges(compiled: CompiledPlot, index: int, trigger: Addressed) -> tuple[Edge, ...]:
+    is_seen = index == trigger.node if trigger.exact else index in (trigger.node, *compiled.nodes[trigger.node].around)
+    if not is_seen:
+        return ()
+    if trigger.number is None:
+        return edges_of(compiled, index, trigger.event)
+    timed = {AFTER: compiled.nodes[index].timeouts, EVERY: compiled.nodes[index].cycles}[trigger.event]
+    return (timed[trigger.number].edge,)
 
 
 def matches(descriptors: str, event: str) -> bool:

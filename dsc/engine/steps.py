@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
-from dsc.engine.configuration import MachineState
 from dsc.engine.situation import Decision
-from dsc.events import Event
+from dsc.engine.state import MachineState
+from dsc.events import AFTER, Event
 from dsc.model.plot import ActionPlot
 from knowledge_base.facts import Delta
 
@@ -52,11 +52,15 @@ class SwitchMode:
 
 @dataclass(frozen=True, slots=True)
 class StartTimer:
-    """Send the activation its timeout number `index` after `seconds`; dropped if it was left by then."""
+    """Send the activation the event, for its timeout or period number `index`, after `seconds`.
+
+    It is dropped if the state was left by then.
+    """
 
     activation: int
     index: int
     seconds: float
+    event: str = AFTER
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,16 +103,17 @@ class Taken:
     place: tuple[str | int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Bound:
+class Bound(NamedTuple):
     """A plot that became the content of a state (named by its path; empty for the outermost plot), as it runs."""
 
     state: str
     plot: ActionPlot
 
 
-@dataclass(frozen=True, slots=True)
-class Microstep:
+NO_CHANGE = Delta()
+
+
+class Microstep(NamedTuple):
     """Transitions taken together. States are named by their path from the root, e.g. `clear/execute/step_2`."""
 
     event: Event | None
@@ -126,8 +131,7 @@ class DecisionMade:
     decision: Decision
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(NamedTuple):
     """One macrostep: run to completion of one event.
 
     Attributes:
@@ -147,7 +151,7 @@ class Step:
     handled: bool
     microsteps: tuple[Microstep, ...] = ()
     decisions: tuple[DecisionMade, ...] = ()
-    knowledge: Delta = field(default_factory=Delta)
+    knowledge: Delta = NO_CHANGE
     output: tuple[Output, ...] = ()
     emitted: tuple[Event, ...] = ()
     errors: tuple[str, ...] = ()

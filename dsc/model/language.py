@@ -32,8 +32,8 @@ class Frozen(BaseModel):
 
 UNKNOWN_FORM = "unknown_form"
 """Type of the validation error for data with none of a union's telling keys."""
-MISNAMED = "misnamed"
-"""Type of the validation error for a wrong name; its context has the `path` of the name in the form."""
+LOCATED = "located"
+"""Type of the validation error whose context has the `path` of what is wrong inside the form."""
 
 
 def by_key(*keys: str) -> Discriminator:

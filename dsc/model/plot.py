@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping
-from typing import Any, Literal
+from collections.abc import Container, Iterable, Iterator, Mapping
+from typing import Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-from dsc.model.language import MISNAMED, ConditionField, EffectField, Frozen, TermField
+from dsc.model.language import LOCATED, ConditionField, EffectField, Frozen, TermField
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -45,7 +45,7 @@ class Parameter(Frozen):
 
 
 class Variable(Frozen):
-    """A variable of the plot's scope; gone when the plot is left (S0.7)."""
+    """A variable or output of the plot's scope; gone when the plot is left (S0.7)."""
 
     type: str
     initial: TermField | None = None
@@ -103,6 +103,8 @@ class ActionPlot(Frozen):
         parameters: values handed in.
         variables: its own variables.
         receives: events from outside (an operator, a user interface) that it listens to, with their attributes.
+        outputs: typed values handed back: inside, they are assigned and read like variables; when the plot reaches
+            its final state, they are the attributes of the holder's `done` (S2.1).
         emits: outcome events with their attributes and types; whoever holds the plot must wire them all.
         when: as a candidate, the condition under which it fits (bottom-up, S0.4).
         implements: the planning action it carries out; its parameters are named as that action's.
@@ -120,6 +122,7 @@ class ActionPlot(Frozen):
     about: str | None = None
     parameters: dict[str, Parameter] = Field(default_factory=dict)
     variables: dict[str, Variable] = Field(default_factory=dict)
+    outputs: dict[str, Variable] = Field(default_factory=dict)
     receives: dict[str, dict[str, str] | None] = Field(default_factory=dict)
     emits: dict[str, dict[str, str] | None] = Field(default_factory=dict)
     when: ConditionField | None = None
@@ -132,6 +135,7 @@ class ActionPlot(Frozen):
     generated: bool = Field(default=False, strict=True)
     profile: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
+    _content: str | None = PrivateAttr(default=None)
 
     def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
         """The same plot that remembers where its parts stand in the text it was read from."""
@@ -154,10 +158,10 @@ class ActionPlot(Frozen):
         for name, _, path in self.walk():
             if _STATE_NAME.fullmatch(name) is None:
                 wrong = "'{name}' is no name for a state: it has a slash, begins with # or is empty"
-                raise PydanticCustomError(MISNAMED, wrong, {"name": name, "path": path})
+                raise PydanticCustomError(LOCATED, wrong, {"name": name, "path": path})
             if name in seen:
                 twice = "two states are named '{name}'; names are unique in a plot"
-                raise PydanticCustomError(MISNAMED, twice, {"name": name, "path": path})
+                raise PydanticCustomError(LOCATED, twice, {"name": name, "path": path})
             seen.add(name)
         return self
 
@@ -167,32 +171,38 @@ class ActionPlot(Frozen):
             name = path[-1]
             if not is_plain_name(str(name)):
                 wrong = "'{name}' is no name for a variable: the language folds names to lower case"
-                raise PydanticCustomError(MISNAMED, wrong, {"name": name, "path": path})
-            if path[0] == "variables" and name in self.parameters:
-                twice = "'{name}' is a parameter and a variable"
-                raise PydanticCustomError(MISNAMED, twice, {"name": name, "path": path})
+                raise PydanticCustomError(LOCATED, wrong, {"name": name, "path": path})
+        self._is_declared_once("variable", self.variables, {"parameter": self.parameters})
+        self._is_declared_once("output", self.outputs, {"parameter": self.parameters, "variable": self.variables})
         return self
+
+    def _is_declared_once(self, kind: str, names: Iterable[str], others: Mapping[str, Container[str]]) -> None:
+        for name in names:
+            for other, declared in others.items():
+                if name in declared:
+                    context = {"name": name, "other": other, "kind": kind, "path": (f"{kind}s", name)}
+                    raise PydanticCustomError(LOCATED, "'{name}' is declared twice: as {other} and as {kind}", context)
 
     def _variable_paths(self) -> Iterator[Path]:
         """Everything that conditions and terms can only read as `?name` or `?event.name`."""
         yield from (("parameters", name) for name in self.parameters)
         yield from (("variables", name) for name in self.variables)
+        yield from (("outputs", name) for name in self.outputs)
         for group, events in (("emits", self.emits), ("receives", self.receives)):
             yield from ((group, event, name) for event, attributes in events.items() for name in attributes or ())
 
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
         """All states in document order, with their names and paths."""
-        yield from walk_states(self.states, ("states",))
+        yield from _walk(self.states, ("states",))
 
-    def scopes(self) -> Iterator[Mapping[str, AnyState]]:
-        """The states that stand side by side: of the plot, of each composite and region; transitions stay in one."""
-        yield self.states
+    def scopes(self) -> Iterator[Scope]:
+        """What holds states side by side: the plot, each composite and region; transitions stay in one."""
+        yield self
         for _, state, _ in self.walk():
             if isinstance(state, CompositeState):
-                yield state.states
+                yield state
             elif isinstance(state, OrthogonalState):
-                for region in state.regions.values():
-                    yield region.states
+                yield from state.regions.values()
 
     def state(self, name: str) -> AnyState:
         """The state of that name anywhere in the plot.
@@ -229,20 +239,27 @@ class ActionPlot(Frozen):
     def __hash__(self) -> int:
         return hash(self._text())
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """See pydantic; what was worked out about the content is not copied with it."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied._content = None  # noqa: SLF001  a plot, like this one
+        return copied
+
     def _text(self) -> str:
-        return json.dumps(self.to_form())
+        if self._content is None:  # a trace asks for the digest whenever a plot is bound
+            self._content = json.dumps(self.to_form())
+        return self._content
 
 
-def walk_states(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, AnyState, Path]]:
-    """These states, which stand at `path`, and all inside them, in document order."""
+def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, AnyState, Path]]:
     for name, state in states.items():
         here = (*path, name)
         yield name, state, here
         if isinstance(state, CompositeState):
-            yield from walk_states(state.states, (*here, "states"))
+            yield from _walk(state.states, (*here, "states"))
         elif isinstance(state, OrthogonalState):
             for region_name, region in state.regions.items():
-                yield from walk_states(region.states, (*here, "regions", region_name, "states"))
+                yield from _walk(region.states, (*here, "regions", region_name, "states"))
             yield from ((each, history, (*here, "connectors", each)) for each, history in state.connectors.items())
 
 

@@ -1,121 +1,68 @@
-"""The kinds of states. The kind follows from the key that is there: `use`, `dynamic`, `states`, `regions`, `final`."""
+"""The kinds of states and connectors; the kind follows from the key that is there, such as `use` or `states`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from dsc.model.actions import Action, Assign, Emit, Internal, InternalAction, Tell, flat
-from dsc.model.language import ConditionField, EffectField, Frozen, TermField
-from knowledge_base.language.expression import Constant, Term
+from dsc.model.actions import Action, InternalAction
+from dsc.model.connectors import ChoiceState, SelectState
+from dsc.model.language import ConditionField, Frozen, TermField
+from dsc.model.transitions import (
+    CyclicTransitions,
+    Duration,
+    FormPath,
+    Source,
+    TimedTransitions,
+    Transition,
+    Transitions,
+    as_tuple,
+)
 
-
-class Transition(Frozen):
-    """An edge of the chart; its trigger is the key it stands under.
-
-    Attributes:
-        target: name of the state to enter (`to`); none means: stay, only the actions happen.
-        guard: condition that must hold (`when`).
-        assign, tell, emit, arguments: internal actions in this order, written directly; `arguments` (`with`)
-            are the attributes of the emitted event.
-        do: more internal actions, before those.
-        rule: label of the contingency rule that put the transition there.
-        also: more targets, in other regions (only in profile `scxml`).
-        internal: a composite source is not left if the target is inside it (SCXML 3.5; only in profile `scxml`).
-    """
-
-    target: str | None = Field(default=None, alias="to")
-    guard: ConditionField | None = Field(default=None, alias="when")
-    do: tuple[InternalAction, ...] = ()
-    rule: str | None = None
-    also: tuple[str, ...] = ()
-    internal: bool = False
-    assign: dict[str, TermField] = Field(default_factory=dict)
-    tell: EffectField | None = None
-    emit: str | None = None
-    arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
-
-    @property
-    def targets(self) -> tuple[str, ...]:
-        """All states to enter."""
-        return () if self.target is None else (self.target, *self.also)
-
-    @property
-    def effect(self) -> tuple[Internal, ...]:
-        """All internal actions in order of execution."""
-        actions: list[Internal] = list(self.do)
-        if self.assign:
-            actions.append(Assign(assign=self.assign))
-        if self.tell is not None:
-            actions.append(Tell(tell=self.tell))
-        if self.emit is not None:
-            actions.append(Emit(emit=self.emit, arguments=self.arguments))
-        return tuple(actions)
-
-    @property
-    def emitted(self) -> tuple[str, ...]:
-        """The events its actions fire."""
-        return tuple(action.emit for action in flat(self.effect) if isinstance(action, Emit))
+Actions = Annotated[tuple[Action, ...], BeforeValidator(as_tuple)]
 
 
-class TimedTransition(Transition):
-    """A transition taken `seconds` after its state was entered, unless the state was left before."""
-
-    seconds: TermField
-
-    @field_validator("seconds")
-    @classmethod
-    def _is_a_duration(cls, value: Term) -> Term:
-        if isinstance(value, Constant) and (isinstance(value.value, str | bool) or value.value < 0):
-            raise ValueError(f"a number of seconds was expected; found {value.value!r}")
-        return value
-
-
-def _as_transitions(value: Any) -> Any:
-    many = value if isinstance(value, list | tuple) else [value]
-    return tuple({"to": one} if isinstance(one, str) else one for one in many)
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list | tuple) else (value,)
-
-
-Transitions = Annotated[tuple[Transition, ...], BeforeValidator(_as_transitions)]
-TimedTransitions = Annotated[tuple[TimedTransition, ...], BeforeValidator(_as_tuple)]
-Actions = Annotated[tuple[Action, ...], BeforeValidator(_as_tuple)]
-
-
-class State(Frozen):
+class State(Source):
     """A simple state: a configuration of the skill layer, set in entry and reverted by exit (S0.15).
 
     Attributes:
-        entry, exit: external actions; in profile `scxml` internal ones too.
+        entry, exit, on_break: external actions; in profile `scxml` internal ones too. `on_break` runs in place of
+            `exit` when the state is interrupted: left by a transition that is not its own (S2.3). If it is empty,
+            `exit` runs then too.
+        at_least: seconds for which the state's own transitions wait (S3.1); an event that one of them would take
+            is kept and offered again when the time has passed. The upper bound is `after`.
         on: event -> transitions, tried in order; `done` is the completion of the state's content.
         after: timeouts.
+        every: reactions that come again and again while the state is active (S3.2).
         always: transitions without trigger, taken as soon as their guard holds.
     """
 
-    about: str | None = None
     entry: Actions = ()
     exit: Actions = ()
+    on_break: Actions = ()
+    at_least: Duration | None = None
     on: dict[str, Transitions] = Field(default_factory=dict)
     after: TimedTransitions = ()
+    every: CyclicTransitions = ()
     always: Transitions = ()
 
-    def transitions(self) -> Iterator[tuple[str, Transition]]:
-        """Every outgoing transition with the label of its trigger."""
-        for _, trigger, transition in self.placed_transitions():
-            yield trigger, transition
+    def blocks(self) -> Iterator[tuple[str, Actions]]:
+        """Its actions, by the keys under which they stand."""
+        yield "entry", self.entry
+        yield "exit", self.exit
+        yield "on_break", self.on_break
 
-    def placed_transitions(self) -> Iterator[tuple[tuple[str | int, ...], str, Transition]]:
-        """As `transitions`, each with its path inside the state, e.g. `("on", "grasped", 0)`."""
+    def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
+        """Every outgoing transition, with its path such as `("on", "grasped", 0)` and the label of its trigger."""
         for event, transitions in self.on.items():
             for number, transition in enumerate(transitions):
                 yield ("on", event, number), event, transition
         for number, timed in enumerate(self.after):
             yield ("after", number), "after", timed
+        for number, cyclic in enumerate(self.every):
+            yield ("every", number), "every", cyclic
         for number, transition in enumerate(self.always):
             yield ("always", number), "always", transition
 
@@ -188,7 +135,7 @@ class FinalState(Frozen):
 
     about: str | None = None
     final: Literal[True]
-    entry: Annotated[tuple[InternalAction, ...], BeforeValidator(_as_tuple)] = ()
+    entry: Annotated[tuple[InternalAction, ...], BeforeValidator(as_tuple)] = ()
     emit: str | None = None
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
 
@@ -210,7 +157,8 @@ class HistoryState(Frozen):
 
 
 _KIND_OF_KEY = {"use": "submachine", "dynamic": "dynamic", "goal": "dynamic", "states": "composite",
-                "regions": "orthogonal", "final": "final", "history": "history"}  # fmt: skip
+                "regions": "orthogonal", "final": "final", "history": "history", "choice": "choice",
+                "select": "select"}  # fmt: skip
 
 
 def _kind(value: Any) -> str:
@@ -229,7 +177,9 @@ AnyState = Annotated[
     | Annotated[SubmachineState, Tag("submachine")]
     | Annotated[DynamicState, Tag("dynamic")]
     | Annotated[FinalState, Tag("final")]
-    | Annotated[HistoryState, Tag("history")],
+    | Annotated[HistoryState, Tag("history")]
+    | Annotated[ChoiceState, Tag("choice")]
+    | Annotated[SelectState, Tag("select")],
     Discriminator(_kind),
     BeforeValidator(_as_state),
 ]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dsc.engine.steps import Cancel, Output, SendLater, SetParameter, Start, StartTimer, SwitchMode
-from dsc.events import SKILL_ERROR, TIMED_OUT, Event
+from dsc.events import EVERY, SKILL_ERROR, TIMED_OUT, Event
 from dsc.skills import Clock, Component, Outcome, SkillCall
 from knowledge_base.errors import UnknownNameError
 
@@ -34,10 +34,9 @@ class SkillMessage:
 
 @dataclass(frozen=True, slots=True)
 class TimerMessage:
-    """A timeout is due."""
+    """A timer is due."""
 
-    activation: int
-    index: int
+    timer: StartTimer
 
 
 class Dispatcher:
@@ -55,7 +54,7 @@ class Dispatcher:
         self._running: dict[str, tuple[Start, asyncio.Task[None]]] = {}
         self._configuring: dict[str, asyncio.Task[None]] = {}
         self._ending: set[asyncio.Task[None]] = set()
-        self._timers: dict[tuple[int, int], asyncio.TimerHandle] = {}
+        self._timers: dict[tuple[int, str, int], asyncio.TimerHandle] = {}
         self._sent: dict[int, asyncio.TimerHandle] = {}
         self._last_sent = 0
 
@@ -69,8 +68,14 @@ class Dispatcher:
 
     @property
     def waiting(self) -> bool:
-        """Whether any answer or timeout is still to come."""
-        return bool(self._running) or bool(self._timers) or bool(self._sent)
+        """Whether any answer or timeout is still to come; periods, which always are, do not count."""
+        timeouts = any(event != EVERY for _, event, _ in self._timers)
+        return bool(self._running) or timeouts or bool(self._sent)
+
+    @property
+    def periods(self) -> frozenset[tuple[int, int]]:
+        """Activation and number of every period that passes at present."""
+        return frozenset((activation, number) for activation, event, number in self._timers if event == EVERY)
 
     def dispatch(self, output: Output) -> None:
         """Carry out one output of the machine.
@@ -184,9 +189,8 @@ class Dispatcher:
             self._timers.pop(key).cancel()
 
     def _start_timer(self, timer: StartTimer) -> None:
-        message = TimerMessage(timer.activation, timer.index)
-        handle = asyncio.get_running_loop().call_later(timer.seconds, self._timer_due, message)
-        self._timers[timer.activation, timer.index] = handle
+        handle = asyncio.get_running_loop().call_later(timer.seconds, self._timer_due, timer)
+        self._timers[timer.activation, timer.event, timer.index] = handle
 
     def _send_later(self, later: SendLater) -> None:
         number = self._last_sent = self._last_sent + 1
@@ -197,9 +201,9 @@ class Dispatcher:
 
         self._sent[number] = asyncio.get_running_loop().call_later(later.seconds, due)
 
-    def _timer_due(self, message: TimerMessage) -> None:
-        del self._timers[message.activation, message.index]
-        self._post(message)
+    def _timer_due(self, timer: StartTimer) -> None:
+        del self._timers[timer.activation, timer.event, timer.index]
+        self._post(TimerMessage(timer))
 
     def _configure(self, component: Component, change: Callable[[], Awaitable[None]]) -> None:
         before = self._configuring.get(component.name)

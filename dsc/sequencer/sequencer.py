@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
-from dsc.engine.steps import Start, Step
+from dsc.engine.steps import Start, StartTimer, Step
 from dsc.errors import RunawayError
-from dsc.events import AFTER, RESERVED, Event
+from dsc.events import EVERY, RESERVED, Event
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.dispatcher import Dispatcher, SkillMessage, TimerMessage
 from dsc.sequencer.tracing import StepTracer
@@ -51,6 +51,8 @@ class RunEnd:
 
 
 Message = SkillMessage | TimerMessage | KnowledgeMessage | Event
+StepListener = Callable[[Step], None]
+"""Is told every macrostep; must not block."""
 
 
 @dataclass(slots=True)
@@ -91,6 +93,13 @@ class Sequencer:
         self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait)
         self._open_ended = open_ended
         self._caused_by: dict[str, int] = {}
+        self._listeners: list[StepListener] = []
+        self._coming: set[asyncio.TimerHandle] = set()
+        self._in_vain: set[tuple[int, int]] = set()
+
+    def listen(self, listener: StepListener) -> None:
+        """Tell `listener` every macrostep from now on, before its actions leave."""
+        self._listeners.append(listener)
 
     def working_for(self, action_id: str) -> frozenset[str]:
         """Names of the components that carry out skills for the content of the state that started `action_id`."""
@@ -99,8 +108,12 @@ class Sequencer:
         inside = frozenset() if owner is None else self.machine.state.activations_inside(owner)
         return frozenset(start.component for start in started if start.activation in inside)
 
-    def post(self, event: Event) -> None:
+    def post(self, event: Event, *, after: float = 0.0) -> None:
         """Hand in an event from outside, e.g. an operator's `stop`; from the loop's own thread.
+
+        Args:
+            event: what happened.
+            after: seconds until it comes; meanwhile the run does not end for want of things to come.
 
         Raises:
             InputError: the event is one that only the executive itself fires, e.g. `done`, or an attribute is no
@@ -108,16 +121,21 @@ class Sequencer:
         """
         if event.name in RESERVED:
             raise InputError(f"the event '{event.name}' is fired by the executive itself", found=event.name)
-        self._inbox.put_nowait(replace(event, attributes=_plain_data(event)))
+        self._hand_in(event._replace(attributes=_plain_data(event)), after)
 
-    def change(self, delta: Delta, author: str) -> None:
+    def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
         """Hand in a change of knowledge that somebody else made; from the loop's own thread.
+
+        Args:
+            delta: what is different now.
+            author: who says so.
+            after: as for `post`.
 
         Raises:
             InputError: the change contradicts the schema; nothing was changed.
         """
         self.knowledge.overlay().apply(delta)
-        self._inbox.put_nowait(KnowledgeMessage(delta, author))
+        self._hand_in(KnowledgeMessage(delta, author), after)
 
     async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
         """Run the plot until it ends, or until nothing can happen any more.
@@ -136,6 +154,8 @@ class Sequencer:
                     break
                 self._take(await self._inbox.get(), progress)
         finally:
+            for handle in self._coming:
+                handle.cancel()
             self._leave(progress)
             untaken = await self.dispatcher.close()
             unsubscribe()
@@ -157,13 +177,29 @@ class Sequencer:
 
     def _leave(self, progress: _Progress) -> None:
         """Wherever the run ends, exit actions put the components at rest; a finished machine has nothing to leave."""
+        if self.machine.state.root is None:
+            return
         try:
             self._commit(self.machine.leave(self._situation()), progress)
         except InputError as error:
             progress.problem = progress.problem or str(error)
 
+    def _hand_in(self, message: Message, after: float) -> None:
+        if after <= 0:
+            self._inbox.put_nowait(message)
+            return
+
+        def due() -> None:
+            self._coming.discard(handle)
+            self._inbox.put_nowait(message)
+
+        handle = asyncio.get_running_loop().call_later(after, due)
+        self._coming.add(handle)
+
     def _idle(self) -> bool:
-        return not self._open_ended and self._inbox.empty() and not self.dispatcher.waiting
+        """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
+        coming = self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.periods <= self._in_vain
+        return not self._open_ended and self._inbox.empty() and not coming
 
     def _situation(self) -> KnowledgeSituation:
         return KnowledgeSituation(self.knowledge, self.library)
@@ -171,7 +207,9 @@ class Sequencer:
     def _take(self, message: Message, progress: _Progress) -> None:
         try:
             event = self._received(message)
+            before = self.machine.state
             step = self.machine.send(event, self._situation())
+            self._note_periods(message, in_vain=step.state == before and _is_vain(step))
             if isinstance(message, SkillMessage) and message.final:
                 self.dispatcher.settle(message.start)
             self._commit(step, progress)
@@ -179,6 +217,12 @@ class Sequencer:
                 self._unhandled(message, event, progress)
         except (RunawayError, InputError) as error:
             progress.problem = str(error)
+
+    def _note_periods(self, message: Message, *, in_vain: bool) -> None:
+        if not isinstance(message, TimerMessage) or not in_vain:
+            self._in_vain.clear()
+        elif message.timer.event == EVERY:
+            self._in_vain.add((message.timer.activation, message.timer.index))
 
     def _received(self, message: Message) -> Event | None:
         """Apply what the message observed; the event the machine shall see, if any."""
@@ -192,8 +236,10 @@ class Sequencer:
             return message
         if isinstance(message, TimerMessage):
             self.trace.cause = None
-            event = Event(AFTER, to=message.activation, exact=True, index=message.index)
-            self.trace.cause = self._tracer.event(event, "timer")
+            timer = message.timer
+            event = Event(timer.event, to=timer.activation, exact=True, number=timer.index)
+            if timer.event != EVERY:  # most periods pass without anything happening; if not, the step says so
+                self.trace.cause = self._tracer.event(event, "timer")
             return event
         start, outcome = message.start, message.outcome
         name = start.names.get(outcome.event, outcome.event)
@@ -209,6 +255,8 @@ class Sequencer:
 
     def _commit(self, step: Step, progress: _Progress) -> None:
         """First what the chart told becomes knowledge, then actions leave."""
+        for listener in self._listeners:
+            listener(step)
         self._tracer.step(step)
         self._tracer.decisions(step)
         self._apply(step.knowledge, CHART)
@@ -229,6 +277,12 @@ class Sequencer:
             skill = f"{message.start.component}.{message.start.skill}"
             why = event.attributes.get("reason") if event.name in RESERVED else None
             progress.problem = f"nobody handles '{event.name}' of {skill}" + (f": {why}" if why else "")
+
+
+def _is_vain(step: Step) -> bool:
+    """Whether nothing came of it but the next period; in the same state and world, nothing ever will."""
+    only_timers = all(isinstance(output, StartTimer) for output in step.output)
+    return only_timers and not step.knowledge and not step.emitted
 
 
 def _plain_data(event: Event) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from dsc.model.language import MISNAMED, UNKNOWN_FORM
+from dsc.model.language import LOCATED, UNKNOWN_FORM
 from dsc.text.yaml import Document, FormPath
 from knowledge_base.errors import InputError, UnknownNameError, shortened
 
@@ -21,6 +21,7 @@ Location = tuple[str | int, ...]
 _PLAIN = {
     "missing": "the key '{key}' is missing",
     "string_type": "text was expected",
+    "invalid_key": "a key is a name",
     "dict_type": "a mapping of names was expected",
     "model_type": "a mapping was expected",
     "model_attributes_type": "a mapping was expected",
@@ -75,7 +76,7 @@ def _message(details: ErrorDetails) -> str:
     kind = details["type"]
     if kind == "value_error":
         return _said_by(details["ctx"]["error"])
-    if kind == MISNAMED:
+    if kind == LOCATED:
         return details["msg"]
     if kind == UNKNOWN_FORM:
         return f"{details['msg']}; found {_in_yaml(details['input'])}"
@@ -121,9 +122,12 @@ def _follow(loc: Location, data: Any, schema: _Schema) -> tuple[FormPath, list[_
             continue
         if isinstance(data, list):
             data = dict(enumerate(data))
-        if isinstance(data, Mapping) and element in data:
-            data = data[element]
-            path.append(element)
+        # The model keeps the keys of cases as text; in the file they may be numbers and truth values.
+        for key in data if isinstance(data, Mapping) else ():
+            if element in {key, _in_yaml(key)}:
+                data = data[key]
+                path.append(key)
+                break
         nodes = [inner for node in nodes for inner in _into(node, element, schema)] or nodes
     return tuple(path), [form for node in nodes for form in _alternatives(node, schema)]
 

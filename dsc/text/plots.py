@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dsc.dynamic.library import Library
+from dsc.model.connectors import case_value
 from dsc.model.plot import ActionPlot
 from dsc.text.files import read_file
 from dsc.text.form import read_model
@@ -45,26 +46,19 @@ def plot_to_yaml(plot: ActionPlot) -> str:
     return dump(_short(plot.to_form()))
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of plot files, for editors."""
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "action plot",
-        **ActionPlot.model_json_schema(by_alias=True),
-    }
-
-
 _ORDER = (
-    "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "receives",
-    "emits", "seconds", "set", "to", "when", "of", "trigger", "switch", "use", "dynamic", "assign", "tell",
-    "emit", "with", "as", "within", "goal", "budget", "do", "then", "limit", "rule", "entry", "initial",
-    "final", "states", "regions", "on", "after", "always", "exit", "rules",
+    "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs",
+    "receives", "emits", "seconds", "set", "switch", "to", "pass", "when", "of", "trigger", "use", "dynamic",
+    "assign", "tell", "emit", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit", "rule",
+    "choice", "select", "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on",
+    "after", "every", "always", "exit", "on_break", "rules",
 )
-_SINGLE = frozenset({"entry", "exit", "after", "always", "event"})
+_SINGLE = frozenset({"entry", "exit", "on_break", "after", "every", "always", "event", "clear"})
 _NAMES = {
-    "on": "event", "states": "state", "connectors": "state", "regions": "region",
-    "parameters": "declaration", "variables": "declaration",
-    "emits": "attributes", "receives": "attributes", "with": "value", "as": "value", "assign": "value",
+    "on": "event", "states": "state", "connectors": "state", "regions": "region", "cases": "transition",
+    "parameters": "declaration", "variables": "declaration", "outputs": "declaration",
+    "emits": "attributes", "receives": "attributes", "with": "value", "pass": "value", "as": "value",
+    "assign": "value",
 }  # fmt: skip
 """Mappings whose keys are people's names, which keep their order, and what stands under such a name."""
 
@@ -72,18 +66,24 @@ _NAMES = {
 def _short(node: Any, role: str = "plot") -> Any:
     """Lists of one and mappings that only say `to` or `type` in their short spelling, keys in reading order."""
     if isinstance(node, list):
-        short = [_short(one, "transition" if role in {"event", "always"} else "element") for one in node]
+        short = [_short(one, "transition" if role in {"event", "always", "choice"} else "element") for one in node]
         return short[0] if len(short) == 1 and role in _SINGLE else short
     if not isinstance(node, dict) or role == "attributes":
         return node
     if role in _NAMES:
-        return {name: _short(one, _NAMES[role]) for name, one in node.items()}
-    if role in {"event", "transition"} and set(node) == {"to"}:
+        return {_key(name, role): _short(one, _NAMES[role]) for name, one in node.items()}
+    if role in {"event", "transition", "else"} and set(node) == {"to"}:
         return node["to"]
     if role == "declaration" and set(node) == {"type"}:
         return node["type"]
     keys = list(node) if "do" in node else sorted(node, key=_rank)
     return {key: _short(node[key], key) for key in keys}
+
+
+def _key(name: str, role: str) -> str | int | float:
+    """The key of a case as YAML writes that constant; other names as they are."""
+    value = case_value(name) if role == "cases" else name
+    return name if isinstance(value, str) else value
 
 
 def _rank(key: str) -> int:

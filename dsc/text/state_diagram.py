@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.states import (
     AnyState,
@@ -15,7 +16,8 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from dsc.text.diagram.captions import action_text, full_text, labelled
+from dsc.model.transitions import Source
+from dsc.text.diagram.captions import block_texts, full_text, labelled, seconds_text
 
 
 def to_mermaid(plot: ActionPlot) -> str:
@@ -46,6 +48,9 @@ class _Writer:
 
     def _states(self, states: Mapping[str, AnyState], indent: str) -> Iterator[str]:
         for name, state in states.items():
+            if isinstance(state, Connector):  # a choice has no title in these forms
+                yield f"{indent}state {self._alias[name]} <<choice>>"
+                continue
             yield f'{indent}state "{_safe(_title(name, state))}" as {self._alias[name]}'
             if isinstance(state, CompositeState | OrthogonalState):
                 yield f"{indent}state {self._alias[name]} {{"
@@ -54,9 +59,9 @@ class _Writer:
             if isinstance(state, FinalState):
                 yield f"{indent}{self._alias[name]} --> [*]"
             if isinstance(state, State):
-                for word, actions in (("entry", state.entry), ("exit", state.exit)):
-                    for action in actions:
-                        yield f"{indent}{self._alias[name]} : {word} / {_safe(action_text(action))}"
+                least = [] if state.at_least is None else [f"at least {seconds_text(state.at_least)}"]
+                for text in (*least, *block_texts(state)):
+                    yield f"{indent}{self._alias[name]} : {_safe(text)}"
 
     def _inside(self, state: CompositeState | OrthogonalState, indent: str) -> Iterator[str]:
         if isinstance(state, CompositeState):
@@ -72,7 +77,7 @@ class _Writer:
     def _edges(self, name: str, state: AnyState) -> Iterator[str]:
         if isinstance(state, HistoryState):
             yield f"  {self._alias[name]} --> {self._alias[state.target]}"
-        if not isinstance(state, State):
+        if not isinstance(state, Source):
             return
         for one in labelled(state):
             text = _safe(full_text(one))

@@ -8,6 +8,7 @@ time it takes is bounded by the number of its parts.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -35,8 +36,8 @@ from dsc.text.files import check_size
 from knowledge_base.errors import ParseError, Place
 
 MAX_DEPTH = 128
-MAX_PARTS = 12_000
-"""Keys, values and collections; reading that many takes half a second."""
+MAX_PARTS = 20_000
+"""Keys, values and collections: a plot of 1,000 states has 16,000; reading and checking that many takes a second."""
 
 FormPath = tuple[str | int, ...]
 """Names of keys and positions in lists."""
@@ -138,7 +139,7 @@ class _Reader:
     def __init__(self, text: str, source: str | None, places: dict[FormPath, Place]) -> None:
         yaml = YAML(typ="safe", pure=True)
         yaml.Scanner = _Scanner
-        self._events: Iterator[Event] = yaml.parse(text)
+        self._events: Iterator[Any] = yaml.parse(text)
         self._source = source
         self._places = places
         self._parts = 0
@@ -164,27 +165,30 @@ class _Reader:
             return self._sequence(path)
         return self._scalar(event)
 
-    def _mapping(self, path: FormPath) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+    def _mapping(self, path: FormPath) -> dict[str | int, Any]:
+        found: dict[str | int, Any] = {}
         while not isinstance(event := next(self._events), MappingEndEvent):
             name = self._key(event, path)
             here = (*path, name)
             if name in found:
                 first = self._places[here].line
-                message = f'not readable as YAML: duplicate key "{name}", which is in line {first} too'
+                message = f'not readable as YAML: duplicate key "{event.value}", which is in line {first} too'
                 raise ParseError(message, place=self._place(event))
             self._places[here] = self._place(event)
             found[name] = self._node(next(self._events), here)
         return found
 
-    def _key(self, event: Event, path: FormPath) -> str:
+    def _key(self, event: Event, path: FormPath) -> str | int:
+        """A name; the cases of a `select` are constants, so there a number or truth value is one too."""
         self._refuse_surprises(event, path)
         key = self._scalar(event) if isinstance(event, ScalarEvent) else None
-        if not isinstance(key, str):
-            written = f"'{event.value}'" if isinstance(event, ScalarEvent) and event.value else "this"
-            message = f"a key is a name; {written} is none (in quotes it would be)"
-            raise ParseError(message, place=self._place(event))
-        return key
+        if isinstance(key, str):
+            return key
+        if path[-1:] == ("cases",) and isinstance(key, int | float) and math.isfinite(key):
+            return key if isinstance(key, int) else repr(key)
+        written = f"'{event.value}'" if isinstance(event, ScalarEvent) and event.value else "this"
+        message = f"a key is a name; {written} is none (in quotes it would be)"
+        raise ParseError(message, place=self._place(event))
 
     def _sequence(self, path: FormPath) -> list[Any]:
         found: list[Any] = []

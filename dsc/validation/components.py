@@ -16,7 +16,7 @@ def check_components(plot: ActionPlot, components: Collection[str]) -> Iterator[
     for _, state, path in plot.walk():
         if not isinstance(state, State):
             continue
-        for key, actions in (("entry", state.entry), ("exit", state.exit)):
+        for key, actions in state.blocks():
             for position, action in enumerate(actions):
                 name = _addressed(action)
                 if name is not None and name not in components:

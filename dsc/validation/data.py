@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.outcomes import outcomes_of
+from dsc.dynamic.outcomes import outcomes_of, outputs_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
+from dsc.events import DONE
 from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
-from dsc.model.plot import ActionPlot, Parameter, Path, Variable
-from dsc.model.states import AnyState, DynamicState, FinalState, State, SubmachineState, TimedTransition, Transition
+from dsc.model.connectors import Connector, SelectState
+from dsc.model.plot import ActionPlot, Parameter, Path, Rule, Variable
+from dsc.model.states import DynamicState, FinalState, State, SubmachineState
+from dsc.model.transitions import TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
-from dsc.validation.wiring import Skills
+from dsc.validation.attributes import Skills, attributes_of
+from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.binding import unbound_error
 from knowledge_base.language.check import check, check_effect, check_term
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, When
-from knowledge_base.language.effect import Assign as Change
+from knowledge_base.language.effect import Effect, mentioned
 from knowledge_base.language.expression import Expression, Term, free_variables
 from knowledge_base.schema import Schema
 
@@ -28,21 +31,25 @@ Types = Mapping[str, str | None]
 
 
 def check_data(
-    plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills
+    plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
 ) -> Iterator[Finding]:
     """Findings about variables, types, conditions, effects and arguments."""
-    yield from _Data(plot, library, schema, skills).findings()
+    yield from _Data(plot, library, schema, skills, nesting).findings()
 
 
 class _Data:
-    def __init__(self, plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills) -> None:
+    def __init__(
+        self, plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
+    ) -> None:
         self._plot = plot
         self._library = library
         self._schema = schema
         self._skills = skills
-        declared: dict[str, Parameter | Variable] = {**plot.parameters, **plot.variables}
+        self._nesting = nesting
+        self._assigned = {**plot.variables, **plot.outputs}
+        declared: dict[str, Parameter | Variable] = {**plot.parameters, **self._assigned}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
-        self._sources = [outcomes for _, state, _ in plot.walk() if (outcomes := outcomes_of(state, library))]
+        self._sources = [outcomes for _, state, _ in nesting.states if (outcomes := outcomes_of(state, library))]
         self._sources += [other.emits for other in library if other.implements]
 
     def findings(self) -> Iterator[Finding]:
@@ -50,12 +57,14 @@ class _Data:
         if self._plot.when is not None:
             own = {name: self._types[name] for name in self._plot.parameters}
             yield from self._condition(self._plot.when, own, ("when",))
-        for _, state, path in self._plot.walk():
+        for _, state, path in self._nesting.states:
             if isinstance(state, State):
                 yield from self._state(state, path)
             elif isinstance(state, FinalState):
                 yield from self._terms(state.arguments.items(), None, (*path, "with"))
                 yield from self._internal(state.entry, None, (*path, "entry"))
+            elif isinstance(state, Connector):
+                yield from self._connector(state, path)
             else:
                 yield from self._internal(state.do, None, (*path, "do"))
         for number, rule in enumerate(self._plot.rules):
@@ -70,9 +79,16 @@ class _Data:
             if rule.do.tell is not None:
                 yield from self._effect(rule.do.tell, event, (*path, "do", "tell"))
             yield from self._only(rule.do.arguments, event, (*path, "do", "with"))
-            if rule.do.use is not None:
-                used = self._library.plot(rule.do.use)
-                yield from self._arguments(used.name, used.parameters, set(rule.do.arguments), (*path, "do", "with"))
+            if rule.do.then == "continue":
+                yield from self._continued(rule, event, (*path, "do", "then"))
+
+    def _continued(self, rule: Rule, event: Types, path: Path) -> Iterator[Finding]:
+        """What goes on as if a state were done has the rule's event, not the outputs that `done` would bring."""
+        for name, state, _ in self._nesting.states:
+            answered = rule.on in outcomes_of(state, self._library) and (not rule.of or name in rule.of)
+            if answered and isinstance(state, State) and outputs_of(state, self._library):
+                for transition in state.on.get(DONE, ()):
+                    yield from self._transition(transition, event, path)
 
     # -- parts of a plot ---------------------------------------------------------------------------------
 
@@ -80,7 +96,10 @@ class _Data:
         if self._schema is None:
             return
         valid = FREE_TYPES | set(self._schema.types)
-        for kind, declarations in (("parameters", self._plot.parameters), ("variables", self._plot.variables)):
+        declared: dict[str, Mapping[str, Parameter | Variable]] = {
+            "parameters": self._plot.parameters, "variables": self._plot.variables, "outputs": self._plot.outputs,
+        }  # fmt: skip
+        for kind, declarations in declared.items():
             for name, declaration in declarations.items():
                 if declaration.type not in valid:
                     error = UnknownNameError(
@@ -90,46 +109,37 @@ class _Data:
                     yield Finding(error, "known type")
 
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
-        for key, actions in (("entry", state.entry), ("exit", state.exit)):
+        for key, actions in state.blocks():
             for position, action in enumerate(actions):
                 if isinstance(action, Internal):
                     yield from self._internal((action,), None, (*path, key, position))
                 else:
                     yield from self._external(action, (*path, key, position))
-        for inside, event, transition in state.placed_transitions():
-            attributes = self._event_types(state, event) if event in state.on else None
-            yield from self._transition(transition, attributes, (*path, *inside))
+        for inside, event, transition in self._nesting.leaving(path):
+            if transition.guard is not None or transition.passed or transition.effect:
+                attributes = self._event_types(state, event) if event in state.on else None
+                yield from self._transition(transition, attributes, (*path, *inside))
             if isinstance(transition, TimedTransition):
                 yield from self._terms([("seconds", transition.seconds)], None, (*path, *inside))
-        if isinstance(state, SubmachineState):
+        if state.at_least is not None:
+            yield from self._terms([("at_least", state.at_least)], None, path)
+        if isinstance(state, SubmachineState | DynamicState):
             yield from self._terms(state.arguments.items(), None, (*path, "with"))
-            if not state.use.startswith("?"):
-                used = self._library.plot(state.use)
-                yield from self._arguments(used.name, used.parameters, set(state.arguments), (*path, "with"))
-        if isinstance(state, DynamicState):
-            yield from self._dynamic(state, path)
-
-    def _dynamic(self, state: DynamicState, path: Path) -> Iterator[Finding]:
-        yield from self._terms(state.arguments.items(), None, (*path, "with"))
-        candidates = [self._library.plot(name) for name in state.dynamic]
-        taken = {name for plot in candidates for name in plot.parameters}
-        for plot in candidates:
-            own = set(state.arguments) & set(plot.parameters)
-            yield from self._arguments(plot.name, plot.parameters, own, (*path, "with"))
-        for name in state.arguments:
-            if name not in taken:
-                error = UnknownNameError(
-                    f"no candidate has a parameter '{name}'",
-                    place=self._plot.place((*path, "with", name)), found=name, valid=taken,
-                )  # fmt: skip
-                yield Finding(error, "candidates conform")
-        if state.goal is not None:
+        if isinstance(state, DynamicState) and state.goal is not None:
             yield from self._condition(state.goal, self._types, (*path, "goal"))
 
+    def _connector(self, connector: Connector, path: Path) -> Iterator[Finding]:
+        # Which event brought the run here is not known beforehand.
+        if isinstance(connector, SelectState):
+            yield from self._terms([("select", connector.select)], None, path)
+        for inside, _, transition in self._nesting.leaving(path):
+            yield from self._transition(transition, None, (*path, *inside))
+
     def _transition(self, transition: Transition, attributes: Types | None, path: Path) -> Iterator[Finding]:
-        scope = self._scope(attributes, transition.guard)
         if transition.guard is not None:
+            scope = self._scope(attributes, transition.guard)
             yield from self._condition(transition.guard, scope, (*path, "when"))
+        yield from self._terms(transition.passed.items(), attributes, (*path, "pass"))
         yield from self._internal(transition.effect, attributes, path)
 
     def _internal(self, actions: Iterable[Internal], attributes: Types | None, path: Path) -> Iterator[Finding]:
@@ -153,10 +163,10 @@ class _Data:
 
     def _assign(self, action: Assign, path: Path) -> Iterator[Finding]:
         for name in action.assign:
-            if name not in self._plot.variables:
+            if name not in self._assigned:
                 error = UnknownNameError(
                     f"there is no variable '{name}'", place=self._plot.place((*path, name)),
-                    found=name, valid=self._plot.variables,
+                    found=name, valid=self._assigned,
                 )  # fmt: skip
                 yield Finding(error, "declared variable")
 
@@ -178,30 +188,15 @@ class _Data:
             here = (*path, "with", error.found) if error.found else (*path, "trigger")
             yield Finding(_at(error, self._plot, here), "skill arguments")
 
-    def _arguments(
-        self, plot: str, parameters: Mapping[str, Parameter], given: set[str], path: Path
-    ) -> Iterator[Finding]:
-        for name in sorted(given - set(parameters)):
-            error: InputError = UnknownNameError(
-                f"plot '{plot}' has no parameter '{name}'",
-                place=self._plot.place((*path, name)), found=name, valid=parameters,
-            )  # fmt: skip
-            yield Finding(error, "known parameter")
-        for name, parameter in parameters.items():
-            if name not in given and parameter.default is None:
-                error = InputError(f"plot '{plot}' needs its parameter '{name}'", place=self._plot.place(path))
-                yield Finding(error, "parameters are given", f"add `{name}: …` under `with`")
-
     # -- the language ------------------------------------------------------------------------------------
 
     def _condition(self, condition: Expression, scope: Types, path: Path) -> Iterator[Finding]:
-        asked = asked_states(condition)
-        states = {name for name, _, _ in self._plot.walk()} if asked else set()
-        for name in asked:
-            if name not in states:
+        for name in asked_states(condition):
+            if name not in self._nesting.names:
                 error = UnknownNameError(
-                    f"there is no state '{name}'", place=self._plot.place(path), found=name, valid=states
-                )
+                    f"there is no state '{name}'", place=self._plot.place(path),
+                    found=name, valid=self._nesting.names,
+                )  # fmt: skip
                 yield Finding(error, "condition")
         if self._plot.profile == "scxml":
             condition = settle(condition, lambda _: True)
@@ -257,27 +252,10 @@ class _Data:
 
     def _event_types(self, state: State, event: str) -> Types | None:
         """Attribute types of an event as `event.name`; `None` if they are not known."""
-        declared = outcomes_of(state, self._library)
-        found: Mapping[str, str | None] | None = None
-        if event in declared:
-            found = declared[event] or {}
-        elif event in self._plot.receives:
-            found = self._plot.receives[event] or {}
-        else:
-            found = self._skill_event(state, event)
+        found = attributes_of(event, state, self._plot, self._library, self._skills)
         if found is None:
             return None
         return {f"event.{name}": self._type(kind) if kind else None for name, kind in found.items()}
-
-    def _skill_event(self, state: AnyState, event: str) -> Mapping[str, str | None] | None:
-        if self._skills is None or not isinstance(state, State):
-            return None
-        for action in state.entry:
-            if isinstance(action, Trigger) and action.trigger in self._skills:
-                for original, attributes in self._skills[action.trigger].outcomes.items():
-                    if action.names.get(original, original) == event:
-                        return attributes
-        return None
 
     def _rule_event(self, event: str) -> Types | None:
         """The attributes a rule's event has wherever it can come from, also from steps of a plan."""
@@ -291,7 +269,7 @@ class _Data:
         return found if known else None
 
     def _unknown_event(self, event: str, path: Path) -> Finding:
-        valid = {name for _, state, _ in self._plot.walk() for name in outcomes_of(state, self._library)}
+        valid = {name for _, state, _ in self._nesting.states for name in outcomes_of(state, self._library)}
         valid |= {name for plot in self._library if plot.implements for name in plot.emits}
         error = UnknownNameError(
             f"no state of this plot can end with '{event}'", place=self._plot.place(path), found=event, valid=valid
@@ -302,21 +280,6 @@ class _Data:
         if name in {"number", "text", "boolean"}:
             return name
         return name if self._schema is not None and name in self._schema.types else None
-
-
-def mentioned(part: Expression | Term | Effect) -> frozenset[str]:
-    """The variables that a condition, term or effect mentions and does not itself bind."""
-    if isinstance(part, Add | Delete):
-        return free_variables(part.atom)
-    if isinstance(part, AllOf):
-        return frozenset().union(*(mentioned(inner) for inner in part.parts))
-    if isinstance(part, ForEach):
-        return mentioned(part.effect) - {variable.name for variable in part.variables}
-    if isinstance(part, When):
-        return free_variables(part.condition) | mentioned(part.effect)
-    if isinstance(part, Change):
-        return free_variables(part.call) | free_variables(part.value)
-    return free_variables(part)
 
 
 def _at(error: InputError, plot: ActionPlot, path: Path) -> InputError:

@@ -9,9 +9,12 @@ from dsc.dynamic.library import Library
 from dsc.errors import Finding, PlotError
 from dsc.model.plot import ActionPlot
 from dsc.skills import SkillSignature
+from dsc.validation.arguments import check_arguments
 from dsc.validation.components import check_components
 from dsc.validation.data import check_data
 from dsc.validation.kinds import check_kinds
+from dsc.validation.nesting import Nesting
+from dsc.validation.outputs import check_outputs
 from dsc.validation.reach import check_reach
 from dsc.validation.size import check_size
 from dsc.validation.structure import check_structure
@@ -50,15 +53,18 @@ def validate_plot(
         components: names of the components that are deployed; without them, `set` and `switch` are not checked.
     """
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
+    nesting = Nesting(plot)
     for check in (check_structure, check_size):
-        findings = list(islice(check(plot, library), MAX_FINDINGS))
+        findings = list(islice(check(plot, library, nesting), MAX_FINDINGS))
         if findings:  # what follows would only repeat them in other words, or take too long
             return findings
     checks = [
-        check_reach(plot, library),
-        check_wiring(plot, library, signatures),
-        check_data(plot, library, schema, signatures),
-        check_kinds(plot, library, schema, signatures),
+        check_reach(plot, library, nesting),
+        check_wiring(plot, library, signatures, nesting),
+        check_arguments(plot, library, nesting),
+        check_outputs(plot),
+        check_data(plot, library, schema, signatures, nesting),
+        check_kinds(plot, library, schema, signatures, nesting),
         check_components(plot, components) if components is not None else (),
     ]
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))

@@ -8,33 +8,35 @@ from dsc.engine.membership import asked_states
 from dsc.errors import Finding
 from dsc.model.actions import Choose, Emit, ExternalAction, Internal, Log, flat
 from dsc.model.plot import ActionPlot, Path
-from dsc.model.states import AnyState, FinalState, HistoryState, OrthogonalState, State, Transition
+from dsc.model.states import FinalState, HistoryState, OrthogonalState, State
+from dsc.model.transitions import Source, Transition
+from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError
 
 FIX = "write `profile: scxml` if the plot is to be an SCXML chart"
 
 
-def check_profile(plot: ActionPlot) -> Iterator[Finding]:
+def check_profile(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
     """Findings about what the plot's profile does not have."""
     if plot.profile == "scxml":
         return
-    for name, state, path in plot.walk():
+    for name, state, path in nesting.states:
         if isinstance(state, HistoryState):
             yield _finding(plot, f"'{name}' is a history state", path)
         elif isinstance(state, FinalState):
             yield from _inside(plot, name, state.entry, (*path, "entry"))
         else:
-            yield from _state(plot, name, state, path)
+            yield from _source(plot, name, state, path, nesting)
 
 
-def _state(plot: ActionPlot, name: str, state: AnyState, path: Path) -> Iterator[Finding]:
-    if isinstance(state, OrthogonalState) and state.connectors:
+def _source(plot: ActionPlot, name: str, source: Source, path: Path, nesting: Nesting) -> Iterator[Finding]:
+    if isinstance(source, OrthogonalState) and source.connectors:
         yield _finding(plot, f"'{name}' has connectors", (*path, "connectors"))
-    if not isinstance(state, State):
-        return
-    for key, actions in (("entry", state.entry), ("exit", state.exit)):
-        yield from _inside(plot, name, actions, (*path, key))
-    for inside, _, transition in state.placed_transitions():
+    if isinstance(source, State):
+        for key, actions in source.blocks():
+            if actions:
+                yield from _inside(plot, name, actions, (*path, key))
+    for inside, _, transition in nesting.leaving(path):
         yield from _transition(plot, name, transition, (*path, *inside))
 
 
@@ -42,15 +44,17 @@ def _inside(
     plot: ActionPlot, name: str, actions: Iterable[ExternalAction | Internal], path: Path
 ) -> Iterator[Finding]:
     if any(isinstance(action, Internal) for action in actions):
-        yield _finding(plot, f"'{name}' has an internal action in its entry or exit", path)
+        yield _finding(plot, f"'{name}' has an internal action outside its transitions", path)
 
 
 def _transition(plot: ActionPlot, name: str, transition: Transition, path: Path) -> Iterator[Finding]:
     if transition.also or transition.internal:
         yield _finding(plot, f"a transition of '{name}' is internal or has several targets", path)
+    if transition.clear:
+        yield _finding(plot, f"a transition of '{name}' clears histories", (*path, "clear"))
     if transition.guard is not None and asked_states(transition.guard):
         yield _finding(plot, f"a guard of '{name}' asks which states are active", (*path, "when"))
-    if any(_is_foreign(action) for action in flat(transition.effect)):
+    if transition.do and any(_is_foreign(action) for action in flat(transition.do)):
         yield _finding(plot, f"a transition of '{name}' branches, logs or sends with a delay", path)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping
 
 from dsc.dynamic.library import Library
 from dsc.engine.compiler import compile_plot
@@ -13,47 +12,48 @@ from dsc.model.states import (
     AnyState,
     CompositeState,
     DynamicState,
-    HistoryState,
     OrthogonalState,
     Region,
     State,
     SubmachineState,
 )
+from dsc.validation.connectors import check_connectors
+from dsc.validation.history import check_history
+from dsc.validation.nesting import Nesting
 from dsc.validation.profile import check_profile
-from knowledge_base.errors import Place, SchemaError, UnknownNameError
+from dsc.validation.timing import check_timing
+from knowledge_base.errors import SchemaError, UnknownNameError
 
-Paths = Mapping[str, Path]
-"""All states of a plot by name -> where they stand."""
 RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 """What a rule may do besides going to a named state."""
 
 
-def check_structure(plot: ActionPlot, library: Library) -> Iterator[Finding]:
+def check_structure(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
     sound = True
-    for finding in _shape(plot, library):
+    for finding in _shape(plot, library, nesting):
         sound = False
         yield finding
     if sound and plot.profile == "scxml":
         yield from _tables(plot)
 
 
-def _shape(plot: ActionPlot, library: Library) -> Iterator[Finding]:
-    yield from check_profile(plot)
-    names = {name: path for name, _, path in plot.walk()}
-    yield from _scope(plot, plot, (), names)
-    for name, state, path in plot.walk():
+def _shape(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
+    yield from check_profile(plot, nesting)
+    yield from check_connectors(plot, nesting)
+    yield from check_history(plot, nesting)
+    yield from check_timing(plot, nesting)
+    yield from _scope(plot, plot, (), nesting)
+    for name, state, path in nesting.states:
         if isinstance(state, CompositeState):
-            yield from _scope(plot, state, path, names)
+            yield from _scope(plot, state, path, nesting)
         if isinstance(state, OrthogonalState):
             for key, region in state.regions.items():
-                yield from _scope(plot, region, (*path, "regions", key), names)
+                yield from _scope(plot, region, (*path, "regions", key), nesting)
         yield from _uses(plot, state, path, library)
         if plot.profile == "dsc":
-            yield from _dead_end(plot, name, state, path)
-        if isinstance(state, HistoryState):
-            yield from _history(plot, state, path, names)
-    yield from _rules(plot, set(names), library)
+            yield from _dead_end(plot, name, state, path, nesting)
+    yield from _rules(plot, set(nesting.names), library)
 
 
 def _tables(plot: ActionPlot) -> Iterator[Finding]:
@@ -66,62 +66,41 @@ def _tables(plot: ActionPlot) -> Iterator[Finding]:
 
 
 def _scope(
-    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path, names: Paths
+    plot: ActionPlot, scope: ActionPlot | CompositeState | Region, path: Path, nesting: Nesting
 ) -> Iterator[Finding]:
-    first = scope.initial
-    deeper = plot.profile == "scxml" and first is not None and _is_within(names.get(first, ()), path)
-    if first is not None and first not in scope.states and not deeper:
+    first, anywhere_inside = scope.initial, plot.profile == "scxml"
+    if first is not None and not (nesting.inside(first, path) if anywhere_inside else first in scope.states):
         error = UnknownNameError(
-            f"there is no state '{first}' to begin with", place=plot.place((*path, "initial")), found=first,
-            valid=_within(plot, path) if plot.profile == "scxml" else scope.states,
+            f"there is no state '{first}' to begin with", place=plot.place((*path, "initial")),
+            found=first, valid=nesting.within(path) if anywhere_inside else scope.states,
         )  # fmt: skip
         yield Finding(error, "initial")
-    for name, state in scope.states.items():
-        if isinstance(state, State):
-            yield from _targets(plot, state, (*path, "states", name), scope.states, names)
+    for name in scope.states:
+        yield from _targets(plot, (*path, "states", name), scope.states, nesting)
 
 
 def _targets(
-    plot: ActionPlot, state: State, path: Path, siblings: Mapping[str, AnyState], names: Paths
+    plot: ActionPlot, path: Path, siblings: Mapping[str, AnyState], nesting: Nesting
 ) -> Iterator[Finding]:
-    for inside, _, transition in state.placed_transitions():
-        place = plot.place((*path, *inside, "to"))
+    for inside, _, transition in nesting.leaving(path):
         for target in transition.targets:
-            yield from _target(plot, target, siblings, names, place)
+            if target not in siblings:
+                yield from _elsewhere(plot, target, siblings, nesting.names, (*path, *inside, "to"))
 
 
-def _target(
-    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: Paths, place: Place | None
+def _elsewhere(
+    plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: Collection[str], path: Path
 ) -> Iterator[Finding]:
-    if target not in siblings and not (plot.profile == "scxml" and target in everywhere):
-        if target in everywhere:
-            error = SchemaError(f"the transition to '{target}' crosses a border", place=place, found=target)
-            yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
-        else:
-            missing = UnknownNameError(
-                f"there is no state '{target}'", place=place, found=target,
-                valid=siblings if plot.profile == "dsc" else everywhere,
-            )
-            yield Finding(missing, "target")
-
-
-def _within(plot: ActionPlot, path: Path) -> set[str]:
-    return {name for name, _, other in plot.walk() if _is_within(other, path)}
-
-
-def _is_within(path: Path, around: Path) -> bool:
-    return len(path) > len(around) and path[: len(around)] == around
-
-
-def _history(plot: ActionPlot, state: HistoryState, path: Path, names: Paths) -> Iterator[Finding]:
-    """What a history leads to is inside the state that the history belongs to (SCXML 3.10)."""
-    around = path[:-2]
-    if not _is_within(names.get(state.target, ()), around):
-        error = UnknownNameError(
-            f"there is no state '{state.target}' beside the history", place=plot.place((*path, "to")),
-            found=state.target, valid=_within(plot, around),
+    """Findings about a target that is not beside its source."""
+    if target not in everywhere:
+        missing = UnknownNameError(
+            f"there is no state '{target}'", place=plot.place(path), found=target,
+            valid=siblings if plot.profile == "dsc" else everywhere,
         )  # fmt: skip
-        yield Finding(error, "target")
+        yield Finding(missing, "target")
+    elif plot.profile == "dsc":
+        error = SchemaError(f"the transition to '{target}' crosses a border", place=plot.place(path), found=target)
+        yield Finding(error, "no border crossing", "transitions stay in the state, region or plot around")
 
 
 def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> Iterator[Finding]:
@@ -142,19 +121,8 @@ def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str], what: str
     return Finding(error, "known plot")
 
 
-def around(plot: ActionPlot, path: Path) -> Iterator[State]:
-    """The composite and orthogonal states around the one at `path`."""
-    scope: Any = plot
-    for kind, name in zip(path[:-2:2], path[1:-2:2], strict=True):
-        scope = getattr(scope, str(kind))[name]
-        if isinstance(scope, State):
-            yield scope
-
-
-def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path) -> Iterator[Finding]:
-    if not isinstance(state, State) or any(True for _ in state.transitions()):
-        return
-    if not any(any(True for _ in other.transitions()) for other in around(plot, path)):
+def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path, nesting: Nesting) -> Iterator[Finding]:
+    if isinstance(state, State) and not any(map(nesting.leaving, nesting.way(path))):
         error = SchemaError(f"no transition leaves the state '{name}'", place=plot.place(path))
         yield Finding(error, "no dead end", "wire what it ends with, or make it `final: true`")
 

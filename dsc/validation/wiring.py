@@ -2,35 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cache
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import outcomes_of
 from dsc.errors import Finding
-from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED
+from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED, TIMERS
 from dsc.model.actions import Trigger
-from dsc.model.plot import ActionPlot, Path, walk_states
+from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import (
     AnyState,
-    CompositeState,
-    DynamicState,
     FinalState,
-    OrthogonalState,
     State,
     SubmachineState,
 )
-from dsc.skills import SkillSignature
-from dsc.validation.structure import RESPONSES, around
+from dsc.validation.attributes import Skills
+from dsc.validation.completion import check_completion
+from dsc.validation.nesting import Nesting
+from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-
-Skills = Mapping[str, SkillSignature] | None
 
 _EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
 """Events that are nobody else's; the other two are passed on by who plans."""
 
 
-def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator[Finding]:
+def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> Iterator[Finding]:
     """Findings about events."""
     try:
         expanded = library.expanded(plot)
@@ -38,22 +37,25 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills) -> Iterator
         yield Finding(error, "rules")
         return
     wired = {name: state for name, state, _ in expanded.walk()}
-    local, listened = _local_events(plot), _listened(plot)
-    silent = cache(lambda used: _ends_silently(library.plot(used)))
+    traffic = _traffic(plot, library, skills, nesting)
     yield from _declared_events(plot)
     yield from _rule_targets(plot, library)
-    for name, state, path in plot.walk():
+    for name, state, path in nesting.states:
         if isinstance(state, FinalState):
             yield from _final(plot, state, path)
+        if plot.profile == "dsc":
+            yield from _emissions(plot, path, nesting, traffic)
         if not isinstance(state, State):
             continue
-        handled = _handled([wired[name], *around(plot, path)])
-        yield from _outcomes(plot, name, outcomes_of(state, library), handled, path)
-        yield from _skills(plot, name, state, path, handled, skills)
+        outcomes = outcomes_of(state, library)
+        if outcomes or state.entry:  # otherwise it cannot end with anything
+            handled = _handled([wired[name], *nesting.around(path)])
+            yield from _outcomes(plot, name, outcomes, handled, path)
+            yield from _skills(plot, name, state, path, handled, skills)
         if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
-            yield from _completion(plot, name, state, wired[name], path, silent)
-            yield from _known_events(plot, name, state, path, library, skills, local)
-            yield from _emissions(plot, state, path, listened)
+            yield from _known_events(plot, state, path, skills, traffic)
+    if plot.profile == "dsc":
+        yield from check_completion(plot, wired, library, nesting)
 
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:
@@ -74,12 +76,14 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
-    scopes = [(siblings, [(n, outcomes_of(s, library)) for n, s in siblings.items()]) for siblings in plot.scopes()]
-    for number, rule in enumerate(plot.rules):
-        for siblings, states in scopes:
-            for name, outcomes in states:
+    leading = [(number, rule) for number, rule in enumerate(plot.rules) if rule.do.then not in RESPONSES]
+    every = (scope.states for scope in plot.scopes()) if leading else ()
+    scopes = [(siblings, [(name, outcomes_of(s, library)) for name, s in siblings.items()]) for siblings in every]
+    for number, rule in leading:
+        for siblings, ends in scopes:
+            for name, outcomes in ends:
                 answers = rule.on in outcomes and (not rule.of or name in rule.of)
-                if answers and rule.do.then not in RESPONSES and rule.do.then not in siblings:
+                if answers and rule.do.then not in siblings:
                     error = SchemaError(
                         f"the rule's way from '{name}' to '{rule.do.then}' crosses a border",
                         place=plot.place(("rules", number, "do", "then")), found=rule.do.then, valid=siblings,
@@ -144,59 +148,52 @@ def _skills(
         yield from _outcomes(plot, name, [event for event in events if event not in _EXECUTIVES], handled, path)
 
 
-def _completion(
-    plot: ActionPlot, name: str, state: AnyState, wired: AnyState, path: Path, silent: Callable[[str], bool]
-) -> Iterator[Finding]:
-    completes = (
-        (isinstance(state, SubmachineState) and (state.use.startswith("?") or silent(state.use)))
-        or (isinstance(state, DynamicState) and (state.goal is not None or any(map(silent, state.dynamic))))
-        or (isinstance(state, CompositeState) and any(isinstance(s, FinalState) for s in state.states.values()))
-        or isinstance(state, OrthogonalState)
-    )
-    if type(state) is State and DONE in state.on and any(isinstance(a, Trigger) for a in state.entry):
-        error = SchemaError(
-            f"state '{name}' has no content, so it is done at once and would cancel its skill",
-            place=plot.place((*path, "on", DONE)),
-        )
-        yield Finding(error, "done at once", "wire the outcome of the skill")
-    if completes and isinstance(wired, State) and DONE not in wired.on:
-        error = SchemaError(f"state '{name}' does not handle its completion", place=plot.place((*path, "on")))
-        yield Finding(error, "completion is wired", "add `done: STATE` under `on`")
+@dataclass(frozen=True, slots=True)
+class _Traffic:
+    """Which events there are, gathered once for a plot.
+
+    Attributes:
+        anywhere: events that may come to every state.
+        inside: path of a state -> what its content and skills, and those of states inside, end with.
+        heard: events that some state listens to.
+    """
+
+    anywhere: AbstractSet[str]
+    inside: Mapping[Path, AbstractSet[str]]
+    heard: AbstractSet[str]
 
 
-def _ends_silently(plot: ActionPlot) -> bool:
-    """Whether the plot can reach a top-level final state without firing a declared outcome."""
-    silent = {name for name, s in plot.states.items() if isinstance(s, FinalState) and s.emit is None}
-    return any(
-        transition.target in silent and not set(transition.emitted) & set(plot.emits)
-        for state in plot.states.values()
-        if isinstance(state, State)
-        for _, transition in state.transitions()
-    )
+def _traffic(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> _Traffic:
+    anywhere = {*(RESERVED - TIMERS), *plot.receives}
+    inside: defaultdict[Path, set[str]] = defaultdict(set)
+    heard: set[str] = set()
+    for _, state, path in nesting.states:
+        for _, _, transition in nesting.leaving(path):
+            anywhere.update(transition.emitted)
+        if not isinstance(state, State):
+            continue
+        heard.update(state.on)
+        if ends := {*outcomes_of(state, library), *_skill_events(state, skills)}:
+            for place in nesting.way(path):
+                inside[place] |= ends
+    return _Traffic(anywhere, inside, heard)
 
 
 def _known_events(
-    plot: ActionPlot, name: str, state: AnyState, path: Path, library: Library, skills: Skills, local: set[str]
+    plot: ActionPlot, state: AnyState, path: Path, skills: Skills, traffic: _Traffic
 ) -> Iterator[Finding]:
     if not isinstance(state, State) or (isinstance(state, SubmachineState) and state.use.startswith("?")):
         return
-    known = RESERVED | set(plot.receives) | local
-    for _, inner, _ in walk_states({name: state}, path[:-1]):
-        known = known | set(outcomes_of(inner, library)) | _skill_events(inner, skills)
     if skills is None and any(isinstance(a, Trigger) for a in state.entry):
         return
+    inside = traffic.inside.get(path, frozenset())
     for event in state.on:
-        if event not in known:
+        if event not in traffic.anywhere and event not in inside:
             error = UnknownNameError(
-                f"nothing here fires the event '{event}'",
-                place=plot.place((*path, "on", event)), found=event, valid=known - RESERVED | {DONE},
+                f"nothing here fires the event '{event}'", place=plot.place((*path, "on", event)),
+                found=event, valid=(traffic.anywhere | inside) - RESERVED | {DONE},
             )  # fmt: skip
             yield Finding(error, "known event", "events from outside are declared under `receives`")
-
-
-def _local_events(plot: ActionPlot) -> set[str]:
-    states = [state for _, state, _ in plot.walk() if isinstance(state, State)]
-    return {event for state in states for _, transition in state.transitions() for event in transition.emitted}
 
 
 def _skill_events(state: AnyState, skills: Skills) -> set[str]:
@@ -206,22 +203,16 @@ def _skill_events(state: AnyState, skills: Skills) -> set[str]:
     return {t.names.get(event, event) for t in triggers for event in skills[t.trigger].outcomes}
 
 
-def _listened(plot: ActionPlot) -> set[str]:
-    return {event for _, state, _ in plot.walk() if isinstance(state, State) for event in state.on}
-
-
-def _emissions(plot: ActionPlot, state: AnyState, path: Path, listened: set[str]) -> Iterator[Finding]:
-    if not isinstance(state, State):
-        return
-    for inside, _, transition in state.placed_transitions():
+def _emissions(plot: ActionPlot, path: Path, nesting: Nesting, traffic: _Traffic) -> Iterator[Finding]:
+    for inside, _, transition in nesting.leaving(path):
         for fired in transition.emitted:
             here = (*path, *inside, "emit")
             if fired in RESERVED and fired not in plot.emits:
                 yield _reserved(plot, fired, here)
-            elif fired not in plot.emits and fired not in listened:
+            elif fired not in plot.emits and fired not in traffic.heard:
                 error = UnknownNameError(
                     f"the plot does not declare the outcome '{fired}', and no state listens to it",
-                    place=plot.place(here), found=fired, valid=set(plot.emits) | listened - {DONE, NO_CANDIDATE},
+                    place=plot.place(here), found=fired, valid=set(plot.emits) | traffic.heard - {DONE, NO_CANDIDATE},
                 )  # fmt: skip
                 yield Finding(error, "declared outcome", "declare it under `emits`")
             elif fired in plot.emits and fired == transition.emit:

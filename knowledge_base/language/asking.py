@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from knowledge_base.facts import Value
+from knowledge_base.facts import VALUE_TYPES, Value
 from knowledge_base.language.binding import check_answers, check_bound
 from knowledge_base.language.compiler import compile_query, compile_test
 from knowledge_base.language.expression import (
@@ -23,7 +23,7 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.lookups import Search
 from knowledge_base.language.memory import IdentityCache
-from knowledge_base.language.terms import Bindings, Test, compile_term
+from knowledge_base.language.terms import Bindings, Getter, Test, compile_term
 from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
@@ -34,6 +34,12 @@ NO_BINDINGS: Bindings = MappingProxyType({})
 class _Condition:
     free: frozenset[str]
     test: Test
+
+
+@dataclass(frozen=True, slots=True)
+class _Term:
+    free: frozenset[str]
+    get: Getter
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +56,7 @@ class _Queries:
     by_bound: dict[frozenset[str], _Query]
 
 
+_terms: IdentityCache[Term, _Term] = IdentityCache()
 _conditions: IdentityCache[Expression, _Condition] = IdentityCache()
 _queries: IdentityCache[Expression, _Queries] = IdentityCache()
 
@@ -61,9 +68,11 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
         UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
         SchemaError: a wrong number of arguments, or `<` and the like met something that is no number.
     """
-    condition = _conditions.get(e, world.schema, lambda: _compiled(e, world.schema))
-    if not condition.free <= bindings.keys():
-        check_bound(e, bindings)
+    schema = world.schema
+    condition = _conditions.find(e, schema) or _conditions.keep(e, schema, _compiled(e, schema))
+    for name in condition.free:
+        if type(bindings.get(name)) not in VALUE_TYPES:
+            check_bound(e, bindings)
     return condition.test(world, bindings)
 
 
@@ -77,7 +86,8 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
         InputError: an unbound variable occurs only under `not` or in a comparison.
         UnknownNameError, SchemaError: as for `holds`.
     """
-    queries = _queries.get(e, world.schema, lambda: _Queries(free_variables(e), {}))
+    schema = world.schema
+    queries = _queries.find(e, schema) or _queries.keep(e, schema, _Queries(free_variables(e), {}))
     bound = queries.free.intersection(bindings)
     found = queries.by_bound.get(bound)
     if found is None:
@@ -98,12 +108,20 @@ def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_B
         return term.value
     if isinstance(term, Variable) and term.name in bindings:
         return bindings[term.name]
-    check_bound(term, bindings)
-    return compile_term(term, world.schema)(world, bindings)
+    schema = world.schema
+    known = _terms.find(term, schema) or _terms.keep(term, schema, _compiled_term(term, schema))
+    for name in known.free:
+        if type(bindings.get(name)) not in VALUE_TYPES:
+            check_bound(term, bindings)
+    return known.get(world, bindings)
 
 
 def _compiled(e: Expression, schema: Schema) -> _Condition:
     return _Condition(free_variables(e), compile_test(e, schema))
+
+
+def _compiled_term(term: Term, schema: Schema) -> _Term:
+    return _Term(free_variables(term), compile_term(term, schema))
 
 
 def _compiled_query(e: Expression, schema: Schema, bound: frozenset[str]) -> _Query:

@@ -6,7 +6,7 @@ nowhere else has no answers that could be listed (safe queries in the sense of D
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from knowledge_base.errors import InputError, Place, UnknownNameError
 from knowledge_base.facts import Value
@@ -58,12 +58,14 @@ def check_answers(e: Expression, bound: frozenset[str]) -> None:
 
 
 def check_bound(e: Expression | Term, bindings: Mapping[str, Value]) -> None:
-    """Raise `UnknownNameError` if a free variable of `e` is not among `bindings`."""
-    for name in sorted(free_variables(e) - bindings.keys()):
-        raise unbound_error(name, variable_place(e, name), bindings)
+    """Raise `UnknownNameError` if a free variable of `e` has no value that facts and comparisons can be about."""
+    for name in sorted(free_variables(e)):
+        if not isinstance(bindings.get(name), Value):
+            known = [one for one, value in bindings.items() if isinstance(value, Value)]
+            raise unbound_error(name, variable_place(e, name), known)
 
 
-def unbound_error(name: str, place: Place | None, bound: Mapping[str, object]) -> UnknownNameError:
+def unbound_error(name: str, place: Place | None, bound: Iterable[str]) -> UnknownNameError:
     """The error for a free variable in a condition that must be true or false."""
     return UnknownNameError(
         f"the variable '?{name}' is not bound; to ask whether there is one, use (exists (?{name}) ...)",

@@ -6,7 +6,6 @@ long as the chart or text they belong to, so their identity is enough.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Generic, TypeVar
 
 _K = TypeVar("_K")
@@ -23,14 +22,14 @@ class IdentityCache(Generic[_K, _V]):
         self._size = size
         self._kept: dict[tuple[int, int], tuple[_K, object, _V]] = {}
 
-    def get(self, key: _K, context: object, make: Callable[[], _V]) -> _V:
-        """The result for `key` in `context`, made when it is first asked for."""
-        identity = (id(key), id(context))
-        found = self._kept.get(identity)
-        if found is not None:
-            return found[2]
-        made = make()
+    def find(self, key: _K, context: object) -> _V | None:
+        """The result for `key` in `context`, if it is kept."""
+        found = self._kept.get((id(key), id(context)))
+        return None if found is None else found[2]
+
+    def keep(self, key: _K, context: object, made: _V) -> _V:
+        """Keep a result, and hand it back."""
         if len(self._kept) >= self._size:
             self._kept.clear()
-        self._kept[identity] = (key, context, made)
+        self._kept[id(key), id(context)] = (key, context, made)
         return made

@@ -70,6 +70,9 @@ def compile_comparison(e: Comparison, schema: Schema) -> Test:
         return lambda world, b: not same(left(world, b), right(world, b))
     ordered, name = _ORDER[e.operator], e.operator
     places = (e.left.place or e.place, e.right.place or e.place)
+    if isinstance(e.right, Constant):
+        bound = as_number(e.right.value, name, places[1])
+        return lambda world, b: ordered(as_number(left(world, b), name, places[0]), bound)
 
     def test(world: World, b: Bindings) -> bool:
         first = as_number(left(world, b), name, places[0])

@@ -1,6 +1,5 @@
 """The main job, whole: honest over many seeds, the same twice, and through everything at once."""
 
-import asyncio
 import io
 import json
 
@@ -124,9 +123,8 @@ def test_through_everything_at_once(planner, monkeypatch):
             holder["sequencer"].change(told, "bystander")
         if record.type == "event" and record.data["name"] == "grasp_failed" and "stopped" not in holder:
             holder["stopped"] = True
-            loop = asyncio.get_running_loop()
-            loop.call_later(1.0, holder["sequencer"].post, Event("stop"))
-            loop.call_later(100.0, holder["sequencer"].post, Event("restart"))
+            holder["sequencer"].post(Event("stop"), after=1.0)
+            holder["sequencer"].post(Event("restart"), after=100.0)
 
     table = deploy(None, 0, 0.0, planner, listener)
     script = Script(ITEM_SLIPPED, GRASP_FAILED)
@@ -155,7 +153,7 @@ def test_a_stop_is_obeyed_while_the_planner_works(planner):
         if record.type == "plan.asked" and "stopped" not in holder:
             holder["stopped"] = record.t
             holder["sequencer"].post(Event("stop"))
-            asyncio.get_running_loop().call_later(60.0, holder["sequencer"].post, Event("restart"))
+            holder["sequencer"].post(Event("restart"), after=60.0)
 
     table = deploy(None, 0, 0.0, planner, listener)
     report = table.run(prepare=lambda sequencer: holder.update(sequencer=sequencer))
@@ -167,10 +165,7 @@ def test_a_stop_is_obeyed_while_the_planner_works(planner):
 
 
 def test_an_operator_who_never_restarts_gets_an_honest_report(planner):
-    def prepare(sequencer):
-        asyncio.get_running_loop().call_later(30.0, sequencer.post, Event("stop"))
-
-    _, report = run(planner, prepare=prepare)
+    _, report = run(planner, prepare=lambda sequencer: sequencer.post(Event("stop"), after=30.0))
     assert not report.goal_reached
     assert report.problem is None
     assert len(report.left) > 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator as op
 import textwrap
 from collections.abc import Mapping
 
@@ -20,6 +21,9 @@ from knowledge_base.language import expression as lang
 
 PROPERTY = settings(deadline=None, derandomize=True)
 """How properties are tested: the same examples on every machine, however slow it is."""
+
+
+COMPARE = {"=": op.eq, "!=": op.ne, "<": op.lt, ">": op.gt, "<=": op.le, ">=": op.ge}
 
 
 def plot(text, source=None):
@@ -51,7 +55,7 @@ class FakeSituation:
                 return any(self.holds(p, bindings) for p in parts)
             case lang.Comparison(operator, left, right):
                 a, b = self.value(left, bindings), self.value(right, bindings)
-                return {"=": a == b, "!=": a != b, "<": a < b, ">": a > b, "<=": a <= b, ">=": a >= b}[operator]
+                return COMPARE[operator](a, b)
         raise NotImplementedError(expression)
 
     def value(self, term, bindings):
@@ -104,20 +108,22 @@ class Run:
     def start(self, **arguments):
         return self._commit(self.machine.start(self.first, arguments, self.situation()))
 
-    def send(self, name, *, to=None, exact=False, index=None, **attributes):
-        event = Event(name, attributes, to=self.serial(to) if to else None, exact=exact, index=index)
+    def send(self, name, *, to=None, exact=False, number=None, **attributes):
+        event = Event(name, attributes, to=self.serial(to) if to else None, exact=exact, number=number)
         return self._commit(self.machine.send(event, self.situation()))
 
-    def time_out(self, state, index=0):
-        return self.send("after", to=state, exact=True, index=index)
+    def time_out(self, state, number=0):
+        return self.send("after", to=state, exact=True, number=number)
 
     def look(self):
         """The world may have changed."""
         return self._commit(self.machine.send(None, self.situation()))
 
     def serial(self, path):
-        """The activation of a state, by its path or name."""
-        return next(serial for name, serial in activations(self.machine.state.root) if named(name, path))
+        """The activation of a state that somebody may send events to, by its path or name."""
+        found = next(serial for name, serial in activations(self.machine.state.root) if named(name, path))
+        assert found, f"nobody sends events to '{path}'"
+        return found
 
     @property
     def active(self):

@@ -186,3 +186,9 @@ def test_neighbours_that_are_too_large_do_not_matter(dsc, tmp_path):
     with (tmp_path / "huge.yaml").open("wb") as stream:
         stream.truncate(100_000_000)
     assert dsc("plot", "check", tmp_path / "p.yaml")[0] == 0
+
+
+def test_a_plot_of_a_thousand_states_is_not_too_large(dsc, tmp_path):
+    states = (f"  s{n}: {{entry: {{trigger: arm.move, with: {{to: table}}}}, on: {{moved: s{(n + 1) % 1000}, failed: over}}}}\n" for n in range(1000))
+    (tmp_path / "p.yaml").write_text(HEAD + "".join(states) + FINAL)
+    assert dsc("plot", "check", tmp_path / "p.yaml")[0] == 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from dsc_charts import FakeSituation, plot
 
-from dsc.dynamic.library import Library
+from dsc.dynamic.library import MOST_BOUND, Library
 from dsc.dynamic.outcomes import outcomes_of
 from dsc.dynamic.selection import ACHIEVE
 from dsc.dynamic.situation import KnowledgeSituation
@@ -257,6 +257,17 @@ def test_equal_plots_bound_as_values_share_their_tables():
     library = Library()
     form = {"plot": "made", "states": {"s": {}}}
     assert library.bind(form) is library.bind(dict(form))
+
+
+def test_plots_bound_as_values_are_not_kept_for_ever():
+    library = Library()
+    forms = [{"plot": f"made{n}", "states": {"s": {}}} for n in range(MOST_BOUND + 1)]
+    first, second = library.bind(forms[0]), library.bind(forms[1])
+    for form in forms[2:]:
+        library.bind(forms[0])
+        library.bind(form)
+    assert library.bind(forms[0]) is first
+    assert library.bind(forms[1]) is not second
 
 
 def test_the_outcomes_of_a_state_are_those_of_what_it_uses():

@@ -140,7 +140,7 @@ def test_timeouts_start_on_entry_and_are_cancelled_on_exit():
     assert first.output == (StartTimer(old, 0, 5.0), StartTimer(old, 1, 2.0))
     new = run.send("e")
     assert new.output == (Cancel(old), StartTimer(run.serial("a"), 0, 5.0), StartTimer(run.serial("a"), 1, 2.0))
-    late = step(run.library, run.machine.state, Event("after", to=old, exact=True, index=0), run.situation())
+    late = step(run.library, run.machine.state, Event("after", to=old, exact=True, number=0), run.situation())
     assert not late.moved
     assert run.time_out("a", 1).handled
     assert run.active == ["c"]

@@ -10,7 +10,7 @@ from dsc_charts import PROPERTY, Run, marked, modes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dsc.engine.configuration import MachineState
+from dsc.engine.state import MachineState
 from dsc.model.plot import ActionPlot
 from dsc.model.states import SubmachineState
 
@@ -111,26 +111,25 @@ def steps_of(run, events):
         yield run.send(event)
 
 
-def check_legal(frame, library):
+def check_legal(frame):
     """One child of every composite, all regions, everything around active, plots in active hosts alone."""
-    nodes = library.compiled(frame.plot).nodes
-    index = library.compiled(frame.plot).index
-    active = {int(name[1:]) if name.startswith("#") else index[name] for name in frame.active}
+    nodes, index = frame.compiled.nodes, frame.compiled.index
+    active = frame.configuration.members
     for node in nodes:
         if node.index == 0 or node.index in active:
             inside = [child for child in node.children if child in active]
             assert len(inside) == (len(node.children) if node.orthogonal else min(1, len(node.children)))
         else:
             assert not active & set(node.children)
-    hosts = {name for name in frame.active if isinstance(nodes[index.get(name, 0)].state, SubmachineState)}
+    hosts = {name for name in frame.active if isinstance(nodes[index[name]].state, SubmachineState)}
     assert set(frame.children) == hosts
     for child in frame.children.values():
-        check_legal(child, library)
+        check_legal(child)
 
 
 def serials_of(frame):
     yield frame.serial
-    yield from frame.active.values()
+    yield from frame.activations.values()
     for child in frame.children.values():
         yield from serials_of(child)
 
@@ -145,7 +144,7 @@ def test_the_configuration_is_legal_after_every_step(chart, events):
     for step in steps_of(run, events):
         assert (step.state.root is None) == step.state.finished
         if step.state.root is not None:
-            check_legal(step.state.root, run.library)
+            check_legal(step.state.root)
             serials = list(serials_of(step.state.root))
             assert len(serials) == len(set(serials))
             assert max(serials) <= step.state.serials
@@ -189,7 +188,7 @@ def test_the_same_input_gives_the_same_output_also_after_being_stored(chart, eve
     for a, b in zip(steps_of(one, events), steps_of(other, events), strict=True):
         assert a == b
         stored = json.loads(json.dumps(other.machine.state.to_json()))
-        other.machine.state = MachineState.from_json(stored)
+        other.machine.state = MachineState.from_json(stored, other.library)
 
 
 @settings(PROPERTY, max_examples=50)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from copy import deepcopy
 
 import pytest
 from dsc_charts import FakeSituation, Run, plot
 
 from dsc.dynamic.library import Library
-from dsc.engine.configuration import MachineState
 from dsc.engine.machine import step
 from dsc.engine.situation import Decision
+from dsc.engine.state import MachineState
 from dsc.events import Event
 from knowledge_base.errors import UnknownNameError
 
@@ -42,7 +41,7 @@ def test_the_state_goes_to_json_and_back_exactly_in_the_middle_of_a_run():
     assert run.start() == other.start()
     for name in ("nothing", "tick", "tick"):
         stored = json.dumps(other.machine.state.to_json())
-        other.machine.state = MachineState.from_json(json.loads(stored))
+        other.machine.state = MachineState.from_json(json.loads(stored), other.library)
         assert other.machine.state == run.machine.state
         assert run.send(name) == other.send(name)
     assert run.machine.state.finished
@@ -52,28 +51,30 @@ def test_a_bound_plot_goes_to_json_with_the_state():
     host = plot("{plot: p, parameters: {what: plot}, states: {h: {use: ?what, on: {done: e}}, e: }}")
     run = Run(host)
     run.start(what={"plot": "made", "states": {"a": {"on": {"go": "b"}}, "b": {"final": True}}})
-    state = MachineState.from_json(json.loads(json.dumps(run.machine.state.to_json())))
+    state = MachineState.from_json(json.loads(json.dumps(run.machine.state.to_json())), run.library)
     assert state == run.machine.state
-    fresh = Library([host])  # as after a restart
+    fresh = Library([host])
+    state = MachineState.from_json(state.to_json(), fresh)  # as after a restart
     assert step(fresh, state, Event("go"), FakeSituation()).state.configuration() == ("e",)
 
 
 def test_a_state_of_another_library_is_refused():
     run = rich()
     run.start()
+    stored = run.machine.state.to_json()
     with pytest.raises(UnknownNameError, match="there is no plot 'p'"):
-        step(Library([]), run.machine.state, Event("tick"), FakeSituation())
+        MachineState.from_json(stored, Library([]))
     changed = Library([plot(RICH.replace("x: {use", "x_: {use")), plot(INNER)])
     with pytest.raises(UnknownNameError, match="plot 'p' no longer has the state 'x'"):
-        step(changed, run.machine.state, Event("tick"), FakeSituation())
+        MachineState.from_json(stored, changed)
 
 
 def test_a_step_changes_nothing_it_was_given():
     run = rich()
     run.start()
-    before, kept = run.machine.state, deepcopy(run.machine.state)
+    before, kept = run.machine.state, json.dumps(run.machine.state.to_json())
     first = step(run.library, before, Event("tick"), run.situation())
-    assert before == kept
+    assert json.dumps(before.to_json()) == kept
     assert step(run.library, before, Event("tick"), run.situation()) == first
     assert run.machine.state is before
     assert run.send("tick") == first

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from dsc.model.actions import Configure, Emit, Switch, Trigger
+from dsc.model.actions import Assign, Configure, Emit, Switch, Trigger
+from dsc.model.connectors import ChoiceState, SelectState
 from dsc.model.plot import ActionPlot, Rule, initial_of
 from dsc.model.states import (
     CompositeState,
@@ -19,16 +20,17 @@ from dsc.model.states import (
     OrthogonalState,
     State,
     SubmachineState,
-    Transition,
 )
+from dsc.model.transitions import Transition
 from dsc.text.plots import parse_plot, plot_to_yaml
-from knowledge_base.language.expression import TRUE, Arithmetic, Atom, Constant, Variable
+from knowledge_base.language.expression import TRUE, And, Arithmetic, Atom, Comparison, Constant, Variable
 
 EVERYTHING = plot("""
     plot: everything
     about: "one of each kind: a # in it"
     parameters: {item: item, to: {type: place, default: table}}
     variables: {n: {type: number, initial: 0}, found: item}
+    outputs: {where: place, tries: {type: number, initial: 0}}
     receives: {stop: , moved: {who: item}}
     emits: {failed: {reason: text}, lost: }
     when: (and (on ?item table) (not (gone ?item)))
@@ -42,8 +44,11 @@ EVERYTHING = plot("""
           - {set: arm.approach, to: side}
           - {trigger: arm.pick, with: {item: ?item, speed: 0.5}, as: {picked: taken}, within: 3}
         exit: {switch: arm, to: neutral}
+        on_break: {switch: arm, to: "off"}
+        at_least: 0.5
+        every: {seconds: 2, when: (p), assign: {n: 0}}
         on:
-          taken: second
+          taken: {to: second, pass: {a: ?event.item}, clear: [box, "both*"]}
           failed: {emit: failed, with: {reason: ?event.reason}, to: over}
           retry:
             - {to: first, when: (< ?n 3), assign: {n: (+ ?n 1)}, tell: (and (tried ?item) (not (fresh ?item)))}
@@ -64,6 +69,8 @@ EVERYTHING = plot("""
           left: {states: {l: {}}, initial: l}
           right: {states: {r: {}}}
         on: {stop: over}
+      either: {choice: [{when: (p), to: first, assign: {n: 1}}, second]}
+      which: {select: ?item, cases: {cup: first, 3: {to: second, when: (p)}, "true": third, '"4"': box}, else: over}
       over: {final: true, emit: lost}
     rules:
       - {on: failed, when: (< (failures ?event.item) 4), of: [second], do: {use: other, with: {a: 1}, then: retry, limit: 2}}
@@ -83,6 +90,8 @@ EVERYTHING = plot("""
         ({"dynamic": ["p"]}, DynamicState),
         ({"goal": "(p)"}, DynamicState),
         ({"final": True}, FinalState),
+        ({"choice": ["s"]}, ChoiceState),
+        ({"select": "?x", "cases": {"a": "s"}, "else": "s"}, SelectState),
     ],
 )
 def test_the_kind_of_a_state_follows_from_its_telling_key(form, kind):
@@ -103,6 +112,9 @@ def test_short_forms_mean_the_long_ones():
         variables: {b: number}
         states:
           s: {entry: {switch: arm, to: up}, on: {e: t}, after: {seconds: 1, to: t}, always: t}
+          r: {on_break: {switch: arm, to: up}, every: {seconds: 1, to: t}, on: {e: {to: s, clear: b}}}
+          c: {choice: t}
+          v: {select: ?b, cases: {1: t}, else: t}
           t:
     """)
     long = plot("""
@@ -115,6 +127,12 @@ def test_short_forms_mean_the_long_ones():
             on: {e: [{to: t}]}
             after: [{seconds: 1, to: t}]
             always: [{to: t}]
+          r:
+            on_break: [{switch: arm, to: up}]
+            every: [{seconds: 1, to: t}]
+            on: {e: [{to: s, clear: [b]}]}
+          c: {choice: [{to: t}]}
+          v: {select: ?b, cases: {"1": {to: t}}, else: {to: t}}
           t: {}
     """)
     assert short == long
@@ -210,6 +228,24 @@ def test_unknown_keys_are_refused(form):
         {"plot": "p", "states": {"s": {"use": "q", "with": {"a": None}}}},
         {"plot": "p", "states": {"s": {"on": {"e": {"tell": 5}}}}},
         {"plot": "p", "states": {"s": {"on": {"e": {"tell": ["(p)", 5]}}}}},
+        {"plot": "p", "states": {"s": {"after": {"seconds": -1, "to": "s"}}}},
+        {"plot": "p", "states": {"s": {"every": {"seconds": 0, "to": "s"}}}},
+        {"plot": "p", "states": {"s": {"at_least": "soon"}}},
+        {"plot": "p", "states": {"s": {"at_least": -1}}},
+        {"plot": "p", "parameters": {"a": "item"}, "outputs": {"a": "item"}, "states": {"s": {}}},
+        {"plot": "p", "variables": {"a": "item"}, "outputs": {"a": "item"}, "states": {"s": {}}},
+        {"plot": "p", "outputs": {"Where": "place"}, "states": {"s": {}}},
+        # Connectors: nothing rests there, something is always true, every value stands once.
+        {"plot": "p", "states": {"s": {"choice": []}}},
+        {"plot": "p", "states": {"s": {"choice": [{"when": "(p)"}, "s"]}}},
+        {"plot": "p", "states": {"s": {"select": "?x", "cases": {}, "else": "s"}}},
+        {"plot": "p", "states": {"s": {"select": "?x", "cases": {"a": "s"}}}},
+        {"plot": "p", "states": {"s": {"select": "?x", "cases": {"a": {"emit": "e"}}, "else": "s"}}},
+        {"plot": "p", "states": {"s": {"select": "?x", "cases": {"a": "s"}, "else": {"emit": "e"}}}},
+        {"plot": "p", "states": {"s": {"select": "?x", "cases": {1: "s", "1.0": "s"}, "else": "s"}}},
+        {"plot": "p", "states": {"s": {"select": "?x", "cases": {1: "s", "true": "s"}, "else": "s"}}},
+        {"plot": "p", "states": {"s": {"select": "?x", "cases": {None: "s"}, "else": "s"}}},
+        {"plot": "p", "states": {"s": {"select": "?x", "cases": {float("inf"): "s"}, "else": "s"}}},
     ],
 )
 def test_what_is_no_plot_is_refused(form):
@@ -250,9 +286,18 @@ def test_the_order_of_states_is_part_of_a_plot():
     assert forward != backward
 
 
+def test_a_copy_that_says_something_else_is_another_plot_even_if_the_first_was_compared_before():
+    first = plot("plot: p\nstates:\n  a:\n    on:\n      e: b\n  b:\n")
+    digest = first.digest
+    copy = first.model_copy(update={"about": "another"})
+    assert copy.digest != digest
+    assert copy != first
+    assert copy.model_copy(update={"about": None}) == first
+
+
 def test_states_are_walked_in_document_order_with_their_paths():
     names = [name for name, _, _ in EVERYTHING.walk()]
-    assert names == ["first", "second", "third", "box", "in_a", "in_b", "both", "l", "r", "over"]
+    assert names == ["first", "second", "third", "box", "in_a", "in_b", "both", "l", "r", "either", "which", "over"]
     paths = {name: path for name, _, path in EVERYTHING.walk()}
     assert paths["in_b"] == ("states", "box", "states", "in_b")
     assert paths["r"] == ("states", "both", "regions", "right", "states", "r")
@@ -265,6 +310,40 @@ def test_the_actions_of_a_transition_are_done_before_its_own_shorthand():
     )
     assert [type(a).__name__ for a in transition.effect] == ["Emit", "Assign", "Tell", "Emit"]
     assert transition.emitted == ("a", "b")
+
+
+def test_what_is_passed_and_cleared_is_no_action_of_a_transition():
+    assert Transition.model_validate({"to": "s", "pass": {"a": 1}, "clear": "t"}).effect == ()
+
+
+def test_the_branches_of_a_choice_are_transitions_in_order():
+    choice = EVERYTHING.state("either")
+    assert [(path, label, one.target) for path, label, one in choice.placed_transitions()] == [
+        (("choice", 0), "choice", "first"),
+        (("choice", 1), "choice", "second"),
+    ]
+    assert next(iter(choice.transitions()))[1].effect == (Assign(assign={"n": 1}),)
+
+
+def test_the_cases_of_a_select_are_guarded_by_their_values():
+    guarded = {path: one.guard for path, _, one in EVERYTHING.state("which").placed_transitions()}
+    item = Variable("item")
+    assert guarded == {
+        ("cases", "cup"): Comparison("=", item, Constant("cup")),
+        ("cases", 3): And((Comparison("=", item, Constant(3)), Atom("p"))),
+        ("cases", True): Comparison("=", item, Constant(True)),
+        ("cases", '"4"'): Comparison("=", item, Constant("4")),
+        ("else",): None,
+    }
+
+
+def test_reactions_that_come_again_stand_between_timeouts_and_what_needs_no_trigger():
+    state = State.model_validate({
+        "always": "c", "every": [{"seconds": "?n", "to": "b"}, {"seconds": 1}], "after": {"seconds": 0, "to": "a"},
+    })  # fmt: skip
+    assert [(path, label) for path, label, _ in state.placed_transitions()] == [
+        (("after", 0), "after"), (("every", 0), "every"), (("every", 1), "every"), (("always", 0), "always"),
+    ]  # fmt: skip
 
 
 def test_a_rule_says_what_it_does():
@@ -284,9 +363,13 @@ TRANSITIONS = st.fixed_dictionaries(
     {},
     optional={
         "to": NAMES, "when": st.sampled_from(["(p)", "(not (p ?x))"]), "assign": TERMS,
-        "tell": st.just("(p)"), "emit": NAMES, "with": TERMS,
+        "tell": st.just("(p)"), "emit": NAMES, "with": TERMS, "pass": TERMS,
     },
 )  # fmt: skip
+CASES = st.sampled_from(["a", "on", "4", 2, 0.5, '"3"', "Big Cup", "null", "true", "a: b"])
+SELECTS = st.fixed_dictionaries(
+    {"select": SCALARS, "cases": st.dictionaries(CASES, NAMES, min_size=1, max_size=3), "else": NAMES}
+)
 SIMPLE = st.fixed_dictionaries(
     {},
     optional={
@@ -315,7 +398,7 @@ SIMPLE = st.fixed_dictionaries(
             "states": st.just({}),
         },
     ),
-    states=st.dictionaries(NAMES, SIMPLE, min_size=1, max_size=3),
+    states=st.dictionaries(NAMES, st.one_of(SIMPLE, SELECTS), min_size=1, max_size=3),
     regions=st.lists(NAMES, max_size=2, unique=True),
 )
 def test_any_plot_survives_json_and_yaml(form, states, regions):

@@ -131,6 +131,25 @@ def test_a_goal_needs_no_planner_to_be_checked(tmp_path: Path) -> None:
 # -- show --------------------------------------------------------------------------------------------------
 
 
+def test_connectors_and_times_are_shown_in_the_tree(tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text("""
+plot: p
+outputs: {n: {type: number, initial: 0}}
+states:
+  a: {at_least: 2, on_break: {switch: arm, to: up}, every: {seconds: 0.5, to: b}, on: {done: w}}
+  w: {select: ?n, cases: {1: {to: a, assign: {n: 2}}}, else: c}
+  c: {choice: [{when: (> ?n 3), to: a}, b]}
+  b: {final: true}
+""")
+    lines = [line.lstrip("│├└─ ") for line in run("show", file).output.splitlines()]
+    for line in (
+        "outputs: n: number", "at least 2 s", "break / arm → up", "every 0.5 s → b", "w  select ?n",
+        "1 → a  / n := 2", "→ c  [else]", "c  choice", "→ a  [(> ?n 3)]", "→ b  [else]",
+    ):  # fmt: skip
+        assert line in lines
+
+
 def test_a_plot_is_shown_as_a_tree() -> None:
     result = run("show", SHIPPED / "report.yaml")
     assert result.exit_code == 0

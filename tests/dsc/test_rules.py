@@ -9,10 +9,12 @@ from dsc.dynamic.library import Library
 from dsc.dynamic.rules import DEFAULT_RETRIES
 from dsc.engine.situation import Decision
 from dsc.engine.steps import SetParameter
+from dsc.model.actions import Tell
 from dsc.model.states import SubmachineState
 from dsc.text.plots import parse_plot, plot_to_yaml
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Fact, fact
+from knowledge_base.language.expression import Constant
 
 STEP = """
     plot: step
@@ -416,6 +418,63 @@ def test_a_recovery_takes_no_name_that_is_there_already():
     step = run.send("bad")
     assert run.machine.state.is_active("mend")
     assert modes(step) == []
+
+
+def test_a_rule_keeps_all_that_the_transition_it_takes_says():
+    text = """
+        plot: p
+        profile: scxml
+        states:
+          do_it: {use: step, on: {done: {to: next, pass: {item: cup2}, clear: box, also: [other], emit: e}}}
+          next: {use: step}
+          other:
+          box:
+        rules:
+          - {on: failed, of: [do_it], do: {tell: (p), then: continue}}
+    """
+    holder = plot(text)
+    expanded = Library([holder, plot(STEP)]).expanded(holder)
+    done, failed = (expanded.states["do_it"].on[event][0] for event in ("done", "failed"))
+    (tell, emit) = failed.effect
+    assert (tell, emit) == (Tell(tell="(p)"), *done.effect)
+    assert (failed.targets, failed.passed, failed.clear) == (done.targets, done.passed, done.clear)
+    assert failed.rule == "failed: continue"
+
+
+def test_what_is_passed_on_giving_up_may_be_the_reason():
+    text = """
+        plot: p
+        states:
+          do_it: {use: step, on: {done: next, gave_up: {to: next, pass: {item: ?event.reason}}}}
+          next: {use: step, on: {done: over}}
+          over: {final: true}
+        rules:
+          - {on: failed, of: [do_it], do: {then: give_up}}
+    """
+    holder = plot(text)
+    expanded = Library([holder, plot(STEP)]).expanded(holder)
+    assert expanded.states["do_it"].on["failed"][0].passed == {"item": Constant("failed")}
+
+
+def test_rules_leave_connectors_alone_and_their_names():
+    text = """
+        plot: p
+        outputs: {tries_do_it_failed_1: {type: number, initial: 0}}
+        states:
+          do_it: {use: step, on: {done: which}}
+          which: {choice: [{when: (p), to: do_it}, do_it_failed_0_recover]}
+          do_it_failed_0_recover: {select: 1, cases: {1: over}, else: do_it}
+          over: {final: true}
+        rules:
+          - {on: failed, do: {use: recover, then: over}}
+          - {on: failed, do: {then: retry}}
+    """
+    holder = plot(text)
+    expanded = Library([holder, plot(STEP), plot(RECOVER)]).expanded(holder)
+    for name in ("which", "do_it_failed_0_recover"):
+        assert expanded.states[name] == holder.states[name]
+    assert expanded.states["do_it_failed_0_recover_2"].use == "recover"
+    assert list(expanded.variables) == ["tries_do_it_failed_1_2"]
 
 
 # -- mistakes ----------------------------------------------------------------------------------------------

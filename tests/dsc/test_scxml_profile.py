@@ -8,8 +8,8 @@ import pytest
 from dsc_charts import Run, plot
 
 from dsc.dynamic.library import Library
-from dsc.engine.configuration import MachineState
 from dsc.engine.selection import matches
+from dsc.engine.state import MachineState
 from dsc.engine.steps import Note, SendLater
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, SimulatedEventLoop
@@ -63,7 +63,7 @@ def test_history_restores_what_was_left(depth, restored):
     assert run.active == ["p", "o"]
     for event in ("next", "next", "out"):
         run.send(event)
-    run.machine.state = MachineState.from_json(run.machine.state.to_json())
+    run.machine.state = MachineState.from_json(run.machine.state.to_json(), run.library)
     run.send("back")
     assert run.active == restored
 
@@ -130,6 +130,8 @@ FOREIGN = [
     "a: {on: {e: {to: b, do: [{log: [x]}]}}}",
     "a: {on: {e: {to: b, do: [{emit: f, delay: 1}]}}}",
     "a: {states: {h: {history: deep, to: c}, c: {}}, on: {e: b}}",
+    "a: {on_break: {emit: e}, on: {e: b}}",
+    "a: {choice: [{when: (in-state b), to: b}, b]}",
 ]
 
 
@@ -142,6 +144,14 @@ def test_the_dsc_profile_refuses_what_only_scxml_has(state):
     assert "p.yaml:3" in str(found[0])
     admitted = plot(text.replace("PROFILE", "profile: scxml\n"))
     assert validate_plot(admitted, Library([admitted])) == []
+
+
+def test_histories_are_cleared_where_there_are_histories():
+    text = "plot: p\nPROFILEstates:\n  a:\n    on: {e: {to: b, clear: a}}\n    states: {h: {history: deep, to: c}, c: {}}\n  b: {}\n"
+    refused = plot(text.replace("PROFILE", ""), "p.yaml")
+    assert any("p.yaml:4" in str(one) and "clears histories" in str(one) for one in validate_plot(refused, Library()))
+    admitted = plot(text.replace("PROFILE", "profile: scxml\n"))
+    assert validate_plot(admitted, Library()) == []
 
 
 @pytest.mark.parametrize(

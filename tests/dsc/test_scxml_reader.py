@@ -87,6 +87,9 @@ def test_what_terms_cannot_say_is_named(text):
         ("<state id='a'><onentry><send event='e' target='http://x'/></onentry></state>", "send/@target"),
         ("<state id='a' initial='b c'><state id='b'/><state id='c'/></state>", "only one state"),
         ("<state id='a'><x:y xmlns:x='other'/></state>", "y: has no counterpart"),
+        ("<state id='a'><transition event='go after' target='a'/></state>", "transition/@event: 'after'"),
+        ("<state id='a'><transition event='every' target='a'/></state>", "transition/@event: 'every'"),
+        ("<state id='a'><transition event='at_least' target='a'/></state>", "transition/@event: 'at_least'"),
     ],
 )
 def test_elements_without_counterpart_are_named(body, message):

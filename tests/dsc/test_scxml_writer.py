@@ -14,6 +14,7 @@ from dsc.text.scxml.reader import parse_scxml
 from dsc.text.scxml.writer import to_scxml
 from dsc.text.state_diagram import to_mermaid, to_plantuml
 from knowledge_base.errors import InputError
+from knowledge_base.language.printer import to_text
 
 SHIPPED = sorted((Path(__file__).parents[2] / "domains" / "clean_up_table" / "plots").glob("*.yaml"))
 
@@ -67,6 +68,57 @@ def test_a_plain_dsc_plot_can_be_written():
 def test_what_scxml_cannot_say_is_named(state):
     with pytest.raises(NotExpressibleError):
         to_scxml(plot(f"plot: p\nvariables: {{x: number, y: number}}\nstates: {{a: {state}, end: {{final: true}}}}"))
+
+
+@pytest.mark.parametrize(
+    ("element", "keys"),
+    [
+        ("outputs", "outputs: {x: {type: number, initial: 0}}\nstates: {a: {on: {go: b}}, b: {final: true}}"),
+        ("on_break", "states: {a: {on_break: {switch: arm, to: up}, on: {go: b}}, b: {final: true}}"),
+        ("every", "states: {a: {every: {seconds: 1}, on: {go: b}}, b: {final: true}}"),
+        ("at_least", "states: {a: {at_least: 1, on: {go: b}}, b: {final: true}}"),
+        ("pass", "states: {a: {on: {go: {to: b, pass: {x: 1}}}}, b: {final: true}}"),
+        ("clear", "profile: scxml\nstates: {a: {on: {go: {to: b, clear: b}}}, b: {states: {h: {history: deep, to: c}, c: {}}}}"),
+    ],
+)
+def test_what_scxml_has_nothing_for_is_named_as_in_the_plot(element, keys):
+    with pytest.raises(NotExpressibleError) as caught:
+        to_scxml(plot(f"plot: p\n{keys}\n"))
+    assert caught.value.element == element
+
+
+CONNECTORS = """
+    plot: p
+    receives: {go: {kind: text}}
+    variables: {x: {type: number, initial: 0}}
+    states:
+      first: {choice: [{when: (< ?x 3), to: a, assign: {x: (+ ?x 1)}}, b]}
+      a: {on: {go: which}}
+      which: {select: ?event.kind, cases: {cup: {to: a, when: (> ?x 1)}, 2: b}, else: first}
+      b: {final: true}
+"""
+
+
+def test_connectors_are_passed_through_as_states_that_wait_for_nothing():
+    written = to_scxml(plot(CONNECTORS))
+    read = parse_scxml(written)
+    assert read.initial == "first"
+    assert [(one.target, len(one.effect)) for one in read.states["first"].always] == [("a", 1), ("b", 0)]
+    assert [one.target for one in read.states["which"].always] == ["a", "b", "first"]
+    assert to_text(read.states["which"].always[0].guard) == '(and (= ?event.kind "cup") (> ?x 1))'
+    assert to_scxml(read) == written
+
+
+def test_text_diagrams_show_connectors_and_times():
+    made = plot(CONNECTORS.replace("a: {on:", "a: {at_least: 2, every: {seconds: 0.5, to: b}, on_break: {switch: arm, to: up}, on:"))
+    for text in (to_mermaid(made), to_plantuml(made)):
+        assert "state s1 <<choice>>" in text
+        assert "state s3 <<choice>>" in text
+        assert "s1 --> s4 : [else]" in text
+        assert "s3 --> s2 : [(and (= ?event.kind cup) (> ?x 1))]" in text
+        assert "s2 --> s4 : every 0.5 s" in text
+        assert "s2 : at least 2 s" in text
+        assert "s2 : break / arm → up" in text
 
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)

@@ -5,12 +5,17 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from dsc_runs import SLOW, Arm, Ran
+from dsc_charts import plot
+from dsc_runs import SCHEMA, SLOW, Arm, Ran
 
+from dsc.dynamic.library import Library
 from dsc.events import Event
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import Outcome, skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
+from knowledge_base.store import KnowledgeBase
 
 GRASP = """
     plot: p
@@ -382,3 +387,72 @@ def test_events_of_the_executive_itself_cannot_be_posted_from_outside(name):
             sequencer.post(Event(name))
 
     Ran("{plot: p, states: {e: {final: true}}}", prepare=prepare)
+
+
+# -- listening, and what is still to come ------------------------------------------------------------------
+
+
+def test_whoever_listens_is_told_every_step_before_its_actions_leave():
+    def prepare(sequencer):
+        sequencer.listen(lambda step: heard.append((step, list(arm.log))))
+        sequencer.post(Event("nonsense"), after=1)
+        sequencer.change(Delta(added=(Fact("q"),)), "somebody", after=1.5)
+
+    heard, arm = [], Arm()
+    ran = Ran(GRASP, arm=arm, prepare=prepare)
+    assert ran.end.finished
+    assert [(step.event and step.event.name, step.moved) for step, _ in heard] == [
+        (None, True), ("nonsense", False), (None, False), ("grasped", True),
+    ]  # fmt: skip
+    assert [log for _, log in heard] == [[], *[["grasp cup1"]] * 3]
+
+
+def test_a_run_that_ends_with_a_problem_tells_the_step_that_leaves_everything():
+    heard = []
+    ran = Ran("{plot: p, states: {a: {on: {stop: e}}, e: {final: true}}}", prepare=lambda sequencer: sequencer.listen(heard.append))
+    assert not ran.end.finished
+    assert [step.exited("a") for step in heard] == [False, True]
+
+
+def test_a_run_waits_for_what_is_still_to_come_and_for_no_longer():
+    def prepare(sequencer):
+        sequencer.post(Event("nonsense"), after=9)
+        sequencer.change(Delta(added=(Fact("q"),)), "somebody", after=20)
+
+    text = "{plot: p, receives: {go: }, states: {a: {on: {go: e}, always: {to: b, when: (q)}}, b: {on: {go: e}}, e: {final: true}}}"
+    ran = Ran(text, prepare=prepare)
+    assert ran.end.problem == "nothing is going on and nothing can happen any more"
+    assert ran.at == pytest.approx(20)
+    assert any("b" in micro["entered"] for step in ran.of_type("step") for micro in step["microsteps"])
+
+
+def test_what_is_still_to_come_when_a_run_ends_is_dropped():
+    ran = Ran(GRASP, prepare=lambda sequencer: sequencer.post(Event("stop"), after=50))
+    assert ran.end.finished
+    assert ran.at == pytest.approx(2)
+    assert [event["name"] for event in ran.of_type("event")] == ["grasped"]
+
+
+def test_what_was_still_to_come_does_not_come_in_the_next_run():
+    heard = []
+
+    async def main():
+        waits = Library([plot("{plot: p, states: {a: {after: {seconds: 3, to: e}}, e: {final: true}}}")])
+        sequencer = Sequencer(waits, KnowledgeBase(SCHEMA), [], LoopClock())
+        sequencer.listen(heard.append)
+        sequencer.post(Event("stop"), after=4)
+        await sequencer.run("p")
+        await sequencer.run("p")
+
+    run_simulated(main())
+    assert [step.event and step.event.name for step in heard] == [None, "after"] * 2
+
+
+def test_what_is_wrong_is_refused_at_once_however_late_it_would_come():
+    def prepare(sequencer):
+        with pytest.raises(InputError, match="fired by the executive itself"):
+            sequencer.post(Event("done"), after=5)
+        with pytest.raises(UnknownNameError, match="'nonsense'"):
+            sequencer.change(Delta(added=(Fact("nonsense"),)), "me", after=5)
+
+    assert Ran(GRASP, prepare=prepare).at == pytest.approx(2)

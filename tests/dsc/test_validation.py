@@ -10,6 +10,7 @@ from dsc_charts import plot
 
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
+from dsc.model.plot import ActionPlot
 from dsc.skills import Component, Outcome, skill
 from dsc.text.plots import load_library, parse_plot
 from dsc.validation import raise_findings, validate_library, validate_plot
@@ -48,6 +49,25 @@ HELPERS = [
           s: {on: {bad: {to: over, emit: failed, with: {item: ?item}}, worse: {to: over, emit: lost}, ok: over}}
           over: {final: true}
     """),
+    plot("""
+        plot: search
+        parameters: {item: item, place: {type: place, default: table}}
+        outputs: {where: place, tries: {type: number, initial: 0}}
+        receives: {ok: {at: place}}
+        states:
+          s: {on: {ok: {to: over, assign: {where: ?event.at}}}}
+          over: {final: true}
+    """),
+    plot("""
+        plot: ask
+        parameters: {item: item}
+        outputs: {where: place, tries: {type: text, initial: none}}
+        emits: {nobody: {item: item}}
+        receives: {ok: {at: place}, no: }
+        states:
+          s: {on: {ok: {to: over, assign: {where: ?event.at}}, no: {to: over, emit: nobody, with: {item: ?item}}}}
+          over: {final: true}
+    """),
     plot("{plot: wait, states: {s: {after: {seconds: 1, to: over}}, over: {final: true}}}"),
     plot("{plot: talk, emits: {said: }, states: {s: {after: {seconds: 1, to: over}}, over: {final: true, emit: said}}}"),
 ]  # fmt: skip
@@ -68,6 +88,8 @@ E = "  e: {final: true}\n"
 ITEM = "plot: p\nparameters: {item: item}\nstates:\n"
 GRASP = "    use: grasp\n    with: {item: ?item}\n"
 WIRED = "    on: {done: e, failed: e, lost: e}\n"
+H = "plot: p\nprofile: scxml\nstates:\n"
+FOUND = "  s: {{use: search, {}on: {{done: e}}}}\n  e: {{final: true}}\n"
 WRONG = [
     # -- structure
     ("initial", "plot: p\ninitial: b\nstates: {a: {on: {done: a}}}\n", 2, "no state 'b' to begin with", ""),
@@ -288,6 +310,151 @@ WRONG = [
         7, "the rules would make 1001 transitions; at most 1000", "with `of`",
     ),
     ("something to choose", S + "  a:\n    dynamic: []\n    on: {no_candidate: e}\n" + E, 4, "'a' has nothing to choose", "a `goal`"),
+    # -- connectors
+    ("target", S + "  a: {on: {done: b}}\n  b:\n    choice:\n      - {when: (free), to: d}\n      - e\n" + E, 6, "no state 'd'", ""),
+    ("target", S + "  a: {on: {done: b}}\n  b:\n    select: 1\n    cases:\n      cup: d\n    else: e\n" + E, 7, "no state 'd'", ""),
+    (
+        "no border crossing",
+        S + "  a: {on: {done: b}}\n  c: {states: {d: {on: {done: d}}}, on: {done: e}}\n  b:\n    choice: [d]\n" + E,
+        6, "crosses a border", "",
+    ),
+    ("choice", S + "  a: {on: {done: b}}\n  b:\n    choice: [{when: (free), to: e}]\n" + E, 5, "last branch has a `when`", "end with"),
+    (
+        "choice",
+        S + "  a: {on: {done: b}}\n  b: {select: 1, cases: {1: e},\n    else: {when: (free), to: e}}\n" + E,
+        5, "last branch has a `when`", "end with",
+    ),
+    ("choice", S + "  a: {on: {done: b}}\n  b:\n    choice:\n      - a\n      - e\n" + E, 6, "never reached", "put it last"),
+    (
+        "connectors lead on",
+        S + "  a: {on: {done: b}}\n  b:\n    choice: [{when: (free), to: b}, e]\n" + E, 4, "from 'b' back", "",
+    ),
+    (
+        "condition",
+        S + "  a: {on: {done: b}}\n  b:\n    choice:\n      - {when: (fre), to: e}\n      - e\n" + E, 6, "mean 'free'", "",
+    ),
+    (
+        "condition",
+        "plot: p\nvariables: {n: number}\nstates:\n  a: {on: {done: b}}\n  b:\n    select: ?n\n    cases:\n"
+        "      2: e\n      1: {when: (fre), to: e}\n    else: e\n" + E,
+        9, "mean 'free'", "",
+    ),
+    ("declared variable", S + "  a: {on: {done: b}}\n  b:\n    choice:\n      - {assign: {n: 1}, to: e}\n" + E, 6, "no variable 'n'", ""),
+    (
+        "declared outcome",
+        S + "  a: {on: {done: b}}\n  b:\n    choice:\n      - {emit: lost, to: e}\n" + E, 6, "outcome 'lost'", "emits",
+    ),
+    # -- times
+    ("at least", S + "  a:\n    at_least: 2\n    after: {seconds: 1.5, to: e}\n" + E, 5, "at least 2 s", "2 s or more"),
+    ("declared variable", S + "  a:\n    at_least: ?n\n    on: {done: e}\n" + E, 4, "?n", ""),
+    ("declared variable", S + "  a:\n    every:\n      seconds: ?n\n      to: e\n" + E, 5, "?n", ""),
+    ("condition", S + "  a:\n    every:\n      seconds: 1\n      when: (fre)\n    on: {done: e}\n" + E, 6, "mean 'free'", ""),
+    ("effect", S + "  a:\n    every: {seconds: 1, tell: (fre)}\n    on: {done: e}\n" + E, 4, "mean 'free'", ""),
+    ("declared outcome", S + "  a:\n    every: {seconds: 1, emit: lost}\n    on: {done: e}\n" + E, 4, "outcome 'lost'", ""),
+    ("known event", S + "  a:\n    on:\n      done: e\n      every: e\n" + E, 6, "fires the event 'every'", ""),
+    ("reserved event", "plot: p\nreceives: {at_least: }\nstates:\n  a: {on: {done: e}}\n" + E, 2, "'at_least'", ""),
+    # -- what happens on a break
+    ("known component", S + "  a:\n    on_break: {switch: leg, to: up}\n    on: {done: e}\n" + E, 4, "leg", ""),
+    ("declared variable", S + "  a:\n    on_break: {set: arm.speed, to: ?n}\n    on: {done: e}\n" + E, 4, "?n", ""),
+    # -- histories
+    (
+        "clear",
+        H + "  a:\n    on: {out: {to: e, clear: aa}}\n    states: {b: {}, h: {history: shallow, to: b}}\n" + E,
+        5, "did you mean 'a'", "",
+    ),
+    (
+        "clear",
+        H + "  a:\n    on: {out: {to: e, clear: a}}\n    states: {b: {states: {c: {}, h: {history: deep, to: c}}}}\n" + E,
+        5, "'a' has no history", '"a*"',
+    ),
+    # -- what is passed
+    (
+        "arguments are taken",
+        S + "  a: {on: {done: b}}\n  b:\n    on: {done: {to: e, pass: {n: 1}}}\n" + E, 5, "to 'e', which holds no plot", "use",
+    ),
+    ("arguments are taken", S + "  a: {every: {seconds: 1, pass: {n: 1}}, on: {done: e}}\n" + E, 3, "leads nowhere", ""),
+    (
+        "known parameter",
+        ITEM + "  a:\n    on:\n      done: {to: s, pass: {itm: ?item}}\n" + FOUND.format("with: {item: ?item}, "), 6, "mean 'item'", "",
+    ),
+    (
+        "candidates conform",
+        ITEM + "  a:\n    on:\n      done: {to: s, pass: {itm: ?item}}\n"
+        "  s: {dynamic: [search], with: {item: ?item}, on: {done: e, no_candidate: e}}\n" + E,
+        6, "mean 'item'", "",
+    ),
+    ("declared variable", S + "  a:\n    on:\n      done: {to: s, pass: {item: ?itm}}\n" + FOUND.format(""), 5, "?itm", ""),
+    (
+        "parameters are given",
+        ITEM + "  a:\n    on:\n      done: {to: s, pass: {item: ?item}}\n      error: s\n" + FOUND.format(""),
+        7, "a transition leads to 's' and does not pass 'item', which plot 'search' needs", "`pass`",
+    ),
+    (
+        "parameters are given",
+        H.replace("states:", "parameters: {item: item}\nstates:") + "  a:\n    on: {out: h}\n    states:\n"
+        "      b: {on: {go: {to: s, pass: {item: ?item}}}}\n      s: {use: search}\n      h: {history: deep, to: b}\n",
+        9, "entered without a transition", "`with`",
+    ),
+    (
+        "parameters are given",
+        H.replace("states:", "parameters: {item: item}\nstates:") + "  a: {on: {go: o}}\n  o:\n    regions:\n"
+        "      r: {states: {b: {on: {go: {to: s, pass: {item: ?item}}}}, s: {use: search}}}\n"
+        "      q: {states: {c: {}, d: {use: ask, with: {item: ?item}, on: {nobody: a,\n"
+        "        go: {to: d, also: [s], pass: {item: ?item}}}}}}\n",
+        10, "a transition leads to 's' and does not pass", "`pass`",
+    ),
+    (
+        "parameters are given",
+        ITEM + "  a:\n    on:\n      done: {to: s, pass: {item: ?item}}\n      error: e\n"
+        "  s: {use: search, on: {done: a}}\n" + E + "initial: s\n",
+        8, "entered without a transition", "`with`",
+    ),
+    (
+        "parameters are given",
+        ITEM + "  a: {on: {done: {to: s, pass: {item: ?item}}}}\n  s: {use: ask, on: {done: e}}\n" + E
+        + "rules:\n  - {on: nobody, do: {then: retry}}\n  - {on: nobody, do: {then: e}}\n",
+        5, "the rule 'nobody: retry' leads to 's'", "`with`",
+    ),
+    (
+        "parameters are given",
+        ITEM + "  a: {on: {done: {to: s, pass: {item: ?item}}}}\n  s: {use: ask, on: {done: e}}\n" + E
+        + "rules:\n  - {on: nobody, do: {use: wait, then: retry}}\n  - {on: nobody, do: {then: e}}\n",
+        5, "a rule's recovery leads to 's'", "`with`",
+    ),
+    # -- what is handed back
+    ("outputs are given", "plot: p\noutputs: {n: number}\nstates:\n  a: {on: {done: e}}\n" + E, 2, "never gets a value", "initial"),
+    ("known type", "plot: p\noutputs: {n: {type: nmber, initial: 1}}\nstates:\n  a: {on: {done: e}}\n" + E, 2, "mean 'number'", ""),
+    (
+        "declared variable",
+        ITEM + "  s:\n    use: search\n    with: {item: ?item}\n    on:\n      done: {to: e, emit: x, with: {w: ?event.were}}\n      x: e\n" + E,
+        8, "mean 'event.where'", "",
+    ),
+    (
+        "condition",
+        ITEM + "  s:\n    use: search\n    with: {item: ?item}\n    on:\n      done: [{to: e, when: (on ?event.tries table)}, e]\n" + E,
+        8, "number", "",
+    ),
+    # candidates that agree on a name and not on its type have no such output
+    (
+        "declared variable",
+        ITEM + "  s:\n    dynamic: [search, ask]\n    with: {item: ?item}\n    on:\n"
+        "      done: {to: s, assign: {n: ?event.tries}}\n      no_candidate: e\n      nobody: e\n" + E + "variables: {n: text}\n",
+        8, "?event.tries", "",
+    ),
+    # a goal that is reached, by a candidate or a plan, hands nothing back
+    (
+        "declared variable",
+        ITEM + "  s:\n    dynamic: [search]\n    goal: (free)\n    with: {item: ?item}\n    on:\n"
+        "      done: {to: e, assign: {n: ?event.where}}\n      no_plan: e\n      gave_up: e\n" + E + "variables: {n: place}\n",
+        9, "?event.where", "",
+    ),
+    ("declared variable", S + "  a:\n    on:\n      done: [{to: e, when: (free), emit: x, with: {w: ?event.where}}, e]\n      x: e\n" + E, 5, "?event.where", ""),
+    (
+        "declared variable",
+        ITEM + "  s: {use: ask, with: {item: ?item}, on: {done: {to: e, assign: {w: ?event.where}}}}\n" + E
+        + "variables: {w: place}\nrules:\n  - on: nobody\n    do: {then: continue}\n",
+        9, "?event.where", "",
+    ),
     # -- rules are transitions too
     (
         "no border crossing",
@@ -346,6 +513,27 @@ RIGHT = [
     "  a: {use: grasp, with: {item: ?o, speed: (+ 1 2)}, on: {done: {to: e, assign: {t: ?w}}, failed: e, lost: e}}\n" + E,
     # a plot in a variable may end with anything
     "plot: p\nvariables: {plan: plot}\nstates:\n  a: {use: ?plan, on: {done: e, whatever: e}}\n" + E,
+    # connectors: first, one after the other, fed by any event, on the way to an outcome that is fired before
+    "plot: p\nemits: {yes: , no: }\nparameters: {i: item}\nstates:\n  first: {choice: [{when: (free), to: a}, second]}\n"
+    "  second: {select: ?i, cases: {cup: a, can: {to: a, when: (free)}}, else: {to: e, emit: no}}\n"
+    "  a: {entry: {trigger: arm.grasp, with: {item: ?i}}, on: {grasped: {to: over, emit: yes}, slipped: which}}\n"
+    "  which: {select: ?event.item, cases: {cup: a}, else: {to: over, emit: no}}\n  over: {choice: [e]}\n" + E,
+    # a rule may lead to a connector
+    ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n  c: {choice: [{when: (free), to: a}, e]}\n" + E
+    + "rules:\n  - {on: lost, do: {then: c}}\n",
+    # least times, periods, breaks
+    S + "  a:\n    at_least: 2\n    after: [{seconds: 2, to: e}, {seconds: (* 2 3), to: e}]\n    on_break: {switch: arm, to: rest}\n"
+    "    every: {seconds: 0.1, when: (free), tell: (not (free))}\n" + E,
+    # histories are cleared where they are, or at any level below; those in regions belong to the orthogonal state
+    H + "  a:\n    on: {out: {to: e, clear: [b, 'a*', o]}}\n    states:\n      b: {states: {c: {}, h: {history: deep, to: c}}}\n"
+    "      o: {regions: {r: {states: {d: {}, i: {history: shallow, to: d}}}}}\n" + E,
+    # what a plot needs is passed on every way in; what it has put out is there when it is done
+    ITEM + "  a:\n    on:\n      done: {to: s, pass: {item: ?item}}\n"
+    "  s: {use: search, on: {done: {to: b, pass: {place: ?event.where}, assign: {n: ?event.tries}}}}\n"
+    "  b: {dynamic: [search, ask], with: {item: ?item}, on: {nobody: e, no_candidate: e, done: [{to: s, when: (on ?item ?event.where),\n"
+    "    pass: {item: ?item}}, e]}}\n" + E + "variables: {n: number}\n",
+    # the outputs of a plot in a variable are anybody's guess
+    "plot: p\nvariables: {plan: plot, n: text}\nstates:\n  a: {use: ?plan, on: {done: {to: e, assign: {n: ?event.what}}}}\n" + E,
     # outcomes of plans may be passed on
     "plot: p\nemits: {no_plan: {reason: text}, gave_up: {reason: text}}\nstates:\n  a:\n    goal: (free)\n    on:\n      done: e\n"
     "      no_plan: {to: e, emit: no_plan, with: {reason: ?event.reason}}\n"
@@ -391,3 +579,46 @@ def test_the_shipped_plots_pass_without_skills():
     library = load_library(root / "domains" / "clean_up_table" / "plots")
     schema = Schema.from_pddl(root / "domains" / "clean_up_table" / "domain.pddl")
     assert [str(f) for f in validate_library(library, schema, None)] == []
+
+
+def _ring(size):
+    states = {f"s{n}": {"on": {"next": [{"to": f"s{(n + 1) % size}", "when": "(> ?n 0)"}]}} for n in range(size)}
+    return {"plot": "ring", "variables": {"n": "number"}, "receives": {"next": None}, "states": states}
+
+
+def _handed_on(size):
+    """Submachines one after the other, each with a choice before it that passes what the plot inside needs."""
+    states = {}
+    for n in range(size):
+        states[f"c{n}"] = {"choice": [{"to": f"c{n + 1}", "when": "(> ?n 0)"}, {"to": f"s{n}", "pass": {"item": "?item"}}]}
+        states[f"s{n}"] = {"use": "search", "on": {"done": {"to": f"c{n + 1}", "assign": {"out": 1}}}}
+    states[f"c{size}"] = {"select": "?n", "cases": {1: "e"}, "else": "e"}
+    more = {"parameters": {"item": "item"}, "variables": {"n": {"type": "number", "initial": 1}}, "outputs": {"out": "number"}}
+    return {"plot": "handed_on", **more, "states": {"begin": {"on": {"done": "c0"}}, **states, "e": {"final": True}}}
+
+
+def _remembering(size):
+    """Composite states with histories, which transitions forget."""
+    states = {
+        f"s{n}": {
+            "initial": f"a{n}", "after": {"seconds": 1, "to": f"h{(n + 1) % size}", "clear": [f"s{n}", f"s{n}*"]},
+            "states": {f"a{n}": {"on": {"go": f"b{n}"}}, f"b{n}": {}, f"h{n}": {"history": "deep", "to": f"b{n}"}},
+        }
+        for n in range(size)
+    }  # fmt: skip
+    return {"plot": "remembering", "profile": "scxml", "states": states}
+
+
+@pytest.mark.parametrize("form", [_ring, _handed_on, _remembering])
+def test_a_large_plot_is_walked_no_oftener_than_a_small_one(form, monkeypatch):
+    def walks(size):
+        large = ActionPlot.model_validate(form(size))
+        seen = []
+        walk = ActionPlot.walk
+        library = Library([*HELPERS, large])
+        monkeypatch.setattr(ActionPlot, "walk", lambda self: (seen.append(self), walk(self))[1])
+        assert validate_plot(large, library, SCHEMA) == []
+        monkeypatch.undo()
+        return len(seen)
+
+    assert walks(40) == walks(4)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 from dsc_charts import plot
 
 from dsc.text.files import MAX_BYTES
-from dsc.text.plots import json_schema, load_library, load_plot, parse_plot, plot_to_yaml
+from dsc.text.plots import load_library, load_plot, parse_plot, plot_to_yaml
 from dsc.text.yaml import load_document
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.expression import Variable
@@ -73,7 +72,7 @@ BROKEN = [
     ("plot: p\nparameters:\n  Item: item" + END, 3, "'Item' is no name for a variable"),
     ("plot: p\nvariables:\n  two words: item" + END, 3, "'two words' is no name for a variable"),
     ("plot: p\nemits:\n  failed:\n    itemName: item" + END, 4, "'itemName' is no name for a variable"),
-    ("plot: p\nparameters: {n: number}\nvariables:\n  n: number" + END, 4, "'n' is a parameter and a variable"),
+    ("plot: p\nparameters: {n: number}\nvariables:\n  n: number" + END, 4, "'n' is declared twice: as parameter and as variable"),
     # states
     ("plot: p\nstates:\n  s: text", 3, "a mapping was expected"),
     ("plot: p\nstates:\n  a/b: {}", 3, "'a/b' is no name for a state"),
@@ -107,6 +106,28 @@ BROKEN = [
     (HEAD + "    on:\n      e:\n        do:\n          - {asign: {n: 1}}", 7, "did you mean 'assign'?"),
     (HEAD + "    on:\n      e:\n        do:\n          - assign:\n              n: (+ ?n", 8, "'(' is never closed"),
     (HEAD + "    after: {second: 5, to: s}", 4, "did you mean 'seconds'?"),
+    (HEAD + "    every: {second: 5, to: s}", 4, "did you mean 'seconds'?"),
+    (HEAD + "    every:\n      - {seconds: 1, to: s}\n      - {to: s, seconds: 0}", 6, "longer than 0 seconds; found 0"),
+    (HEAD + "    at_least: soon", 4, "a number of seconds was expected; found 'soon'"),
+    (HEAD + "    at_leest: 1", 4, "did you mean 'at_least'?"),
+    (HEAD + "    on_brake: {switch: arm, to: up}", 4, "did you mean 'on_break'?"),
+    (HEAD + "    on:\n      e: {to: s, pas: {a: 1}}", 5, "did you mean 'pass'?"),
+    (HEAD + "    on:\n      e: {to: s, cleer: s}", 5, "did you mean 'clear'?"),
+    (HEAD + "    choise: [s]", 4, "did you mean 'choice'?"),
+    (HEAD + "    choice: []", 4, "at least one entry is needed; found an empty list"),
+    (HEAD + "    choice:\n      - {when: (p), to: s}\n      - {wen: (p), to: s}", 6, "did you mean 'when'?"),
+    (HEAD + "    choice:\n      - {when: (p), too: s}\n      - s", 5, "did you mean 'to'?"),
+    (HEAD + "    choice:\n      - s\n      - {when: (p)}", 6, "nothing rests in a connector"),
+    (HEAD + "    selct: ?x\n    cases: {a: s}", 4, "did you mean 'select'?"),
+    (HEAD + "    select: ?x\n    casses: {a: s}\n    else: s", 5, "did you mean 'cases'?"),
+    (HEAD + "    select: ?x\n    cases: {a: s}", 3, "the key 'else' is missing"),
+    (HEAD + "    select: ?x\n    cases:\n      a: s\n      b: {emit: e}\n    else: s", 7, "nothing rests in a connector"),
+    (HEAD + "    select: ?x\n    cases:\n      1: {to: s, wen: (p)}\n    else: s", 6, "did you mean 'when'?"),
+    (HEAD + "    select: ?x\n    cases: {1: s, '1': s}\n    else: s", 5, "two cases have the same value"),
+    (HEAD + "    select: ?x\n    cases: {null: s}\n    else: s", 5, "a key is a name"),
+    ("plot: p\noutputs:\n  n:\n    type: number\n    inital: 0" + END, 5, "did you mean 'initial'?"),
+    ("plot: p\nparameters: {n: number}\noutputs:\n  n: number" + END, 4, "'n' is declared twice: as parameter and as output"),
+    ("plot: p\nvariables: {n: number}\noutputs:\n  n: number" + END, 4, "'n' is declared twice: as variable and as output"),
     (HEAD + "    after: {to: s}", 4, "the key 'seconds' is missing"),
     (HEAD + "    after: 5", 4, "a mapping was expected"),
     (HEAD + "    after: {seconds: soon, to: s}", 4, "a number of seconds was expected"),
@@ -218,10 +239,3 @@ def test_two_plots_of_one_name_and_an_empty_folder_are_refused(tmp_path):
 def test_shipped_plots_survive_reading_and_writing(file):
     made = load_plot(file)
     assert parse_plot(plot_to_yaml(made)) == made
-
-
-def test_editors_get_a_json_schema():
-    schema = json_schema()
-    assert json.loads(json.dumps(schema)) == schema
-    assert set(schema["required"]) == {"plot", "states"}
-    assert "with" in schema["$defs"]["Trigger"]["properties"]

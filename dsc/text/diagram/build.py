@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from dsc.dynamic.library import Library
+from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path, Scope, initial_of
 from dsc.model.states import (
     AnyState,
@@ -17,7 +18,7 @@ from dsc.model.states import (
     Region,
     State,
 )
-from dsc.text.diagram.cards import action_rows, card, dot, final_card, history_card, leaf_card, name_beside
+from dsc.text.diagram.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card, name_beside
 from dsc.text.diagram.edges import Bundle, bundles, initial_bundle, loop, room_for_loop
 from dsc.text.diagram.header import header, rules_note
 from dsc.text.diagram.layered.arrange import arrange
@@ -121,6 +122,8 @@ class _Builder:
         if isinstance(state, OrthogonalState):
             regions = [self._region(key, one, (*here, "regions", key)) for key, one in state.regions.items()]
             return self._hull(BoxKind.ORTHOGONAL, name, state, _side_by_side(regions))
+        if isinstance(state, Connector):
+            return diamond(name, state)
         return leaf_card(name, state, self._library, rule=name in self._added, told=self._plot.generated)
 
     def _hull(self, kind: BoxKind, name: str, state: State, inside: _Inside) -> Box:
@@ -169,8 +172,10 @@ def _link(source: int, target: int, bundle: Bundle) -> Link:
 
 def _node(box: Box, own: Bundle | None, *, sideways: bool) -> Node:
     beside = room_for_loop(own, sideways=sideways) if own is not None else 0.0
-    pointed = box.kind in {BoxKind.INITIAL, BoxKind.FINAL}
-    return Node(box.width, box.height, beside, pointed=pointed, last=box.kind is BoxKind.FINAL)
+    pointed, diamond = box.kind in {BoxKind.INITIAL, BoxKind.FINAL}, box.kind is BoxKind.CHOICE
+    return Node(
+        box.width, box.height, beside, pointed=pointed, diamond=diamond, last=box.kind is BoxKind.FINAL
+    )
 
 
 def _roomy(box: Box, own: Bundle | None, *, sideways: bool) -> Box:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from dsc.events import AFTER
+from dsc.events import TIMERS
 from dsc.model.actions import Assign, Choose, Configure, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger
-from dsc.model.states import State, TimedTransition, Transition
+from dsc.model.connectors import CHOICE, SelectState, case_value
+from dsc.model.states import State
+from dsc.model.transitions import Source, TimedTransition, Transition
 from dsc.text.diagram.layout import TextStyle
 from dsc.text.diagram.measure import pack
 from knowledge_base.language.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.printer import to_text, value_text
 
 WIDTH = 190.0
 """Of one line at an edge."""
@@ -43,24 +45,37 @@ class Labelled:
     otherwise: bool
 
 
-def labelled(state: State) -> list[Labelled]:
-    """A state's transitions in the order in which they are tried."""
+def labelled(source: Source) -> list[Labelled]:
+    """The transitions of a state or connector in the order in which they are tried."""
     seen: set[str] = set()
     result = []
-    for event, transition in state.transitions():
-        result.append(Labelled(_trigger(event, transition), transition, event in seen and event != AFTER))
+    for event, transition in source.transitions():
+        result.append(Labelled(_trigger(event, transition), transition, event in seen and event not in TIMERS))
         seen.add(event)
     return result
 
 
+def labelled_by_value(source: Source) -> list[Labelled]:
+    """As `labelled`, with the cases of a selection by their values alone, for where it says what it selects."""
+    if not isinstance(source, SelectState):
+        return labelled(source)
+    cases = [Labelled(value_text(case_value(key)), case, otherwise=False) for key, case in source.cases.items()]
+    return [*cases, Labelled("", source.otherwise, otherwise=True)]
+
+
 def _trigger(event: str, transition: Transition) -> str:
     if isinstance(transition, TimedTransition):
-        match transition.seconds:
-            case Constant(int() | float() as seconds):
-                return f"after {seconds:g} s"
-            case other:
-                return f"after {to_text(other)} s"
-    return "" if event == ALWAYS else event
+        return f"{event} {seconds_text(transition.seconds)}"
+    return "" if event in {ALWAYS, CHOICE} else event
+
+
+def seconds_text(seconds: Term) -> str:
+    """A duration: `0.5 s`, `(* 2 ?n) s`."""
+    match seconds:
+        case Constant(int() | float() as value):
+            return f"{value:g} s"
+        case other:
+            return f"{to_text(other)} s"
 
 
 def captions(transitions: Iterable[Labelled], *, terse: bool = False) -> list[Caption]:
@@ -88,7 +103,14 @@ def _guard(one: Labelled, *, terse: bool) -> str:
 
 def _brief(transition: Transition, *, terse: bool) -> tuple[str, ...]:
     shown = [action for action in transition.effect if not (terse and isinstance(action, Assign))]
-    return tuple(action_text(action, brief=True) for action in shown)
+    return (*(action_text(action, brief=True) for action in shown), *_handed(transition, brief=True))
+
+
+def _handed(transition: Transition, *, brief: bool = False) -> list[str]:
+    """What a transition passes to the plot of its target, and which histories it clears."""
+    passed = ", ".join(name if brief else f"{name} = {to_text(value)}" for name, value in transition.passed.items())
+    cleared = ", ".join(transition.clear)
+    return [f"{word} {what}" for word, what in (("pass", passed), ("clear", cleared)) if what]
 
 
 def _caption(group: list[Labelled], *, terse: bool) -> Caption:
@@ -106,7 +128,7 @@ def _caption(group: list[Labelled], *, terse: bool) -> Caption:
 
 def full_text(one: Labelled, *, trigger: bool = True) -> str:
     """A transition with nothing left out; `trigger` can be."""
-    effects = "; ".join(action_text(action) for action in one.transition.effect)
+    effects = "; ".join([*map(action_text, one.transition.effect), *_handed(one.transition)])
     rule = one.transition.rule
     parts = [
         one.trigger if trigger else "",
@@ -134,6 +156,12 @@ def _rule_guard(guard: Expression | None) -> str:
             case _:
                 words.append(to_text(part))
     return f"[{', '.join(words)}]" if words else ""
+
+
+def block_texts(state: State) -> list[str]:
+    """The actions of a state, one a line: `entry / arm.grasp(?item)`."""
+    words = {"entry": "entry", "exit": "exit", "on_break": "break"}
+    return [f"{words[key]} / {action_text(action)}" for key, actions in state.blocks() for action in actions]
 
 
 def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> str:  # noqa: PLR0911  # a table by kind

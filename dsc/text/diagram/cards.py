@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dsc.dynamic.library import Library
+from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, FinalState, HistoryState, State, SubmachineState
-from dsc.text.diagram.captions import action_text, captions, content_text, labelled
+from dsc.text.diagram.captions import block_texts, captions, content_text, labelled, seconds_text
 from dsc.text.diagram.layout import Box, BoxKind, Text, TextStyle
 from dsc.text.diagram.measure import LINE_HEIGHT, shorten, text_width
 from knowledge_base.language.expression import Term
@@ -22,6 +23,8 @@ MARK = 24.0
 """Room beside the name for the mark of submachine and dynamic states."""
 LEAST_WIDTH = 76.0
 FINAL_SIZE = 20.0
+DIAMOND_HEIGHT = 44.0
+"""With one line in it."""
 DOT_SIZE = 14.0
 
 
@@ -79,6 +82,24 @@ def history_card(name: str, state: HistoryState) -> Box:
     return card(BoxKind.SIMPLE, name, [_row(f"{mark} → {state.target}")], about=state.about or "")
 
 
+def diamond(name: str, connector: Connector) -> Box:
+    """A choice or selection: a flat diamond around its name and what it selects by."""
+    rows = [Row(name, TextStyle.NAME, name)]
+    if isinstance(connector, SelectState):
+        rows.append(_row(to_text(connector.select)))
+    block = LINE_HEIGHT * len(rows)
+    height = DIAMOND_HEIGHT + 2 * LINE_HEIGHT * (len(rows) - 1)
+    # A text fits where its share of the width and the lines' share of the height are 1 together.
+    width = (max(text_width(row.text, row.style) for row in rows) + SIDE) / (1 - block / height)
+    first = (height - block) / 2 + 11.5
+    texts = tuple(
+        Text(width / 2, first + LINE_HEIGHT * number, row.text, row.style, centred=True)
+        for number, row in enumerate(rows)
+    )
+    title = "\n".join(filter(None, [name, connector.about, *(row.full for row in rows[1:])]))
+    return Box(BoxKind.CHOICE, name, 0, 0, width, height, texts, title=title)
+
+
 def name_beside(final: Box) -> Box:
     """A final state with its texts right of the bullseye, for edges that come from the left."""
     height = max(FINAL_SIZE, LINE_HEIGHT * len(final.texts))
@@ -117,9 +138,9 @@ def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, t
 
 
 def action_rows(state: State) -> list[Row]:
-    """What a state does on entry, on exit, and on events that do not leave it."""
-    rows = [_row(f"entry / {action_text(action)}") for action in state.entry]
-    rows += [_row(f"exit / {action_text(action)}") for action in state.exit]
+    """How long a state lasts at least, what it does on entry, on exit, and on events that do not leave it."""
+    rows = [] if state.at_least is None else [_row(f"≥ {seconds_text(state.at_least)}")]
+    rows += [_row(text) for text in block_texts(state)]
     for caption in captions(one for one in labelled(state) if one.transition.target is None):
         rows += [Row(line, caption.style, caption.full) for line in caption.lines[:1]]
         rows += [Row(line, caption.style) for line in caption.lines[1:]]

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from dsc.model.states import AnyState, State
-from dsc.text.diagram.captions import Caption, Labelled, captions, labelled
+from dsc.model.states import AnyState
+from dsc.model.transitions import Source
+from dsc.text.diagram.captions import Caption, Labelled, captions, labelled_by_value
 from dsc.text.diagram.layered.graph import Route
-from dsc.text.diagram.layout import Box, Edge, Point, Text
+from dsc.text.diagram.layout import Box, BoxKind, Edge, Point, Text
 from dsc.text.diagram.measure import LINE_HEIGHT, text_width
 
 LOOP = 18.0
@@ -67,7 +68,7 @@ def bundles(states: Mapping[str, AnyState], recoveries: frozenset[str], *, terse
     """
     groups: dict[tuple[str, str], list[Labelled]] = {}
     for name, state in states.items():
-        for one in labelled(state) if isinstance(state, State) else ():
+        for one in labelled_by_value(state) if isinstance(state, Source) else ():
             if one.transition.target is not None:
                 groups.setdefault((name, one.transition.target), []).append(one)
     return [
@@ -102,9 +103,12 @@ def room_for_loop(bundle: Bundle, *, sideways: bool) -> float:
 def loop(bundle: Bundle, box: Box, *, sideways: bool) -> Edge:
     """A transition from a state to itself."""
     x, y = box.x + box.width, box.y + box.height / 2
+    slope = box.height / box.width if box.kind is BoxKind.CHOICE else 0.0
     if sideways:
         x, y = box.x + box.width / 2, box.y + box.height
-        ends = ((x - LOOP_HALF, y), (x - LOOP_HALF, y + LOOP), (x + LOOP_HALF, y + LOOP), (x + LOOP_HALF, y))
+        end = y - LOOP_HALF * slope
+        ends = ((x - LOOP_HALF, end), (x - LOOP_HALF, y + LOOP), (x + LOOP_HALF, y + LOOP), (x + LOOP_HALF, end))
         return bundle.edge(ends, (x, y + LOOP + 6 + bundle.height / 2))
-    ends = ((x, y - LOOP_HALF), (x + LOOP, y - LOOP_HALF), (x + LOOP, y + LOOP_HALF), (x, y + LOOP_HALF))
+    end = x - LOOP_HALF / slope if slope else x
+    ends = ((end, y - LOOP_HALF), (x + LOOP, y - LOOP_HALF), (x + LOOP, y + LOOP_HALF), (end, y + LOOP_HALF))
     return bundle.edge(ends, (x + LOOP + 6 + bundle.width / 2, y))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from dsc.model.plot import ActionPlot, Rule
+from dsc.model.plot import ActionPlot, Parameter, Rule, Variable
 from dsc.text.diagram.captions import content_text
 from dsc.text.diagram.layout import Box, BoxKind, Text, TextStyle
 from dsc.text.diagram.measure import LINE_HEIGHT, pack, shorten, text_width
@@ -44,8 +44,7 @@ def header(plot: ActionPlot, width: float) -> Header:
 
 def signature(plot: ActionPlot) -> str:
     """Name and parameters."""
-    parameters = ", ".join(f"{name}: {parameter.type}" for name, parameter in plot.parameters.items())
-    return f"{plot.name}({parameters})" if parameters else plot.name
+    return f"{plot.name}({_declared(plot.parameters)})" if plot.parameters else plot.name
 
 
 def facts(plot: ActionPlot) -> list[str]:
@@ -57,10 +56,15 @@ def facts(plot: ActionPlot) -> list[str]:
             ("fits when", to_text(plot.when) if plot.when is not None else ""),
             ("listens to", _events(plot.receives)),
             ("outcomes", _events(plot.emits)),
-            ("variables", ", ".join(f"{name}: {one.type}" for name, one in plot.variables.items())),
+            ("outputs", _declared(plot.outputs)),
+            ("variables", _declared(plot.variables)),
         )
         if text
     ]
+
+
+def _declared(names: Mapping[str, Parameter | Variable]) -> str:
+    return ", ".join(f"{name}: {one.type}" for name, one in names.items())
 
 
 def _events(declared: Mapping[str, Mapping[str, str] | None]) -> str:

@@ -34,6 +34,7 @@ class BoxKind(StrEnum):
     SUBMACHINE = "submachine"
     DYNAMIC = "dynamic"
     FINAL = "final"
+    CHOICE = "choice"
     BULLSEYE = "bullseye"
     INITIAL = "initial"
     NOTE = "note"

@@ -27,6 +27,7 @@ _LOOKS: dict[BoxKind, tuple[str, str]] = {
     BoxKind.ORTHOGONAL: ("#f6f8fb", "#475569"),
     BoxKind.SUBMACHINE: ("#e3f0fb", "#0064a8"),
     BoxKind.DYNAMIC: ("#fff3d6", "#b35c00"),
+    BoxKind.CHOICE: ("#eef2f7", "#475569"),
     BoxKind.NOTE: ("#fdf1f6", "#e3b5cb"),
 }
 """Fill and border of each kind."""
@@ -87,6 +88,8 @@ def _shape(box: Box, fill: str, stroke: str) -> Iterator[str]:
     elif box.kind is BoxKind.BULLSEYE:
         yield f'<circle {centre} r="9" fill="#ffffff" stroke="{_INK}" stroke-width="1.6"/>'
         yield f'<circle {centre} r="5" fill="{_INK}"/>'
+    elif box.kind is BoxKind.CHOICE:
+        yield _diamond(box, fill, stroke)
     else:
         dash = ' stroke-dasharray="6 4"' if box.kind is BoxKind.DYNAMIC else ""
         thick = "1" if box.kind in {BoxKind.PLOT, BoxKind.NOTE} else "1.6"
@@ -99,6 +102,13 @@ def _rect(box: Box, fill: str, border: str) -> str:
     size = f'x="{_n(box.x)}" y="{_n(box.y)}" width="{_n(box.width)}" height="{_n(box.height)}"'
     radius = 4 if box.kind is BoxKind.NOTE else 10
     return f'<rect {size} rx="{radius}" fill="{fill}" {border}/>'
+
+
+def _diamond(box: Box, fill: str, stroke: str) -> str:
+    x, y = box.x + box.width / 2, box.y + box.height / 2
+    corners = [(x, box.y), (box.x + box.width, y), (x, box.y + box.height), (box.x, y)]
+    points = "L".join(map(_p, corners))
+    return f'<path d="M{points}Z" fill="{fill}" stroke="{stroke}" stroke-width="1.6" stroke-linejoin="round"/>'
 
 
 def _across(box: Box, y: float, stroke: str) -> str:

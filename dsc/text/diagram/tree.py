@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from rich.text import Text
 from rich.tree import Tree
 
+from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import (
     AnyState,
@@ -18,7 +19,15 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from dsc.text.diagram.captions import action_text, content_text, full_text, labelled
+from dsc.text.diagram.captions import (
+    Labelled,
+    block_texts,
+    content_text,
+    full_text,
+    labelled,
+    labelled_by_value,
+    seconds_text,
+)
 from dsc.text.diagram.header import facts, rule_text, signature
 from knowledge_base.language.printer import to_text
 
@@ -44,19 +53,18 @@ def _add_states(tree: Tree, states: Mapping[str, AnyState], initial: str) -> Non
         branch = tree.add(_line((mark + name, "bold"), (_kind(state), "cyan")))
         if isinstance(state, State):
             _add_content(branch, state)
+        elif isinstance(state, Connector):
+            _add_transitions(branch, labelled_by_value(state))
 
 
 def _add_content(branch: Tree, state: State) -> None:
-    for word, actions in (("entry", state.entry), ("exit", state.exit)):
-        for action in actions:
-            branch.add(_line((f"{word} / {action_text(action)}", _SOFT)))
+    if state.at_least is not None:
+        branch.add(_line((f"at least {seconds_text(state.at_least)}", _SOFT)))
+    for text in block_texts(state):
+        branch.add(_line((text, _SOFT)))
     if isinstance(state, DynamicState) and state.goal is not None:
         branch.add(_line((f"goal {to_text(state.goal)}", _SOFT)))
-    for one in labelled(state):
-        target = one.transition.target
-        style = _RULE if one.transition.rule is not None else ""
-        arrow = f" → {target}" if target is not None else ""
-        branch.add(_line((f"{one.trigger or 'always'}{arrow}", style), (full_text(one, trigger=False), _SOFT)))
+    _add_transitions(branch, labelled(state), unnamed="always")
     if isinstance(state, CompositeState):
         _add_states(branch, state.states, initial_of(state))
     if isinstance(state, OrthogonalState):
@@ -64,12 +72,25 @@ def _add_content(branch: Tree, state: State) -> None:
             _add_states(branch.add(_line((f"region {name}", "italic"))), region.states, initial_of(region))
 
 
-def _kind(state: AnyState) -> str:
+def _add_transitions(branch: Tree, transitions: Iterable[Labelled], *, unnamed: str = "") -> None:
+    for one in transitions:
+        target = one.transition.target
+        style = _RULE if one.transition.rule is not None else ""
+        arrow = f" → {target}" if target is not None else ""
+        led = f"{one.trigger or unnamed}{arrow}".strip()
+        branch.add(_line((led, style), (full_text(one, trigger=False), _SOFT)))
+
+
+def _kind(state: AnyState) -> str:  # noqa: PLR0911  # a table by kind
     match state:
         case FinalState(emit=event):
             return "final" + (f" ^{event}" if event is not None else "")
         case HistoryState(history=depth, target=target):
             return f"{depth} history → {target}"
+        case SelectState(select=value):
+            return f"select {to_text(value)}"
+        case Connector():
+            return "choice"
         case SubmachineState():
             return f"use {content_text(state.use, state.arguments)}"
         case DynamicState():

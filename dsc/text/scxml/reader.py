@@ -17,7 +17,7 @@ from collections import Counter
 from pathlib import PurePath
 from typing import Any
 
-from dsc.events import AFTER, RESERVED
+from dsc.events import RESERVED, TIMERS
 from dsc.model.plot import ActionPlot, Path
 from dsc.text.form import read_model
 from dsc.text.scxml.content import Form, actions, needed
@@ -200,8 +200,9 @@ class _Reader:
                 self._note((*path, "always", len(always)), child.place)
                 always.append(self._transition(child))
                 continue
-            if AFTER in words:
-                raise NotExpressibleError("transition/@event", f"'{AFTER}' is the name of timeouts", place=child.place)
+            for word in TIMERS.intersection(words):
+                problem = f"'{word}' is what the executive's clock says"
+                raise NotExpressibleError("transition/@event", problem, place=child.place)
             key = _key(" ".join(words), on, repeats)
             self._note((*path, "on", key, len(on.setdefault(key, []))), child.place)
             on[key].append(self._transition(child))

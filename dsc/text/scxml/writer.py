@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree as ET
 
 from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log
+from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.states import (
     AnyState,
@@ -17,8 +18,8 @@ from dsc.model.states import (
     Region,
     State,
     SubmachineState,
-    Transition,
 )
+from dsc.model.transitions import Transition
 from dsc.text.scxml.document import NAMESPACE
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.expressions import expression_text, identifier, term_text
@@ -31,8 +32,9 @@ def to_scxml(plot: ActionPlot) -> str:
     Raises:
         NotExpressibleError: the plot uses something that SCXML has nothing for.
     """
-    for what, there in (("parameters", plot.parameters), ("rules", plot.rules), ("outcome events", plot.emits),
-                        ("condition", plot.when), ("planning action", plot.implements)):  # fmt: skip
+    for what, there in (("parameters", plot.parameters), ("outputs", plot.outputs), ("rules", plot.rules),
+                        ("outcome events", plot.emits), ("condition", plot.when),
+                        ("planning action", plot.implements)):  # fmt: skip
         if there:
             raise NotExpressibleError(what, "SCXML has no counterpart", place=plot.place(()))
     root = ET.Element("scxml", {"xmlns": NAMESPACE, "version": "1.0", "name": plot.name, "datamodel": "ecmascript"})
@@ -68,6 +70,10 @@ class _Writer:
         elif isinstance(state, FinalState):
             final = ET.SubElement(around, "final", {"id": name})
             self._block(final, "onentry", state.entry)
+        elif isinstance(state, Connector):
+            passage = ET.SubElement(around, "state", {"id": name})
+            for _, transition in state.transitions():
+                self._transition(passage, name, None, transition)
         else:
             self._proper(around, name, state)
 
@@ -81,8 +87,11 @@ class _Writer:
             raise NotExpressibleError("submachine or dynamic state", f"'{name}' is filled by other plots")
         if type(state) is State and "done" in state.on and self._plot.profile == "dsc":
             raise NotExpressibleError("completion", f"'{name}' has no content and is done at once")
-        if state.after:
-            raise NotExpressibleError("timeout", f"'{name}' has one; SCXML sends delayed events instead")
+        for what, there in (("timeout", state.after), ("every", state.every), ("at_least", state.at_least)):
+            if there:
+                raise NotExpressibleError(what, f"'{name}' has one; SCXML sends delayed events instead")
+        if state.on_break:
+            raise NotExpressibleError("on_break", f"'{name}' has one; SCXML leaves a state always in the same way")
         element = ET.SubElement(around, "parallel" if isinstance(state, OrthogonalState) else "state", {"id": name})
         self._block(element, "onentry", state.entry)
         self._block(element, "onexit", state.exit)
@@ -119,6 +128,9 @@ class _Writer:
             element.set("target", " ".join(transition.targets))
         if transition.internal:
             element.set("type", "internal")
+        for what, there in (("pass", transition.passed), ("clear", transition.clear)):
+            if there:
+                raise NotExpressibleError(what, f"a transition of '{source}' has it, and SCXML no counterpart")
         if transition.rule is not None:
             raise NotExpressibleError("rule", f"'{source}' is answered by one")
         _actions(element, transition.effect)

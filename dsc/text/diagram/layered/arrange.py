@@ -36,7 +36,7 @@ def arrange(nodes: Sequence[Node], links: Sequence[Link], *, sideways: bool = Fa
     left = min((axis - cell.left for axis, cell in zip(axes, grid.cells, strict=True)), default=0.0)
     axes = [round(axis - left, 1) for axis in axes]
     ports = assign_ports(nodes, grid, axes)
-    return _Levels(grid, axes, ports).arrangement(links)
+    return _Levels(nodes, grid, axes, ports).arrangement(links)
 
 
 def _turned(drawing: Arrangement) -> Arrangement:
@@ -50,7 +50,8 @@ def _turned(drawing: Arrangement) -> Arrangement:
 class _Levels:
     """Heights of the layers and of the tracks between them."""
 
-    def __init__(self, grid: Grid, axes: list[float], ports: Ports) -> None:
+    def __init__(self, nodes: Sequence[Node], grid: Grid, axes: list[float], ports: Ports) -> None:
+        self._nodes = nodes
         self._grid, self._axes, self._ports = grid, axes, ports
         self._tracks: dict[tuple[int, int], float] = {}
         self._middles: list[float] = []
@@ -116,7 +117,10 @@ class _Levels:
     def _end(self, node: int, neighbour: int) -> Point:
         cell = self._grid.cells[node]
         half = cell.height / 2 if neighbour in cell.down else -cell.height / 2
-        return self._ports[node, neighbour], self._middles[cell.layer] + half
+        across = self._ports[node, neighbour]
+        if self._nodes[node].diamond:
+            half *= 1 - abs(across - self._axes[node]) / cell.left
+        return across, self._middles[cell.layer] + half
 
 
 def _without_detours(points: Sequence[Point]) -> tuple[Point, ...]:

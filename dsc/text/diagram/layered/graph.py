@@ -15,6 +15,7 @@ class Node:
         width, height: its size.
         beside: room to keep free on its right, e.g. for a loop.
         pointed: all links meet it in the middle of its side, not spread along it.
+        diamond: it is pointed and only its corners reach its sides; links against the order meet it beside them.
         last: no link may lead upwards to it.
     """
 
@@ -22,6 +23,7 @@ class Node:
     height: float
     beside: float = 0.0
     pointed: bool = False
+    diamond: bool = False
     last: bool = False
 
 

@@ -1,0 +1,46 @@
+"""What an event costs: a table written by hand, this engine and its peers, in one run; see docs/speed.md.
+
+`python benchmarks/engine.py [--quick] [--json] [--write]`: one quick round, plain data for programs, or the table
+put into docs/speed.md. Peers that are not installed are left out; `make bench-engine` installs them.
+"""
+
+import argparse
+import json
+import logging
+import platform
+from pathlib import Path
+
+from common import common_rows
+from own import own_rows
+from peers import contenders
+from rows import table
+from timing import Pace
+
+PAGE = Path(__file__).parents[1] / "docs" / "speed.md"
+FULL, QUICK = Pace(rounds=15, seconds=0.02), Pace(rounds=1, seconds=0.002)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="one short round: does it work at all?")
+    parser.add_argument("--json", action="store_true", help="plain data")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/speed.md")
+    options = parser.parse_args()
+    logging.disable(logging.CRITICAL)  # a log call costs a peer more than its own work
+    pace = QUICK if options.quick else FULL
+    everyone = contenders()
+    rows = [*common_rows(everyone, pace), *own_rows(pace)]
+    versions = {"Python": platform.python_version(), **{one.package: one.version for one in everyone if one.package}}
+    if options.json:
+        print(json.dumps({"versions": versions, "rounds": pace.rounds, "rows": [row.to_json() for row in rows]}))
+        return
+    said = ", ".join(f"{name} {version}" for name, version in versions.items())
+    text = f"{table(rows, [one.name for one in everyone])}\n\nMeasured with {said}; {pace.rounds} rounds."
+    print(text)
+    if options.write:
+        head, mark, _ = PAGE.read_text(encoding="utf-8").partition("<!-- results -->\n")
+        PAGE.write_text(f"{head}{mark}{text}\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

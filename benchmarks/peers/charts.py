@@ -1,0 +1,73 @@
+"""The charts that everyone runs, said once; every contender writes them in its own form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+PING, PONG = "ping", "pong"
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A state; the first one of a scope is its initial one.
+
+    Attributes:
+        on: event -> name of the state to go to, in the same scope.
+        states: what is inside, one at a time.
+        regions: what is inside, all together: name -> states.
+    """
+
+    on: Mapping[str, str] = field(default_factory=dict)
+    states: Mapping[str, State] = field(default_factory=dict)
+    regions: Mapping[str, Mapping[str, State]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A chart and what is right.
+
+    Attributes:
+        name: for people.
+        states: the top-level states.
+        rounds: after how many pings it is again where it began.
+        leaves: number of pings -> names of the innermost active states.
+    """
+
+    name: str
+    states: Mapping[str, State]
+    rounds: int
+    leaves: Callable[[int], frozenset[str]]
+
+
+def flat() -> Chart:
+    """Two states."""
+    return Chart("ping-pong", {"a": State({PING: "b"}), "b": State({PING: "a"})}, 2, lambda n: frozenset("ab"[n % 2]))
+
+
+def deep(levels: int = 5) -> Chart:
+    """Two towers; the transitions are at the top: an event leaves as many levels as it enters."""
+
+    def tower(name: str, other: str) -> State:
+        inside: dict[str, State] = {f"{name}{levels}": State()}
+        for level in range(levels - 1, 1, -1):
+            inside = {f"{name}{level}": State(states=inside)}
+        return State({PING: f"{other}1"}, states=inside)
+
+    states = {"a1": tower("a", "b"), "b1": tower("b", "a")}
+    return Chart(f"{levels} levels", states, 2, lambda n: frozenset({f"{'ab'[n % 2]}{levels}"}))
+
+
+def regions(count: int = 4) -> Chart:
+    """Regions that are active together and all react."""
+    inside = {
+        f"r{n}": {f"x{n}": State({PING: f"y{n}"}), f"y{n}": State({PING: f"x{n}"})} for n in range(1, count + 1)
+    }
+    leaves = [frozenset(f"{side}{n}" for n in range(1, count + 1)) for side in "xy"]
+    return Chart(f"{count} regions", {"all": State(regions=inside)}, 2, lambda n: leaves[n % 2])
+
+
+def ring(size: int = 1000) -> Chart:
+    """States one after the other, with a way on and a way back."""
+    states = {f"s{n}": State({PING: f"s{(n + 1) % size}", PONG: f"s{(n - 1) % size}"}) for n in range(size)}
+    return Chart(f"ring of {size:,} states", states, size, lambda n: frozenset({f"s{n % size}"}))

@@ -1,0 +1,61 @@
+"""A plot in another's place: what it must share with the original so that no holder notices (S0.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dsc.model.plot import ActionPlot
+from knowledge_base.errors import InputError, SchemaError
+
+_ROLE = ("when", "implements", "effects", "confirm")
+"""What a library knows a plot for; a substitute that says nothing about it plays the original's part."""
+
+
+def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
+    """The substitute under the original's name, with the original's part where it names none of its own.
+
+    That part is the condition as a candidate and the planning action with what is said about its effects. It still
+    declares every outcome of the original, so that what holders have wired is not found to be dead.
+
+    Raises:
+        SchemaError: a holder of the original could not hold the substitute.
+    """
+    _check(original, substitute)
+    role = {key: getattr(original, key) for key in _ROLE if key not in substitute.model_fields_set}
+    emits = {**original.emits, **substitute.emits}
+    return substitute.model_copy(update={"name": original.name, "emits": emits, **role})
+
+
+def _check(original: ActionPlot, substitute: ActionPlot) -> None:
+    """Who holds the original gives all of its parameters, or only the required ones, and wires its outcomes."""
+    for name, parameter in original.parameters.items():
+        own = substitute.parameters.get(name)
+        if own is None:
+            raise _refusal(original, substitute, f"lacks its parameter '{name}'", name, substitute.parameters)
+        if own.type != parameter.type:
+            different = f"takes '{name}' as '{own.type}', not as '{parameter.type}'"
+            raise _refusal(original, substitute, different, own.type, (parameter.type,))
+    for name, parameter in substitute.parameters.items():
+        given = name in original.parameters and original.parameters[name].default is None
+        if parameter.default is None and not given:
+            needs = f"needs the parameter '{name}', which holders need not give"
+            raise _refusal(original, substitute, needs, name, original.parameters)
+    for name, output in original.outputs.items():
+        if name not in substitute.outputs or substitute.outputs[name].type != output.type:
+            lacking = f"does not hand back '{name}' as '{output.type}'"
+            raise _refusal(original, substitute, lacking, name, substitute.outputs)
+    for event, attributes in substitute.emits.items():
+        if event not in original.emits:
+            new = f"emits '{event}', which no holder has wired"
+            raise _refusal(original, substitute, new, event, original.emits)
+        for name in original.emits[event] or ():
+            if name not in (attributes or {}):
+                lacking = f"emits '{event}' without its attribute '{name}'"
+                raise _refusal(original, substitute, lacking, name, attributes or ())
+
+
+def _refusal(
+    original: ActionPlot, substitute: ActionPlot, why: str, found: str, valid: Iterable[str]
+) -> InputError:
+    message = f"'{substitute.name}' cannot stand in for '{original.name}': it {why}"
+    return SchemaError(message, place=substitute.place(("plot",)), found=found, valid=valid)

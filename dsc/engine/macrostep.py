@@ -1,0 +1,227 @@
+"""One macrostep: microsteps and internal events until the chart rests (SCXML 3.13, appendix D: mainEventLoop)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from dsc.engine.choice import Question, choice_of
+from dsc.engine.configuration import configuration_of
+from dsc.engine.execution import Execution
+from dsc.engine.frames import Frame, freeze, thaw
+from dsc.engine.membership import settle
+from dsc.engine.reaction import Part, Reaction, reaction_of, report
+from dsc.engine.selection import Addressed, Enabled, Trigger, select
+from dsc.engine.situation import Situation
+from dsc.engine.state import FrameState, MachineState, at_rest
+from dsc.engine.steps import Step
+from dsc.engine.tables import Chart, Edge
+from dsc.errors import RunawayError
+from dsc.events import AT_LEAST, ERRORS, EVERY, Event
+from knowledge_base.errors import InputError
+from knowledge_base.language.expression import Expression
+
+MAX_MICROSTEPS = 1000
+"""A macrostep that takes more is going round in circles."""
+
+
+class Macrostep(Execution):
+    """Works on thawed frames; `finish` freezes them into the next state.
+
+    What it can do is in layers, one a file, of one object: a step has no time for several.
+    """
+
+    __slots__ = ("_broken_guards", "_root")
+
+    def __init__(self, chart: Chart, situation: Situation, state: MachineState) -> None:
+        super().__init__(chart, situation, state.serials)
+        self._root = thaw(state.root) if state.root else None
+        self._broken_guards: set[tuple[int, Edge]] = set()
+
+    def start(self, plot: str, arguments: Mapping[str, Any]) -> None:
+        """Enter the outermost plot; raises `InputError` if there is none of that name or its arguments do not fit."""
+        self._root = self.enter_plot(self.chart.compiled(plot), arguments)
+        self.end_microstep(None, ())
+        self._rest()
+
+    def react(self, event: Event | None) -> bool:
+        """Take the event, then run to completion; returns whether anybody took the event, or keeps it."""
+        handled = event is not None and self._take(event)
+        if event is not None and event.name == EVERY:
+            self._next_period(event)
+        self._rest()
+        return handled
+
+    def leave(self) -> None:
+        """Leave all active states of all plots."""
+        assert self._root is not None  # noqa: S101  # there is nothing to leave before the start
+        self.leave_plot(self._root)
+        self.end_microstep(None, ())
+        self._root = None
+        self.errors += [_reason(event) for event in self.internal if event.name in ERRORS]
+
+    def finish(self, event: Event | None, *, handled: bool) -> Step:
+        """The step as a value."""
+        if self.finished and self._root is not None:
+            self.leave()
+        root, serials = self._root, self.serials
+        return Step(
+            at_rest(freeze(root), serials) if root else MachineState(None, serials, self.finished),
+            event,
+            handled,
+            tuple(self.microsteps),
+            tuple(self.decisions),
+            self.knowledge,
+            tuple(self.output),
+            tuple(self.emitted),
+            tuple(self.errors),
+        )
+
+    def _rest(self) -> None:
+        while not self.finished:
+            if self._take_spontaneous():
+                continue
+            if not self.internal:
+                return
+            event = self.internal.popleft()
+            if not self._take(event) and event.name in ERRORS:
+                self.errors.append(_reason(event))
+
+    # -- one event ---------------------------------------------------------------------------------------
+
+    def _take(self, event: Event) -> bool:
+        """One microstep, if anybody listens to the event and can take it; or somebody keeps it for later."""
+        self.event = event
+        if event.to is not None:
+            return self._take_addressed(event, event.to)
+        name, scope = event.name, event.frame
+
+        def listens(one: Frame | FrameState) -> bool:
+            return (scope is None or scope == one.serial) and choice_of(one.configuration, name) is not None
+
+        listeners = self._that(listens)
+        if len(listeners) == 1:
+            return self._take_alone(listeners[0], event.name, event)
+        return bool(listeners) and self._take_together(event.name, event)
+
+    def _take_addressed(self, event: Event, activation: int) -> bool:
+        found = self._find(activation)
+        if found is None:
+            return False
+        frame, state = found
+        if event.name == AT_LEAST:
+            return self._least_time_passed(frame, state)
+        trigger = Addressed(event.name, frame.compiled.index[state], event.exact, event.number)
+        return self._take_alone(frame, trigger, event)
+
+    def _take_spontaneous(self) -> bool:
+        """One microstep, if a change of the world enables any transition."""
+        concerned = self._that(_is_spontaneous)
+        if len(concerned) == 1:
+            return self._take_alone(concerned[0], None, None)
+        return bool(concerned) and self._take_together(None, None)
+
+    def _that(self, wanted: Callable[[Frame | FrameState], bool]) -> list[Frame]:
+        assert self._root is not None  # noqa: S101  # `step` answers for a machine that has ended
+        return self._root.that(wanted)
+
+    def _find(self, activation: int) -> tuple[Frame, str] | None:
+        """The frame and state that were given this number, if they are still active."""
+        for frame in self._that(lambda one: activation in one.activations.values()):
+            return frame, next(state for state, serial in frame.activations.items() if serial == activation)
+        return None
+
+    def _take_alone(self, frame: Frame, trigger: Trigger, event: Event | None) -> bool:
+        choice = choice_of(frame.configuration, trigger)
+        while isinstance(choice, Question):
+            choice = choice.follow(self._holds(frame, choice.edge, choice.condition))
+        if choice is None:
+            return False
+        kept = bool(choice.keeps) and self._keep(frame, choice.keeps, event)
+        if not choice.parts:
+            return kept
+        self._check_progress()
+        self.take(frame, choice)
+        self.end_microstep(event, choice.taken_in(frame.compiled, frame.prefix))
+        return True
+
+    def _take_together(self, trigger: Trigger, event: Event | None) -> bool:
+        """Several plots listen: what is enabled in one may preempt what is enabled in another (SCXML 3.13)."""
+        assert self._root is not None  # noqa: S101
+        taken, late = select(self._root, trigger, self._guard)
+        kept = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
+        if not taken:
+            return any(kept)
+        self._check_progress()
+        by_frame: dict[Frame, list[Edge]] = {}
+        for one in taken:
+            by_frame.setdefault(one.frame, []).append(one.edge)
+        reactions = {frame: reaction_of(frame.configuration, tuple(edges)) for frame, edges in by_frame.items()}
+        parts = [(one.frame, _part_of(one, reactions[one.frame])) for one in taken]
+        reports = tuple([report(one.edge, one.frame.compiled, one.frame.prefix) for one in taken])
+        self.take_together(reactions, parts)
+        self.end_microstep(event, reports)
+        return True
+
+    def _check_progress(self) -> None:
+        if len(self.microsteps) >= MAX_MICROSTEPS:
+            trail = [path for micro in self.microsteps[-6:] for path in micro.entered]
+            raise RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
+
+    # -- guards ------------------------------------------------------------------------------------------
+
+    def _guard(self, frame: Frame, edge: Edge) -> bool:
+        if edge.guard is None:
+            return True
+        condition = settle(edge.guard, frame.configuration.is_active) if frame.compiled.scxml else edge.guard
+        return self._holds(frame, edge, condition)
+
+    def _holds(self, frame: Frame, edge: Edge, condition: Expression) -> bool:
+        try:
+            return self.holds(frame, condition)
+        except InputError as error:
+            # Once in a macrostep: a guard without trigger is looked at again after every microstep.
+            if (frame.serial, edge) not in self._broken_guards:
+                self._broken_guards.add((frame.serial, edge))
+                source = frame.prefix + frame.compiled.nodes[edge.source].name
+                self.fail(frame, f"guard of '{edge.trigger}' in {source}: {error}")
+            return False
+
+    # -- time --------------------------------------------------------------------------------------------
+
+    def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> bool:
+        """An event that a state would take if it could be left already waits with it; a period comes again."""
+        if event is None or event.name == EVERY:
+            return False
+        frame.kept = (*frame.kept, *((state, event) for state in states))
+        return True
+
+    def _least_time_passed(self, frame: Frame, state: str) -> bool:
+        """The state can be left from now on; what it kept is offered again, before anything new."""
+        before = frame.configuration
+        waiting = before.waiting - {frame.compiled.index[state]}
+        frame.configuration = configuration_of(frame.compiled, before.active, waiting, before.history)
+        self.internal.extend(kept for name, kept in frame.kept if name == state)
+        frame.kept = tuple([one for one in frame.kept if one[0] != state])
+        return True
+
+    def _next_period(self, event: Event) -> None:
+        found = self._find(event.to or 0)
+        if found is not None and event.number is not None:
+            frame, state = found
+            node = frame.compiled.nodes[frame.compiled.index[state]]
+            seconds = node.cycles[event.number].seconds
+            self.start_timer(frame, node, event.to or 0, EVERY, event.number, seconds)
+
+
+def _is_spontaneous(one: Frame | FrameState) -> bool:
+    return one.configuration.spontaneous
+
+
+def _part_of(one: Enabled, reaction: Reaction) -> Part:
+    return next(part for part in reaction.parts if part.edge is one.edge)
+
+
+def _reason(error: Event) -> str:
+    # A chart may fire `error` itself, and say nothing.
+    return str(error.attributes.get("reason", "the chart fired 'error' without a reason"))

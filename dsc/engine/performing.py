@@ -1,0 +1,131 @@
+"""Actions carried out in a running plot: variables, knowledge, events, and what is handed to components."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import Any
+
+from dsc.engine.actions import delay_of, evaluate, output_of
+from dsc.engine.frames import Frame
+from dsc.engine.record import Record
+from dsc.engine.situation import Situation
+from dsc.engine.steps import Note, SendLater, StartTimer
+from dsc.engine.tables import Node
+from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, Event
+from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Tell
+from dsc.model.language import TermField
+from knowledge_base.errors import InputError
+from knowledge_base.language.expression import Expression
+
+Action = ExternalAction | Internal
+SHORTEST_PERIOD = 0.001
+"""Seconds; a period of nothing would leave no time for anything else."""
+
+
+class Performer(Record):
+    """Carries out actions.
+
+    Attributes:
+        situation: the world as the chart sees it.
+        event: the last one taken, whose attributes actions read.
+    """
+
+    __slots__ = ("event", "situation")
+
+    def __init__(self, situation: Situation, serials: int) -> None:
+        super().__init__(serials)
+        self.situation = situation
+        self.event: Event | None = None
+
+    def holds(self, frame: Frame, condition: Expression) -> bool:
+        """Whether a condition is true in a frame; raises `InputError`."""
+        return self.situation.holds(condition, self.bindings(frame))
+
+    def value(self, frame: Frame, term: TermField) -> Any:
+        """What a term stands for in a frame; raises `InputError`."""
+        return evaluate(term, self.bindings(frame), self.situation)
+
+    def values(self, frame: Frame, terms: Mapping[str, TermField]) -> dict[str, Any]:
+        """What several terms stand for; raises `InputError`."""
+        return {name: self.value(frame, term) for name, term in terms.items()}
+
+    def bindings(self, frame: Frame) -> Mapping[str, Any]:
+        """The frame's variables and the event's attributes."""
+        if self.event is None or not self.event.attributes:
+            return frame.variables
+        return {**frame.variables, **self.event.bindings()}
+
+    def fail(self, frame: Frame, reason: str) -> None:
+        """Let the plot know that something could not be evaluated."""
+        name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
+        self.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
+
+    def act(
+        self, frame: Frame, state: str, actions: Iterable[Action], activation: int = 0, first: int = 0
+    ) -> None:
+        """Carry out a block of actions of a state, numbered from `first` within its activation.
+
+        What cannot be evaluated fires an error; the others are carried out, in profile `scxml` only those
+        before it (SCXML 4.9).
+        """
+        for number, action in enumerate(actions, first):
+            try:
+                if isinstance(action, Internal):
+                    self._perform(frame, action)
+                else:
+                    value = partial(self.value, frame)
+                    self.output.append(output_of(action, activation, number, value))
+            except InputError as error:
+                self.fail(frame, f"{frame.prefix}{state}: {error}")
+                if frame.compiled.scxml:
+                    return
+
+    def start_timers(self, frame: Frame, node: Node, activation: int) -> None:
+        """Ask for all timers of a state that was entered."""
+        if node.at_least is not None:
+            self.start_timer(frame, node, activation, AT_LEAST, 0, node.at_least)
+        for index, timed in enumerate(node.timeouts):
+            self.start_timer(frame, node, activation, AFTER, index, timed.seconds)
+        for index, timed in enumerate(node.cycles):
+            self.start_timer(frame, node, activation, EVERY, index, timed.seconds)
+
+    def start_timer(  # all that names a timer
+        self, frame: Frame, node: Node, activation: int, event: str, index: int, seconds: TermField
+    ) -> None:
+        """Ask for one timer of a state; a delay that cannot be worked out is a failure like others."""
+        try:
+            delay = delay_of(self.value(frame, seconds), least=SHORTEST_PERIOD if event == EVERY else 0)
+        except InputError as error:
+            self.fail(frame, f"{frame.prefix}{node.name}: {error}")
+        else:
+            self.output.append(StartTimer(activation, index, delay, event))
+
+    def _perform(self, frame: Frame, action: Internal) -> None:
+        match action:
+            case Assign(assign=terms):
+                frame.variables = {**frame.variables, **self.values(frame, terms)}
+            case Tell(tell=effect):
+                told = self.situation.tell(effect, self.bindings(frame))
+                self.knowledge = self.knowledge.then(told)
+            case Emit():
+                attributes = self.values(frame, action.arguments)
+                delay = None if action.delay is None else delay_of(self.value(frame, action.delay))
+                self._emit(frame, action.emit, attributes, delay)
+            case Log(log=parts, label=label):
+                text = "".join(str(self.value(frame, part)) for part in parts)
+                self.output.append(Note(label, text))
+            case Choose():
+                for inner in action.then if self.holds(frame, action.condition) else action.otherwise:
+                    self._perform(frame, inner)
+
+    def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any], delay: float | None) -> None:
+        if delay is not None:
+            self.output.append(SendLater(Event(name, attributes, frame=frame.serial), delay))
+        elif name not in frame.compiled.plot.emits:
+            self.internal.append(Event(name, attributes, frame=frame.serial))
+        elif frame.parent is None:
+            self.emitted.append(Event(name, attributes))
+        elif not frame.gone:
+            self.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
+        # Else the host was left by another transition of this microstep: nobody waits for an outcome any more.

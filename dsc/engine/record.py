@@ -1,0 +1,47 @@
+"""What a macrostep has done so far."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from dsc.engine.steps import NO_CHANGE, Bound, DecisionMade, Microstep, Output, Taken
+from dsc.events import Event
+
+
+class Record:
+    """Collects what will be the step.
+
+    Attributes:
+        serials: the last serial number given out.
+        internal: events that the chart has still to take.
+        exited, entered, bound: of the microstep that is going on.
+    """
+
+    __slots__ = (
+        "bound", "decisions", "emitted", "entered", "errors", "exited", "internal", "knowledge", "microsteps",
+        "output", "serials",
+    )  # fmt: skip
+
+    def __init__(self, serials: int) -> None:
+        self.serials = serials
+        self.internal: deque[Event] = deque()
+        self.microsteps: list[Microstep] = []
+        self.decisions: list[DecisionMade] = []
+        self.output: list[Output] = []
+        self.emitted: list[Event] = []
+        self.errors: list[str] = []
+        self.knowledge = NO_CHANGE
+        self.exited: list[str] = []
+        self.entered: list[str] = []
+        self.bound: list[Bound] = []
+
+    def next_serial(self) -> int:
+        """A number never given out before in this run."""
+        self.serials += 1
+        return self.serials
+
+    def end_microstep(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
+        """What was left, entered and bound since the last one becomes a microstep."""
+        bound = tuple(self.bound)
+        self.microsteps.append(Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))
+        self.exited, self.entered, self.bound = [], [], []

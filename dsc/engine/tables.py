@@ -1,0 +1,177 @@
+"""A plot as tables: nodes in document order, edges by event. Made once for a plot, shared by all its instances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from dsc.events import DONE
+from dsc.model.actions import ExternalAction, Internal, Trigger
+from dsc.model.language import TermField
+from dsc.model.plot import ActionPlot
+from dsc.model.states import AnyState, DynamicState, FinalState, OrthogonalState, SubmachineState
+from knowledge_base.language.expression import Expression
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edge:
+    """A transition between nodes, by their indices; without targets nothing is left or entered.
+
+    Attributes:
+        source, targets: the nodes that it leads from and to.
+        trigger, guard, effect, rule: as in the model.
+        internal: only true where it makes a difference: a composite source with all targets inside it.
+        place: where it stands in its source, e.g. `("on", "grasped", 0)`.
+        passed: arguments for the plot inside the target.
+        cleared: history nodes that forget.
+    """
+
+    source: int
+    trigger: str
+    targets: tuple[int, ...]
+    guard: Expression | None
+    effect: tuple[Internal, ...]
+    rule: str | None = None
+    internal: bool = False
+    place: tuple[str | int, ...] = ()
+    passed: Mapping[str, TermField] = field(default_factory=dict)
+    cleared: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Default:
+    """Where a history leads that remembers nothing, and what happens on the way."""
+
+    target: int
+    effect: tuple[Internal, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """A transition that time triggers."""
+
+    seconds: TermField
+    edge: Edge
+
+
+@dataclass(slots=True, eq=False)
+class Node:
+    """A state, a region or (index 0) the plot itself.
+
+    Attributes:
+        index: position in document order.
+        name: the state's name; of a region, its place, `#index`.
+        around: indices of the nodes around it, innermost first, the plot last.
+        last: index of the last node inside it; its own if there is none.
+        children: indices of the nodes directly inside.
+        initial: the child entered by default; -1 where none or all are.
+        state: the model value; `None` for the plot and for regions.
+        entry, exit, broken: actions on entering, on leaving, and on leaving by a transition of another state.
+        edges: event name -> transitions in order.
+        timeouts, cycles: transitions after a time, and each time it has passed again.
+        at_least: how long its transitions have to wait.
+        always: transitions without trigger.
+        histories: indices of the history nodes that remember what is inside.
+        transparent: a region that stands for its only state (profile `scxml`), no scope for transitions.
+        parent: index of the node around it; -1 for the plot.
+        final: whether it is a final state.
+        orthogonal: whether all its children are active together.
+        holds_plot: whether its content is another plot.
+        timed: whether entering it starts a timer.
+        addressed: whether anybody will send events to one of its activations, so that they need numbers.
+    """
+
+    index: int
+    name: str
+    around: tuple[int, ...]
+    state: AnyState | None
+    last: int = 0
+    children: list[int] = field(default_factory=list)
+    initial: int = -1
+    entry: tuple[ExternalAction | Internal, ...] = ()
+    exit: tuple[ExternalAction | Internal, ...] = ()
+    broken: tuple[ExternalAction | Internal, ...] = ()
+    edges: dict[str, tuple[Edge, ...]] = field(default_factory=dict)
+    timeouts: tuple[Timed, ...] = ()
+    cycles: tuple[Timed, ...] = ()
+    at_least: TermField | None = None
+    always: tuple[Edge, ...] = ()
+    histories: list[int] = field(default_factory=list)
+    transparent: bool = False
+
+    parent: int = field(init=False)
+    final: bool = field(init=False)
+    orthogonal: bool = field(init=False)
+    holds_plot: bool = field(init=False)
+    timed: bool = False
+    addressed: bool = False
+
+    def __post_init__(self) -> None:
+        # Worked out once: a step asks for it too often.
+        self.parent = self.around[0] if self.around else -1
+        self.final = isinstance(self.state, FinalState)
+        self.orthogonal = isinstance(self.state, OrthogonalState)
+        self.holds_plot = isinstance(self.state, SubmachineState | DynamicState)
+
+    def settle(self) -> None:
+        """Work out what follows from its transitions and actions, when all of them are there."""
+        self.timed = bool(self.timeouts or self.cycles) or self.at_least is not None
+        starts = any(isinstance(action, Trigger) for action in (*self.entry, *self.exit, *self.broken))
+        self.addressed = starts or self.timed or self.holds_plot or DONE in self.edges
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CompiledPlot:
+    """A plot with its tables.
+
+    Attributes:
+        plot: the model.
+        nodes: all nodes in document order; a node comes after the one around it.
+        index: state name -> node index.
+        form: the plot as data if it was bound as a value, else `None`.
+        defaults: history node -> what it stands for at first.
+        scxml: whether the plot is in profile `scxml`: events match by prefix and keep SCXML's names.
+        cache: what the engine has worked out about its configurations (see `configuration`).
+    """
+
+    plot: ActionPlot
+    nodes: tuple[Node, ...]
+    index: Mapping[str, int]
+    form: Mapping[str, Any] | None = None
+    defaults: Mapping[int, Default] = field(default_factory=dict)
+    scxml: bool = False
+    cache: dict[Any, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"CompiledPlot({self.plot.name})"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are made from the same plot in the same way."""
+        if self is other:
+            return True
+        return isinstance(other, CompiledPlot) and self.form == other.form and self.plot == other.plot
+
+    def __hash__(self) -> int:
+        return hash(self.plot.name)
+
+    def way(self, around: int, index: int) -> list[int]:
+        """The nodes from one around it, which is not part of the way, down to a node."""
+        ancestors = self.nodes[index].around
+        return [*reversed(ancestors[: ancestors.index(around)]), index]
+
+    def inside(self, index: int, around: int) -> bool:
+        """Whether a node is (properly) inside another: what is inside follows it in document order."""
+        return around < index <= self.nodes[around].last
+
+
+class Chart(Protocol):
+    """Where the engine finds plots: by name, or bound as a value."""
+
+    def compiled(self, name: str) -> CompiledPlot:
+        """The plot of that name; raises `UnknownNameError`."""
+        ...
+
+    def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
+        """A plot given as data, e.g. one made from a plan; raises `InputError`."""
+        ...

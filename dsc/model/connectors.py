@@ -1,0 +1,98 @@
+"""Connectors: a way in that leads on at once, by conditions or by a value (S3.1). Nothing ever rests there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from dsc.model.language import LOCATED, TermField
+from dsc.model.transitions import FormPath, Source, Transition, Transitions, as_transition
+from knowledge_base.facts import Value
+from knowledge_base.language.expression import TRUTH_VALUES, And, Comparison, Constant, is_number
+
+CHOICE = "choice"
+"""Label of the transitions of connectors, which have no trigger."""
+
+
+class Connector(Source):
+    """What is passed through on the way to a state; its transitions are tried in order, and the last one holds."""
+
+    @model_validator(mode="after")
+    def _leads_on(self) -> Connector:
+        for path, _, transition in self.placed_transitions():
+            if transition.target is None:
+                problem = "nothing rests in a connector; say with `to` where this leads"
+                raise PydanticCustomError(LOCATED, problem, {"path": path})
+        return self
+
+
+class ChoiceState(Connector):
+    """Goes on by conditions: `choice: [{when: G, to: a}, z]`; the last branch has no `when`."""
+
+    choice: Transitions = Field(min_length=1)
+
+    def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
+        """The branches in order; paths are `("choice", number)`."""
+        for number, branch in enumerate(self.choice):
+            yield ("choice", number), CHOICE, branch
+
+
+def _as_cases(value: Any) -> Any:
+    if not isinstance(value, Mapping):
+        return value
+    cases = {_case_text(key): as_transition(case) for key, case in value.items()}
+    if len(set(map(case_value, cases))) < len(value):  # to Python and YAML, 1 and true are the same key
+        raise ValueError(f"two cases have the same value; found {', '.join(map(str, value))}")
+    return cases
+
+
+def _case_text(key: Any) -> str:
+    if isinstance(key, bool):
+        return "true" if key else "false"
+    if isinstance(key, int | float) and math.isfinite(key):
+        return repr(key)
+    if isinstance(key, str):
+        return key
+    raise ValueError(f"a case is text, a number or a truth value; found {key!r}")
+
+
+def case_value(key: str) -> Value:
+    """The constant that a case's key stands for: `1` a number, `true` a truth value, `"1"` and `cup` texts."""
+    if is_number(key):
+        number = float(key)
+        return int(number) if number.is_integer() else number
+    quoted = len(key) > 1 and key[0] == key[-1] == '"'
+    return TRUTH_VALUES.get(key, key[1:-1] if quoted else key)
+
+
+class SelectState(Connector):
+    """Goes on by value: `select: ?event.kind`, `cases: {cup: wash, can: throw}`, `else: ask`.
+
+    Attributes:
+        select: the value that decides.
+        cases: constant -> transition. Keys are kept as text, since JSON has no others, and mean what `case_value`
+            says. A `when` in a case must hold as well.
+        otherwise: the transition for all other values (`else`).
+    """
+
+    select: TermField
+    cases: Annotated[dict[str, Transition], BeforeValidator(_as_cases)] = Field(min_length=1)
+    otherwise: Annotated[Transition, BeforeValidator(as_transition)] = Field(alias="else")
+
+    def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
+        """The cases as guarded transitions, then the rest; paths are `("cases", key)` and `("else",)`."""
+        for key, case in self.cases.items():
+            value = case_value(key)
+            # A whole number or truth value is a key of that kind in YAML.
+            place = value if isinstance(value, int) else key
+            yield ("cases", place), CHOICE, self._guarded(value, case)
+        yield ("else",), CHOICE, self.otherwise
+
+    def _guarded(self, value: Value, case: Transition) -> Transition:
+        is_case = Comparison("=", self.select, Constant(value))
+        guard = is_case if case.guard is None else And((is_case, case.guard))
+        return case.model_copy(update={"guard": guard})

@@ -1,0 +1,165 @@
+"""Which states, transitions and rules of which plots the runs of a test reached, and which they did not."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.engine.steps import Microstep, Step, Taken
+from dsc.model.plot import ActionPlot
+from dsc.testing.coverable import KINDS, Item, Key, Kind, items_of
+from knowledge_base.errors import InputError, UnknownNameError
+
+
+class Coverage:
+    """Counts over many runs, the steps of one after those of another.
+
+    A plot that stands in for one of these (`Library.substitute`) is not counted as it. A rule counts where it stands:
+    also when it answered in a plot that was made from a plan and inherited it.
+
+    Args:
+        plots: the library, or its plots.
+        only: names of the plots to be covered; all if left out.
+
+    Raises:
+        UnknownNameError: `only` names a plot that is not there.
+    """
+
+    def __init__(self, plots: Iterable[ActionPlot], only: Collection[str] = ()) -> None:
+        self._library = Library(plots)
+        wanted = [self._library.plot(name) for name in only] or list(self._library)
+        self._items = {plot.name: {item.key: item for item in items_of(plot)} for plot in wanted}
+        self._reached: set[tuple[str, Key]] = set()
+        self._inside: dict[str, str | None] = {}  # path of the holding state -> plot, None if it is none of ours
+        self._seen: dict[int, tuple[ActionPlot, bool]] = {}
+
+    def add(self, *steps: Step) -> None:
+        """Count what the steps did; also a listener for `Sequencer.listen`.
+
+        Raises:
+            InputError: the steps of a run before these are missing.
+        """
+        for micro in (micro for step in steps for micro in step.microsteps):
+            for taken in micro.taken:  # stands before what was bound by it
+                self._take(taken)
+            self._bind(micro)
+            for path in micro.entered:
+                holder, _, name = path.rpartition("/")
+                self._count(self._holding(holder), ("state", name, ()))
+
+    def missing(self, plot: str | None = None) -> tuple[Item, ...]:
+        """What was not reached, in the order of plots and texts; of one plot, or of all.
+
+        Raises:
+            UnknownNameError: that plot is not covered.
+        """
+        return tuple(item for name in self._names(plot) for item in self._missing(name))
+
+    def count(self, plot: str, kind: Kind) -> tuple[int, int]:
+        """How many of a plot's states, transitions or rules were reached, and how many there are.
+
+        Raises:
+            UnknownNameError: that plot is not covered.
+        """
+        (name,) = self._names(plot)
+        keys = [key for key in self._items[name] if key[0] == kind]
+        return sum((name, key) in self._reached for key in keys), len(keys)
+
+    @property
+    def ratio(self) -> float:
+        """The part of everything that was reached, from 0 to 1; 1 if there is nothing."""
+        reached, total = self._total()
+        return reached / total if total else 1.0
+
+    def report(self) -> str:
+        """A table of plots, and under each one a line with place for everything that was missed."""
+        width = max(map(len, self._items), default=0)
+        head = " " * width + "".join(f"  {kind + 's':>11}" for kind in KINDS)
+        return "\n".join([head.rstrip(), *(line for name in self._items for line in self._lines(name, width))])
+
+    def assert_complete(self, at_least: float = 1.0) -> None:
+        """Raise `AssertionError` with the report if less than that part of everything was reached.
+
+        Args:
+            at_least: from 0 to 1.
+        """
+        if self.ratio < at_least:
+            reached, total = self._total()
+            raise AssertionError(
+                f"{reached} of {total} ({self.ratio:.1%}) covered, at least {at_least:.1%} wanted\n{self.report()}"
+            )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data: per plot how many were reached and what was missed, with file and line."""
+        return {
+            name: {
+                **{f"{kind}s": dict(zip(("reached", "all"), self.count(name, kind), strict=True)) for kind in KINDS},
+                "missing": [item.to_json() for item in self._missing(name)],
+            }
+            for name in self._items
+        }
+
+    def _take(self, taken: Taken) -> None:
+        holder, _, source = taken.source.rpartition("/")
+        if taken.rule is None:
+            self._count(self._holding(holder), ("transition", source, taken.place))
+            return
+        # The innermost plot around that has such a rule: a generated plot inherits its holder's.
+        key: Key = ("rule", taken.rule, ())
+        for around in _outwards(holder):
+            name = self._holding(around)
+            if name is not None and key in self._items[name]:
+                self._count(name, key)
+                return
+
+    def _bind(self, micro: Microstep) -> None:
+        for bound in micro.bound:
+            self._inside[bound.state] = bound.plot.name if self._is_ours(bound.plot) else None
+
+    def _is_ours(self, plot: ActionPlot) -> bool:
+        if plot.name not in self._items:
+            return False
+        kept = self._seen.get(id(plot))  # the same object time and again; comparing texts is for the first time
+        if kept is None or kept[0] is not plot:
+            kept = (plot, self._library.expanded(self._library.plot(plot.name)) == plot)
+            self._seen[id(plot)] = kept
+        return kept[1]
+
+    def _holding(self, state: str) -> str | None:
+        if state not in self._inside:
+            raise InputError("the steps of a run are counted from its start; these begin in the middle")
+        return self._inside[state]
+
+    def _count(self, plot: str | None, key: Key) -> None:
+        if plot is not None and key in self._items[plot]:
+            self._reached.add((plot, key))
+
+    def _total(self) -> tuple[int, int]:
+        total = sum(map(len, self._items.values()))
+        return total - len(self.missing()), total
+
+    def _names(self, plot: str | None) -> Iterable[str]:
+        if plot is None:
+            return self._items
+        if plot not in self._items:
+            raise UnknownNameError(f"the plot '{plot}' is not covered", found=plot, valid=self._items)
+        return (plot,)
+
+    def _missing(self, plot: str) -> Iterator[Item]:
+        items: Mapping[Key, Item] = self._items[plot]
+        return (item for key, item in items.items() if (plot, key) not in self._reached)
+
+    def _lines(self, plot: str, width: int) -> Iterator[str]:
+        counts = (self.count(plot, kind) for kind in KINDS)
+        cells = (f"{reached} of {total}" if total else "-" for reached, total in counts)
+        yield f"{plot:<{width}}" + "".join(f"  {cell:>11}" for cell in cells)
+        yield from (f"  {item}" for item in self._missing(plot))
+
+
+def _outwards(path: str) -> Iterator[str]:
+    """The path of the state that holds a plot, then of the one that holds that state's plot, up to the outermost."""
+    yield path
+    while path:
+        path = path.rpartition("/")[0]
+        yield path

@@ -1,0 +1,182 @@
+"""The machine alone: events by hand, a clock that moves when it is told to, no skills and no loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.dynamic.situation import KnowledgeSituation
+from dsc.engine.machine import Machine
+from dsc.engine.steps import Cancel, Output, SendLater, Start, StartTimer, Step
+from dsc.events import TIMED_OUT, Event
+from dsc.model.plot import ActionPlot
+from dsc.sequencer.dispatcher import DEFAULT_WITHIN
+from dsc.sequencer.sequencer import CHART
+from dsc.testing.worlds import change_of, world
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.facts import Delta
+from knowledge_base.store import KnowledgeBase
+
+_ROUNDING = 1e-9
+"""Seconds by which sums of floating-point numbers may miss each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Due:
+    """An event that comes at a certain time, unless its activation is left or its skill (by action) answers."""
+
+    at: float
+    event: Event
+    activation: int | None = None
+    action_id: str | None = None
+
+
+class DryRun:
+    """A plot that has been started and waits for what the test does to it.
+
+    Args:
+        plots: the library, or its plots.
+        plot: the name of the one to run.
+        arguments: values for its parameters.
+        knowledge: the world model, which the plot changes; an empty one if left out.
+
+    Attributes:
+        library: its plots.
+        machine: the machine; its state can be looked at.
+        knowledge: the world model.
+        now: seconds since the start.
+        steps: all steps so far; see `predicates`.
+        running: the skills that were started and have neither answered nor been cancelled.
+
+    Raises:
+        InputError: the plot is unknown, or a parameter is missing or unknown.
+        RunawayError: the chart does not come to rest.
+    """
+
+    def __init__(
+        self,
+        plots: Iterable[ActionPlot],
+        plot: str,
+        arguments: Mapping[str, Any] | None = None,
+        knowledge: KnowledgeBase | None = None,
+    ) -> None:
+        self.library = Library(plots)
+        self.machine = Machine(self.library)
+        self.knowledge = knowledge if knowledge is not None else world()
+        self.now = 0.0
+        self.steps: list[Step] = []
+        self.running: list[Start] = []
+        self._due: list[_Due] = []
+        self._keep(self.machine.start(plot, arguments or {}, self._situation()))
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """The paths of all active states, outermost first."""
+        return self.machine.state.configuration()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the plot has reached its final state."""
+        return self.machine.state.finished
+
+    @property
+    def emitted(self) -> tuple[Event, ...]:
+        """The plot's outcome events, in order."""
+        return tuple(event for step in self.steps for event in step.emitted)
+
+    def send(self, event: str, /, **attributes: Any) -> Step:
+        """An event from outside, which everybody sees."""
+        return self._send(Event(event, attributes))
+
+    def answer(
+        self, skill: str, event: str, attributes: Mapping[str, Any] | None = None, *, observed: Delta | str = ""
+    ) -> Step:
+        """A running skill (`component.skill`; the one started first, if there are several) ends with an outcome.
+
+        Args:
+            skill: which.
+            event: its outcome, under the skill's own name for it.
+            attributes: the event's attributes.
+            observed: what is known with it: a change, or a PDDL effect in which `?name` stands for an argument.
+
+        Returns:
+            The step; where it is not `handled`, a sequencer would end the run.
+
+        Raises:
+            UnknownNameError: no such skill is running.
+        """
+        start = next((one for one in self.running if _skill(one) == skill), None)
+        if start is None:
+            raise UnknownNameError(f"no skill '{skill}' is running", found=skill, valid=map(_skill, self.running))
+        self._ended(start.action_id)
+        if observed:
+            self.knowledge.apply(change_of(observed, self.knowledge, start.arguments), start.component)
+        return self._send(Event(start.names.get(event, event), attributes or {}, to=start.activation))
+
+    def change(self, what: Delta | str, author: str = "somebody") -> Step:
+        """Somebody changes the knowledge: a change, or a PDDL effect on the world as it is now."""
+        self.knowledge.apply(change_of(what, self.knowledge), author)
+        return self._send(None)
+
+    def leave(self) -> Step:
+        """The run is ended from outside: everything active is left, and its exit actions put components at rest."""
+        return self._keep(self.machine.leave(self._situation()))
+
+    def advance(self, seconds: float) -> tuple[Step, ...]:
+        """Let time pass; what is due meanwhile comes in order, a skill that has not answered in time as `timed_out`.
+
+        Raises:
+            InputError: time does not go backwards.
+        """
+        if seconds < 0:
+            raise InputError(f"time does not go backwards: {seconds:g} s")
+        until = self.now + seconds
+        before = len(self.steps)
+        while (due := min(self._due, key=lambda one: one.at, default=None)) and due.at <= until + _ROUNDING:
+            self.now = due.at
+            self._due.remove(due)
+            if due.action_id is not None:
+                self._ended(due.action_id)
+            self._send(due.event)
+        self.now = until
+        return tuple(self.steps[before:])
+
+    def _send(self, event: Event | None) -> Step:
+        return self._keep(self.machine.send(event, self._situation()))
+
+    def _situation(self) -> KnowledgeSituation:
+        return KnowledgeSituation(self.knowledge, self.library)
+
+    def _keep(self, step: Step) -> Step:
+        self.steps.append(step)
+        if step.knowledge:
+            self.knowledge.apply(step.knowledge, CHART)
+        for output in step.output:
+            self._note(output)
+        return step
+
+    def _note(self, output: Output) -> None:
+        match output:
+            case Start():
+                self.running.append(output)
+                within = output.within or DEFAULT_WITHIN
+                late = Event(TIMED_OUT, {"skill": _skill(output), "seconds": within}, to=output.activation)
+                self._due.append(_Due(self.now + within, late, output.activation, output.action_id))
+            case StartTimer(activation, index, seconds, name):
+                timeout = Event(name, to=activation, exact=True, number=index)
+                self._due.append(_Due(self.now + seconds, timeout, activation))
+            case SendLater(event, seconds):
+                self._due.append(_Due(self.now + seconds, event))
+            case Cancel(activation):
+                self.running = [start for start in self.running if start.activation != activation]
+                self._due = [due for due in self._due if due.activation != activation]
+
+    def _ended(self, action_id: str) -> None:
+        self.running = [start for start in self.running if start.action_id != action_id]
+        self._due = [due for due in self._due if due.action_id != action_id]
+
+
+def _skill(start: Start) -> str:
+    return f"{start.component}.{start.skill}"

@@ -1,0 +1,39 @@
+"""For pytest, where it is asked for: `pytest_plugins = ["dsc.testing.pytest_plugin"]`.
+
+With `dsc_plots = FOLDER ...` in pytest's own settings, the fixture `plot_coverage` counts for the whole session
+what tests add to it, and the summary ends with its report. Workers of pytest-xdist count each for themselves, and
+nobody reports.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dsc.testing.coverage import Coverage
+from dsc.text.plots import load_library
+
+_COVERAGE = pytest.StashKey[Coverage]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The setting `dsc_plots`."""
+    parser.addini("dsc_plots", "folders of the plots that plot_coverage covers", type="paths", default=[])
+
+
+@pytest.fixture(scope="session")
+def plot_coverage(pytestconfig: pytest.Config) -> Coverage:
+    """One `Coverage` of all plots in the folders of `dsc_plots`, for the whole session."""
+    folders: list[Path] = pytestconfig.getini("dsc_plots")
+    if not folders:
+        raise pytest.UsageError("plot_coverage needs the setting `dsc_plots`: the folders with the plots")
+    return pytestconfig.stash.setdefault(_COVERAGE, Coverage(plot for each in folders for plot in load_library(each)))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """The report, if any test used the fixture."""
+    coverage = config.stash.get(_COVERAGE, None)
+    if coverage is not None:
+        terminalreporter.section("plot coverage")
+        terminalreporter.write_line(coverage.report())

@@ -1,0 +1,82 @@
+"""Plots that just end, to stand in for a whole branch in a test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from dsc.events import DONE
+from dsc.model.plot import ActionPlot, Variable
+from knowledge_base.errors import InputError, UnknownNameError
+
+
+def ends_with(
+    original: ActionPlot,
+    outcome: str = DONE,
+    attributes: Mapping[str, Any] | None = None,
+    *,
+    tell: str | None = None,
+    after: float = 0.0,
+) -> ActionPlot:
+    """A plot with the original's interface and part that does nothing but end; for `Library.substitute`.
+
+    Args:
+        original: the plot whose place it shall take.
+        outcome: one of its outcome events, or `done`.
+        attributes: the event's attributes, as a plot writes them: constants, or `?name` for a parameter; with
+            `done`, values for its outputs.
+        tell: what it tells the knowledge base, as a PDDL effect: what the original would have achieved.
+        after: seconds until it ends.
+
+    Raises:
+        UnknownNameError: the original has no such outcome, or the outcome no such attribute.
+        InputError: an attribute is missing.
+    """
+    given = dict(attributes or {})
+    _check(original, outcome, given)
+    ending: dict[str, Any] = {"to": "ended", "tell": tell}
+    ending |= {"assign": given} if outcome == DONE else {"emit": outcome, "with": given}
+    wait = {"after": {"seconds": after, **ending}} if after > 0 else {"always": ending}
+    about = f"Stands in for '{original.name}' and ends with '{outcome}'."
+    return ActionPlot.model_validate({
+        "plot": original.name,
+        "about": about,
+        "parameters": original.parameters,
+        "emits": original.emits,
+        "outputs": {name: _output(output) for name, output in original.outputs.items()},
+        "when": original.when,
+        "implements": original.implements,
+        "effects": original.effects,
+        "confirm": original.confirm,
+        "states": {"standing_in": wait, "ended": {"final": True}},
+    })
+
+
+def _output(output: Variable) -> dict[str, Any]:
+    """An output that has a value in any case, though nobody reads it where the ending is not `done`."""
+    nothing = 0 if output.type == "number" else "nothing"
+    return {"type": output.type, "initial": nothing if output.initial is None else output.initial}
+
+
+def _required(original: ActionPlot, outcome: str) -> list[str]:
+    if outcome == DONE:
+        return [name for name, output in original.outputs.items() if output.initial is None]
+    return list(original.emits[outcome] or ())
+
+
+def _check(original: ActionPlot, outcome: str, given: Mapping[str, Any]) -> None:
+    if outcome != DONE and outcome not in original.emits:
+        valid = (DONE, *original.emits)
+        raise UnknownNameError(
+            f"plot '{original.name}' does not end with '{outcome}'", place=original.place(("emits",)),
+            found=outcome, valid=valid,
+        )  # fmt: skip
+    declared = original.outputs if outcome == DONE else original.emits[outcome] or {}
+    for name in given:
+        if name not in declared:
+            raise UnknownNameError(
+                f"the outcome '{outcome}' of '{original.name}' has no attribute '{name}'", found=name, valid=declared
+            )
+    missing = [name for name in _required(original, outcome) if name not in given]
+    if missing:
+        raise InputError(f"the outcome '{outcome}' of '{original.name}' needs its attribute '{missing[0]}'")

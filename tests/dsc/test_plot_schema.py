@@ -1,0 +1,59 @@
+"""The JSON Schema of plot files says what the reader says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+from test_model import EVERYTHING
+
+from dsc.text.plots import plot_to_yaml
+from dsc.text.schema import json_schema
+from dsc.text.yaml import load_document
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = sorted(file for room in ("domains", "planning") for file in (ROOT / room).glob("**/plots/*.yaml"))
+SCHEMA = Draft202012Validator(json_schema())
+
+
+def complaints(data):
+    return [error.message for error in SCHEMA.iter_errors(data)]
+
+
+def test_the_schema_is_one():
+    Draft202012Validator.check_schema(json_schema())
+    assert json.loads(json.dumps(json_schema())) == json_schema()
+    assert set(json_schema()["required"]) == {"plot", "states"}
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
+def test_shipped_plots_fit(file):
+    assert complaints(load_document(file.read_text()).data) == []
+
+
+def test_both_spellings_of_every_kind_fit():
+    assert complaints(EVERYTHING.to_form()) == []
+    assert complaints(load_document(plot_to_yaml(EVERYTHING)).data) == []
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        "{colour: red}",
+        "{on: {e: 3}}",
+        "{on: {e: {too: b}}}",
+        "{every: {to: b}}",
+        "{entry: {switch: arm}}",
+        "{choice: b, on: {e: b}}",
+        "{choice: {when: 3}}",
+        "{select: ?x, cases: {a: b}}",
+        "{select: ?x, cases: {}, else: b}",
+        "{select: ?x, cases: [b], else: b}",
+        "{final: false}",
+    ],
+)
+def test_what_is_no_state_does_not_fit(state):
+    data = load_document(f"plot: p\nstates:\n  a: {state}\n  b: {{final: true}}\n").data
+    assert complaints(data) != []
