@@ -36,7 +36,7 @@ from dsc.text.files import check_size
 from knowledge_base.errors import ParseError, Place
 
 MAX_DEPTH = 128
-MAX_PARTS = 20_000
+MAX_PARTS = 18_000
 """Keys, values and collections: a plot of 1,000 states has 16,000; reading and checking that many takes a second."""
 
 FormPath = tuple[str | int, ...]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.outcomes import outcomes_of, outputs_of
+from dsc.dynamic.outcomes import Outcomes, outcomes_of, outputs_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
@@ -84,11 +85,16 @@ class _Data:
 
     def _continued(self, rule: Rule, event: Types, path: Path) -> Iterator[Finding]:
         """What goes on as if a state were done has the rule's event, not the outputs that `done` would bring."""
-        for name, state, _ in self._nesting.states:
-            answered = rule.on in outcomes_of(state, self._library) and (not rule.of or name in rule.of)
-            if answered and isinstance(state, State) and outputs_of(state, self._library):
+        for name, state, outcomes in self._handing_back:
+            if rule.on in outcomes and (not rule.of or name in rule.of):
                 for transition in state.on.get(DONE, ()):
                     yield from self._transition(transition, event, path)
+
+    @cached_property
+    def _handing_back(self) -> list[tuple[str, State, Outcomes]]:
+        """The states that bring outputs when they are done, with their outcomes."""
+        states = ((name, state) for name, state, _ in self._nesting.states if isinstance(state, State))
+        return [(n, s, outcomes_of(s, self._library)) for n, s in states if outputs_of(s, self._library)]
 
     # -- parts of a plot ---------------------------------------------------------------------------------
 
