@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check conformance soak bench-startup bench-engine pictures clean
+.PHONY: help demo test check conformance soak bench-startup bench-broken bench-engine pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -44,6 +44,8 @@ soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every re
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py
 
+bench-broken: $(VENV)/.run   ## how long the error in a broken plot takes, median and longest (RUNS=N)
+	$(BIN)/python benchmarks/broken_plots.py --runs $(or $(RUNS),3)
 bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this engine, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/engine.py $(if $(WRITE),--write)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any
 
 from peers.dsc import KNOWLEDGE, Ready, ready
@@ -25,9 +25,11 @@ def ping_pong(name: str = "bench", *, others: int = 0, entry: Any = (), exit: An
     states: Form = {
         one: {"on": {"ping": {"to": other, **more}}, "entry": entry, "exit": exit} for one, other in ("ab", "ba")
     }
-    states |= {f"s{n}": {"on": {"ping": "a"}} for n in range(others)}
+    way = ["a", *(f"s{n}" for n in range(others)), "a"]
+    for one, other in pairwise(way) if others else ():  # round trips that nobody makes
+        states.setdefault(one, {"on": {}})["on"]["away"] = other
     variables = {"n": {"type": "number", "initial": 1}}
-    return {"plot": name, "variables": variables, "receives": {"ping": None}, "states": states}
+    return {"plot": name, "variables": variables, "receives": {"ping": None, "away": None}, "states": states}
 
 
 def holder(use: str) -> Form:

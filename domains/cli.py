@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TextIO
 
@@ -121,6 +122,9 @@ def _print(report: Report, *, as_json: bool) -> None:
 
 def main() -> None:
     """The entry point: what people got wrong becomes one message and exit status 2, never a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # a terminal may not have the letters that a file has
+            stream.reconfigure(errors="backslashreplace")
     try:
         app()
     except Exception as error:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dsc.dynamic.library import Library
     from dsc.errors import Finding
     from dsc.model.plot import ActionPlot
+    from dsc.text.neighbours import Neighbours
     from knowledge_base.errors import InputError
     from knowledge_base.schema import Schema
 
@@ -27,13 +28,15 @@ BAD_INPUT = 2
 """Exit status of `check` with findings, and of bad input to any command."""
 UNKNOWN_PLOT = "known plot"
 """The rule of findings that may be there because a neighbouring file cannot be read."""
+MAX_BROKEN = 3
+"""Of those files, as many are named."""
 PIPE_WIDTH = 160
 """Columns of a tree that is not printed on a terminal."""
 
 
 @app.command()
 def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Plot files (YAML).")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Plots (YAML) or charts (.scxml).")],
     domain: Annotated[
         Path | None,
         typer.Option(
@@ -48,7 +51,10 @@ def check(
 
     A plot may use the other plots in its folder. Exit status: 0 nothing found, 2 findings.
     """
-    found = [(file, finding) for file in files for finding in _findings(file, domain)]
+    from dsc.text.neighbours import Neighbours
+
+    neighbours = Neighbours()
+    found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours)]
     if json:
         _print_json([_as_data(file, finding) for file, finding in found])
     else:
@@ -99,11 +105,15 @@ def import_(
     ] = "-",
 ) -> None:
     """Read an SCXML chart as a plot of profile `scxml`; what plots cannot say is named."""
+    from dsc.dynamic.library import Library
+    from dsc.text.files import read_file
     from dsc.text.plots import plot_to_yaml
     from dsc.text.scxml.reader import parse_scxml
-    from dsc.text.yaml import read_file
+    from dsc.validation import raise_findings, validate_plot
 
-    _write(out, plot_to_yaml(parse_scxml(read_file(file), str(file))))
+    plot = parse_scxml(read_file(file), str(file))
+    raise_findings(validate_plot(plot, Library([plot])))
+    _write(out, plot_to_yaml(plot))
 
 
 @app.command()
@@ -138,40 +148,37 @@ def schema() -> None:
     _print_json(json_schema())
 
 
-def _findings(file: Path, domain: Path | None) -> list[Finding]:
-    """All that is wrong with one file; what cannot be read at all is one finding."""
+def _findings(file: Path, domain: Path | None, neighbours: Neighbours) -> list[Finding]:
+    """What is wrong with one file; what cannot be read at all is one finding."""
     from dsc.errors import Finding
-    from dsc.text.plots import load_plot
     from dsc.validation import validate_plot
     from knowledge_base.errors import InputError
 
     known = _schema(file, domain)
     try:
-        plot = load_plot(file)
-        library, broken = _neighbours(file, plot)
+        plot = _load(file)
+        library, broken = neighbours.of(file, plot)
         findings = validate_plot(plot, library, known)
     except InputError as error:
         return [Finding(error, "readable")]
     if any(finding.rule == UNKNOWN_PLOT for finding in findings):
-        findings += [Finding(error, "readable") for error in broken]
+        findings += [Finding(error, "readable") for error in broken[:MAX_BROKEN]]
     return findings
 
 
-def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
-    """The plot with the others of its folder, and why some of those are not among them."""
-    from dsc.dynamic.library import Library
+def _load(file: Path) -> ActionPlot:
+    """A plot, whose file says by its name if it is a chart in SCXML."""
+    from dsc.text.files import read_file
     from dsc.text.plots import load_plot
-    from knowledge_base.errors import InputError
+    from dsc.text.scxml.reader import parse_scxml
 
-    library, broken = Library([plot]), []
-    for other in sorted(file.parent.glob("*.yaml")):
-        if other.resolve() == file.resolve():
-            continue
-        try:
-            library.add(load_plot(other))
-        except InputError as error:
-            broken.append(error)
-    return library, broken
+    return parse_scxml(read_file(file), str(file)) if file.suffix == ".scxml" else load_plot(file)
+
+
+def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
+    from dsc.text.neighbours import Neighbours
+
+    return Neighbours().of(file, plot)
 
 
 def _schema(file: Path, domain: Path | None) -> Schema | None:

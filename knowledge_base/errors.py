@@ -6,8 +6,10 @@ One family for all rooms, so that a command can turn any of them into one line a
 from __future__ import annotations
 
 import difflib
+import heapq
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +23,45 @@ class Place:
     def __str__(self) -> str:
         """`file:line:column`, as far as known (compilers' and editors' form)."""
         parts = [self.source or "<text>", *(str(n) for n in (self.line, self.column) if n is not None)]
-        return ":".join(parts)
+        return printable(":".join(parts))
+
+
+MAX_MESSAGE = 400
+"""Characters of a message; what people wrote may be much longer, and nobody reads that in an error."""
+MAX_NAME = 100
+"""Characters of a name for which the nearest valid one is searched; comparing is quadratic in them."""
+MAX_COMPARED = 50
+"""Names that are compared closely with a misspelt one; of more, those that share most pairs of letters."""
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
     """The valid name that `name` was probably meant to be, or `None` when nothing is close."""
-    by_folded = {candidate.casefold(): candidate for candidate in sorted(valid)}
-    close = difflib.get_close_matches(name.casefold(), by_folded, n=1, cutoff=0.55)
+    if len(name) > MAX_NAME:
+        return None
+    folded = name.casefold()
+    by_folded = {candidate.casefold(): candidate for candidate in sorted(valid) if len(candidate) <= MAX_NAME}
+    candidates: Iterable[str] = by_folded
+    if len(by_folded) > MAX_COMPARED:
+        pairs = _pairs(folded)
+        candidates = heapq.nsmallest(MAX_COMPARED, by_folded, key=lambda other: len(pairs ^ _pairs(other)))
+    close = difflib.get_close_matches(folded, candidates, n=1, cutoff=0.55)
     return by_folded[close[0]] if close else None
+
+
+def printable(text: str) -> str:
+    r"""The text on one line: line breaks, control characters and half characters as escapes such as `\\n`."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def shortened(text: str, longest: int = MAX_MESSAGE) -> str:
+    """The text, without its middle if it is longer than that."""
+    half = longest // 2
+    return text if len(text) <= longest else f"{text[:half]} … {text[-half:]}"
+
+
+@lru_cache(maxsize=4096)  # the many errors of one text have the same valid names
+def _pairs(name: str) -> frozenset[str]:
+    return frozenset(name[at : at + 2] for at in range(len(name)))
 
 
 class InputError(Exception):
@@ -49,8 +82,8 @@ class InputError(Exception):
         found: str | None = None,
         valid: Iterable[str] = (),
     ) -> None:
-        super().__init__(message)
-        self.message = message
+        self.message = printable(shortened(message))
+        super().__init__(self.message)
         self.place = place
         self.found = found
         self.valid = tuple(sorted(set(valid)))
@@ -69,10 +102,12 @@ class InputError(Exception):
     def __str__(self) -> str:
         """One line: place, message, and the nearest valid name or the short list of them."""
         text = f"{self.place}: {self.message}" if self.place else self.message
-        if self.nearest is not None:
-            return f"{text}; did you mean '{self.nearest}'?"
+        meant = self.nearest
+        if meant is not None:
+            return f"{text}; did you mean '{printable(meant)}'?"
         if self.valid:
-            shown = ", ".join(self.valid[:8]) + (", …" if len(self.valid) > 8 else "")
+            names = [printable(shortened(name, MAX_NAME)) for name in self.valid[:8]]
+            shown = ", ".join(names) + (", …" if len(self.valid) > 8 else "")
             return f"{text}; valid: {shown}"
         return text
 

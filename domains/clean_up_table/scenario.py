@@ -39,8 +39,9 @@ from domains.clean_up_table.items import (
 )
 from domains.clean_up_table.places import OPERATOR, PLACES
 from domains.clean_up_table.world import World
+from dsc.text.files import read_file
 from dsc.text.form import read_model
-from dsc.text.yaml import load_document, read_file
+from dsc.text.yaml import load_document
 from knowledge_base.errors import InputError, Place, UnknownNameError
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ In a generated plot, what no rule takes leads to `replan`.
 from __future__ import annotations
 
 import itertools
+from collections import ChainMap
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 
@@ -125,7 +126,8 @@ class _Expansion:
         limit = rule.do.limit or (DEFAULT_RETRIES if bounded else None)
         if limit is None:
             return rule.when, {}
-        taken = {*self.plot.parameters, *self.plot.variables, *self.plot.outputs, *self.counters}
+        declared = self.plot.parameters, self.plot.variables, self.plot.outputs
+        taken = ChainMap[str, object](self.counters, *declared)  # type: ignore[arg-type]
         counter = _unused(f"tries_{key}".lower().replace("-", "_"), taken)
         self.counters[counter] = Variable.model_validate({"type": "number", "initial": 0})
         tries = lang.Variable(counter)

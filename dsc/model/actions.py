@@ -23,7 +23,7 @@ class Trigger(Frozen):
     trigger: str = Field(pattern=r"^[\w\-]+\.[\w\-]+$")
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
     names: dict[str, str] = Field(default_factory=dict, alias="as")
-    within: float | None = Field(default=None, gt=0)
+    within: float | None = Field(default=None, gt=0, strict=True)
 
 
 class Configure(Frozen):

@@ -71,7 +71,7 @@ class Response(Frozen):
     use: str | None = None
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
     then: str = "retry"
-    limit: int | None = Field(default=None, ge=1)
+    limit: int | None = Field(default=None, ge=1, strict=True)
 
 
 class Rule(Frozen):
@@ -128,11 +128,11 @@ class ActionPlot(Frozen):
     when: ConditionField | None = None
     implements: str | None = None
     effects: Literal["observed", "assumed"] = "observed"
-    confirm: float = Field(default=5.0, gt=0)
+    confirm: float = Field(default=5.0, gt=0, strict=True)
     initial: str | None = None
     states: dict[str, AnyState] = Field(min_length=1)
     rules: tuple[Rule, ...] = ()
-    generated: bool = False
+    generated: bool = Field(default=False, strict=True)
     profile: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
     _content: str | None = PrivateAttr(default=None)

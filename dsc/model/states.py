@@ -106,8 +106,8 @@ class SubmachineState(State):
 class Budget(Frozen):
     """Bounds of planning for one dynamic state: replans after the first plan, seconds for each search."""
 
-    replans: int = Field(default=8, ge=0)
-    seconds: float = Field(default=10.0, gt=0)
+    replans: int = Field(default=8, ge=0, strict=True)
+    seconds: float = Field(default=10.0, gt=0, strict=True)
 
 
 class DynamicState(State):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -10,7 +11,7 @@ from pydantic_core import ErrorDetails
 
 from dsc.model.language import LOCATED, UNKNOWN_FORM
 from dsc.text.yaml import Document, FormPath
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError, shortened
 
 _Model = TypeVar("_Model", bound=BaseModel)
 _Schema = Mapping[str, Any]
@@ -20,9 +21,13 @@ Location = tuple[str | int, ...]
 _PLAIN = {
     "missing": "the key '{key}' is missing",
     "string_type": "text was expected",
+    "invalid_key": "a key is a name",
     "dict_type": "a mapping of names was expected",
     "model_type": "a mapping was expected",
     "model_attributes_type": "a mapping was expected",
+    "int_type": "a whole number was expected",
+    "float_type": "a number was expected",
+    "bool_type": "true or false was expected",
     "tuple_type": "a list was expected",
     "too_short": "at least one entry is needed",
     "string_pattern_mismatch": "'{key}' is not of the form expected here, e.g. arm.grasp or fetch_item",
@@ -36,7 +41,8 @@ def read_model(model: type[_Model], document: Document) -> _Model:
         InputError: something in it does not fit; the message has file, line, and the nearest valid key.
     """
     if not isinstance(document.data, Mapping):
-        raise InputError("a mapping of keys was expected", place=document.place(()))
+        found = _in_yaml(document.data)
+        raise InputError(f"a mapping of keys was expected; found {found}", place=document.place(()))
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
@@ -45,9 +51,9 @@ def read_model(model: type[_Model], document: Document) -> _Model:
 
 def _first(error: ValidationError, model: type[BaseModel], document: Document) -> InputError:
     # The deepest complaint is the most specific one.
-    details = max(error.errors(), key=lambda one: (one["type"] != "missing", len(one["loc"])))
+    details = max(error.errors(include_url=False), key=lambda one: (one["type"] != "missing", len(one["loc"])))
     kind, loc, context = details["type"], details["loc"], details.get("ctx", {})
-    schema = model.model_json_schema()
+    schema = _schema(model)
     place = document.place((*_follow(loc, document.data, schema)[0], *context.get("path", ())))
     if kind == "extra_forbidden":
         key, around = str(loc[-1]), _follow(loc[:-1], document.data, schema)[1]
@@ -60,6 +66,12 @@ def _first(error: ValidationError, model: type[BaseModel], document: Document) -
     return InputError(_message(details), place=place)
 
 
+@cache
+def _schema(model: type[BaseModel]) -> _Schema:
+    """Making it takes fifty times as long as reading a plot."""
+    return model.model_json_schema()
+
+
 def _message(details: ErrorDetails) -> str:
     kind = details["type"]
     if kind == "value_error":
@@ -67,7 +79,7 @@ def _message(details: ErrorDetails) -> str:
     if kind == LOCATED:
         return details["msg"]
     if kind == UNKNOWN_FORM:
-        return f"{details['msg']}; found {details['input']!r}"
+        return f"{details['msg']}; found {_in_yaml(details['input'])}"
     if kind in _PLAIN:
         found = "" if kind == "missing" else f"; found {_in_yaml(details['input'])}"
         return _PLAIN[kind].format(key=details["loc"][-1]) + found
@@ -76,10 +88,14 @@ def _message(details: ErrorDetails) -> str:
 
 
 def _in_yaml(value: Any) -> str:
-    """The value as people write it: `true`, `null` and `[]`, not Python's words."""
+    """The value as people write it, or only its kind if it is a collection."""
     if isinstance(value, bool | None):
         return {True: "true", False: "false", None: "nothing"}[value]
-    return repr(list(value) if isinstance(value, tuple) else value)
+    if isinstance(value, Mapping):
+        return f"a mapping with the keys {', '.join(map(str, list(value)[:5]))}" if value else "an empty mapping"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}" if value else "an empty list"
+    return shortened(repr(value), 100)
 
 
 def _said_by(error: ValueError) -> str:

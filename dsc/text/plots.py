@@ -8,8 +8,9 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.model.connectors import case_value
 from dsc.model.plot import ActionPlot
+from dsc.text.files import read_file
 from dsc.text.form import read_model
-from dsc.text.yaml import dump, load_document, read_file
+from dsc.text.yaml import dump, load_document
 from knowledge_base.errors import InputError, Place
 
 

@@ -1,31 +1,51 @@
 """Plots and scenarios as YAML 1.2: read with places, refused where YAML is cleverer than people expect.
 
-Duplicate keys, tags, anchors and aliases are refused; so are files too large or nested too deeply to be
-anybody's plot. Every error names file, line and column.
+Duplicate keys, tags, anchors, aliases and merge keys are refused; so are texts too large or nested too deeply to be
+anybody's plot. Scalars are those of YAML 1.2's core schema (10.3): `yes`, `off`, `1_000` and `2024-01-01` are text.
+Every error names file, line and column. What is read is built from the parser's events in one pass, so that the
+time it takes is bounded by the number of its parts.
 """
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from io import StringIO
-from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, NodeEvent, ScalarEvent
-from ruamel.yaml.scanner import RoundTripScanner
+from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.events import (
+    AliasEvent,
+    DocumentStartEvent,
+    Event,
+    MappingEndEvent,
+    MappingStartEvent,
+    NodeEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+)
+from ruamel.yaml.reader import ReaderError
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString
+from ruamel.yaml.scanner import Scanner, ScannerError
 
-from knowledge_base.errors import InputError, ParseError, Place
+from dsc.text.files import check_size
+from knowledge_base.errors import ParseError, Place
 
-MAX_BYTES = 500_000
-MAX_DEPTH = 64
+MAX_DEPTH = 128
+MAX_PARTS = 18_000
+"""Keys, values and collections: a plot of 1,000 states has 16,000; reading and checking that many takes a second."""
 
 FormPath = tuple[str | int, ...]
+"""Names of keys and positions in lists."""
+
+_SPACES = "\0 \t\r\n\x85\u2028\u2029"
 
 
-class _Scanner(RoundTripScanner):
+class _Scanner(Scanner):
     """Reads `{table: ?table}` as YAML 1.2 has it (7.3.3): `?` before a non-space begins a plain scalar.
 
     The library keeps YAML 1.1's reading inside braces, where `?` always begins a complex key.
@@ -39,8 +59,26 @@ class _Scanner(RoundTripScanner):
             return self.reader.peek(1) not in _SPACES
         return super().check_plain()
 
+    def fetch_flow_collection_start(self, *args: Any, **named: Any) -> None:
+        if self.flow_level > MAX_DEPTH:  # looking for a key, the scanner runs ahead of the parser, at a price
+            raise ScannerError(None, None, _TOO_DEEP, self.reader.get_mark())
+        super().fetch_flow_collection_start(*args, **named)
 
-_SPACES = "\0 \t\r\n\x85\u2028\u2029"
+    def scan_yaml_directive_number(self, *args: Any) -> Any:
+        try:
+            return super().scan_yaml_directive_number(*args)
+        except ValueError:
+            raise ScannerError(None, None, "the version is too long", self.reader.get_mark()) from None
+
+    def scan_flow_scalar_non_spaces(self, *args: Any) -> Any:
+        try:
+            return super().scan_flow_scalar_non_spaces(*args)
+        except (ValueError, OverflowError):
+            problem = "an escape that stands for no character"
+            raise ScannerError(None, None, problem, self.reader.get_mark()) from None
+
+
+_TOO_DEEP = f"nested deeper than {MAX_DEPTH} levels"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,38 +101,25 @@ class Document:
         return None
 
 
-def read_file(path: Path | str) -> str:
-    """The text of a file; raises `InputError` if it cannot be read or is not UTF-8."""
-    file = Path(path)
-    try:
-        if file.stat().st_size > MAX_BYTES:
-            raise InputError(f"the file is larger than {MAX_BYTES} bytes", place=Place(str(file)))
-        return file.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        siblings = [str(other) for other in file.parent.glob("*")] if file.parent.is_dir() else []
-        raise InputError(f"there is no file '{file}'", found=str(file), valid=siblings[:200]) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the file: {error}", place=Place(str(file))) from None
-
-
 def load_document(text: str, source: str | None = None) -> Document:
     """Read one YAML document.
 
     Raises:
         ParseError: it is not YAML, or uses a feature that is refused.
+        InputError: it is too large.
     """
-    if len(text) > MAX_BYTES:
-        raise ParseError(f"the text is larger than {MAX_BYTES} bytes", place=Place(source))
+    check_size(len(text), Place(source))
+    places: dict[FormPath, Place] = {(): Place(source, 1)}
+    reader = _Reader(text, source, places)
     try:
-        _refuse_surprises(text, source)
-        tree = _yaml().load(text)
+        return Document(reader.document(), places)
     except MarkedYAMLError as error:
         raise _parse_error(error, source) from None
-    except (YAMLError, ValueError) as error:
-        problem = str(error).split("\n", maxsplit=1)[0]
-        raise ParseError(f"not readable as YAML: {problem}", place=Place(source, 1)) from None
-    places: dict[FormPath, Place] = {(): Place(source, 1)}
-    return Document(_plain(tree, (), places, source), places)
+    except ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        column = error.position - text.rfind("\n", 0, error.position)
+        problem = f"not readable as YAML: the character U+{ord(text[error.position]):04X} cannot stand in a text"
+        raise ParseError(problem, place=Place(source, line, column)) from None
 
 
 def dump(data: Mapping[str, Any]) -> str:
@@ -104,71 +129,172 @@ def dump(data: Mapping[str, Any]) -> str:
     yaml.default_flow_style = None
     yaml.width = 110
     yaml.indent(mapping=2, sequence=4, offset=2)
-    yaml.dump(dict(data), stream)
+    yaml.dump(_quoted(dict(data)), stream)
     return stream.getvalue()
 
 
-def _yaml() -> YAML:
-    yaml = YAML(typ="rt", pure=True)
-    yaml.Scanner = _Scanner
-    yaml.allow_duplicate_keys = False
-    return yaml
+class _Reader:
+    """Builds the data of one document from the parser's events."""
+
+    def __init__(self, text: str, source: str | None, places: dict[FormPath, Place]) -> None:
+        yaml = YAML(typ="safe", pure=True)
+        yaml.Scanner = _Scanner
+        self._events: Iterator[Any] = yaml.parse(text)
+        self._source = source
+        self._places = places
+        self._parts = 0
+
+    def document(self) -> Any:
+        data, begun = None, False
+        for event in self._events:
+            if isinstance(event, DocumentStartEvent):
+                self._directives(event)
+                if begun:
+                    raise ParseError("another document begins here; a file holds one", place=self._place(event))
+                begun = True
+            elif isinstance(event, NodeEvent):
+                self._places[()] = self._place(event)
+                data = self._node(event, ())
+        return data
+
+    def _node(self, event: Event, path: FormPath) -> Any:
+        self._refuse_surprises(event, path)
+        if isinstance(event, MappingStartEvent):
+            return self._mapping(path)
+        if isinstance(event, SequenceStartEvent):
+            return self._sequence(path)
+        return self._scalar(event)
+
+    def _mapping(self, path: FormPath) -> dict[str | int, Any]:
+        found: dict[str | int, Any] = {}
+        while not isinstance(event := next(self._events), MappingEndEvent):
+            name = self._key(event, path)
+            here = (*path, name)
+            if name in found:
+                first = self._places[here].line
+                message = f'not readable as YAML: duplicate key "{event.value}", which is in line {first} too'
+                raise ParseError(message, place=self._place(event))
+            self._places[here] = self._place(event)
+            found[name] = self._node(next(self._events), here)
+        return found
+
+    def _key(self, event: Event, path: FormPath) -> str | int:
+        """A name; the cases of a `select` are constants, so there a number or truth value is one too."""
+        self._refuse_surprises(event, path)
+        key = self._scalar(event) if isinstance(event, ScalarEvent) else None
+        if isinstance(key, str):
+            return key
+        if path[-1:] == ("cases",) and isinstance(key, int | float) and math.isfinite(key):
+            return key if isinstance(key, int) else repr(key)
+        written = f"'{event.value}'" if isinstance(event, ScalarEvent) and event.value else "this"
+        message = f"a key is a name; {written} is none (in quotes it would be)"
+        raise ParseError(message, place=self._place(event))
+
+    def _sequence(self, path: FormPath) -> list[Any]:
+        found: list[Any] = []
+        while not isinstance(event := next(self._events), SequenceEndEvent):
+            here = (*path, len(found))
+            self._places[here] = self._place(event)
+            found.append(self._node(event, here))
+        return found
+
+    def _scalar(self, event: Any) -> Any:
+        value: str = event.value
+        if not event.implicit[0]:  # written in quotes or as a block
+            if _SURROGATE.search(value):
+                raise ParseError("an escape that stands for no character", place=self._place(event))
+            return value
+        if len(value) > _LONGEST_NUMBER and _NUMBER.fullmatch(value):
+            raise ParseError(f"a number has at most {_LONGEST_NUMBER} characters", place=self._place(event))
+        return _plain(value)
+
+    def _refuse_surprises(self, event: Any, path: FormPath) -> None:
+        self._parts += 1
+        if self._parts > MAX_PARTS:
+            raise ParseError(f"more than {MAX_PARTS} keys and values, the most that are read", place=self._place(event))
+        if isinstance(event, AliasEvent) or event.anchor:
+            raise ParseError("anchors and aliases are not used here; write it out", place=self._place(event))
+        if event.tag:
+            raise ParseError("YAML tags are not used here", place=self._place(event), found=str(event.tag))
+        if isinstance(event, ScalarEvent):
+            if event.value == "<<" and event.implicit[0]:
+                message = "merge keys are not used here; write it out"
+                raise ParseError(message, place=self._place(event), found="<<")
+        elif len(path) >= MAX_DEPTH:
+            raise ParseError(_TOO_DEEP, place=self._place(event))
+
+    def _directives(self, event: DocumentStartEvent) -> None:
+        if event.tags or event.version not in {None, (1, 2)}:
+            raise ParseError("only YAML 1.2 without tags is read here", place=self._place(event))
+
+    def _place(self, event: Event) -> Place:
+        return Place(self._source, event.start_mark.line + 1, event.start_mark.column + 1)
 
 
-def _refuse_surprises(text: str, source: str | None) -> None:
-    depth = 0
-    for event in _yaml().parse(text):
-        mark = event.start_mark
-        place = Place(source, mark.line + 1, mark.column + 1)
-        if isinstance(event, AliasEvent) or (isinstance(event, NodeEvent) and event.anchor):
-            raise ParseError("anchors and aliases are not used here; write it out", place=place)
-        if getattr(event, "tag", None):
-            raise ParseError("YAML tags are not used here", place=place, found=str(event.tag))
-        if isinstance(event, ScalarEvent) and event.value == "<<" and event.implicit[0]:
-            raise ParseError("merge keys are not used here; write it out", place=place, found="<<")
-        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
-        if depth > MAX_DEPTH:
-            raise ParseError(f"nested deeper than {MAX_DEPTH} levels", place=place)
+_PLAIN: Mapping[str, bool | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_NUMBER = re.compile(r"""
+    (?P<int>[-+]?[0-9]+) | 0o(?P<octal>[0-7]+) | 0x(?P<hex>[0-9a-fA-F]+)
+    | (?P<float>[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?)
+    | (?P<none>[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN))
+""", re.VERBOSE)  # fmt: skip
+_LONGEST_NUMBER = 40
+_SURROGATE = re.compile("[\ud800-\udfff]")
+
+
+def _plain(text: str) -> Any:
+    """What a scalar without quotes stands for in the core schema of YAML 1.2 (10.3.2)."""
+    if text in _PLAIN:
+        return _PLAIN[text]
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        return text
+    if match["octal"] or match["hex"]:
+        return int(match["octal"] or match["hex"], 8 if match["octal"] else 16)
+    if match["none"]:
+        return float(text.replace(".", "", 1))
+    return int(text) if match["int"] else float(text)
+
+
+def _quoted(data: Any) -> Any:
+    """The data with quotes about texts that would be read as something else without."""
+    if isinstance(data, Mapping):
+        return {_quoted(key): _quoted(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_quoted(one) for one in data]
+    if isinstance(data, str) and (_plain(data) != data or not data.isprintable()):  # other quotes fold line breaks
+        return DoubleQuotedScalarString(data)
+    return data
+
+
+_PLAINER = {
+    r"found character '\\t' that cannot start any token": "a tab stands where YAML wants spaces",
+    r"found a tab character that violates indentation": "a tab stands where YAML wants spaces",
+    r"expected <block end>, but found '<block \w+ start>'": "the line is indented differently from those above it",
+    r"expected <block end>, but found '-'": "a list goes on where the keys of a mapping stand",
+    r"expected <block end>, but found '\?'": "a key stands where the entries of a list do",
+    r"expected <block end>, but found (.*)": r"\1 does not belong there",
+    r"expected ',' or '(.)', but got .*": r"a ',' or '\1' is missing",
+    r"expected the node content, but found (.*)": r"no value begins with \1",
+    r"expected '<document start>', but found .*": "something goes on after the end",
+    r"could not find expected ':'": "a key without ':'",
+    r"mapping values are not allowed here": "a ':' stands where no key can be; is the indentation right?",
+    r"found unexpected end of stream": "a quote is never closed",
+    r"'<stream end>'": "the end of the text",
+}
+"""The library's words -> ours."""
 
 
 def _parse_error(error: MarkedYAMLError, source: str | None) -> ParseError:
-    mark = error.problem_mark or error.context_mark
+    mark, begun = error.problem_mark or error.context_mark, error.context_mark
     place = Place(source, mark.line + 1, mark.column + 1) if mark else Place(source)
-    problem = str(error.problem or error.context or "not readable as YAML").strip().split("\n")[0]
-    problem = problem.split(" with value ")[0]  # a duplicate key's values may be whole plots
-    return ParseError(f"not readable as YAML: {problem}", place=place)
-
-
-def _plain(node: Any, path: FormPath, places: dict[FormPath, Place], source: str | None) -> Any:
-    if isinstance(node, Mapping):
-        return {
-            name: _plain(value, (*path, name), places, source)
-            for name, value in _entries(node, path, places, source)
-        }
-    if isinstance(node, list):
-        for position in range(len(node)):
-            line, column = node.lc.item(position)  # type: ignore[attr-defined]
-            places[(*path, position)] = Place(source, line + 1, column + 1)
-        return [_plain(value, (*path, position), places, source) for position, value in enumerate(node)]
-    return _scalar(node)
-
-
-def _entries(
-    node: Mapping[Any, Any], path: FormPath, places: dict[FormPath, Place], source: str | None
-) -> Iterator[tuple[str | int, Any]]:
-    """A mapping's entries, each with its key as plain data and the key's place noted."""
-    for key, value in node.items():
-        line, column = node.lc.key(key)  # type: ignore[attr-defined]
-        place = Place(source, line + 1, column + 1)
-        if not isinstance(key, str | int | float):
-            raise ParseError("a key is a name; this is none", place=place)
-        name = key if isinstance(key, int) else str(key)
-        places[(*path, name)] = place
-        yield name, value
-
-
-def _scalar(node: Any) -> Any:
-    for kind in (bool, int, float, str):
-        if isinstance(node, kind):
-            return kind(node)
-    return None if node is None else str(node)
+    problem = str(error.problem or error.context or "").strip().split("\n")[0]
+    if problem == _TOO_DEEP:
+        return ParseError(problem, place=place)
+    for jargon, plainer in _PLAINER.items():
+        problem = re.sub(jargon, plainer, problem)
+    since = f" (of what begins in line {begun.line + 1})" if begun and mark and begun.line != mark.line else ""
+    return ParseError(f"not readable as YAML: {problem}{since}", place=place)

@@ -15,11 +15,10 @@ from knowledge_base.errors import SchemaError
 def check_connectors(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
     """Findings about choices and selections."""
     connectors = {name: path for name, state, path in nesting.states if isinstance(state, Connector)}
-    ways = {name: _targets(nesting, path) & connectors.keys() for name, path in connectors.items()}
-    round_about = _has_circle(ways)
+    circle = _circle({name: _targets(nesting, path) for name, path in connectors.items()})
     for name, path in connectors.items():
         yield from _branches(plot, name, path, nesting)
-        if round_about and name in _reached(name, ways):
+        if name in circle:
             error = SchemaError(f"connectors lead from '{name}' back to it", place=plot.place(path), found=name)
             yield Finding(error, "connectors lead on", "let one of them lead to a state, where a run can rest")
 
@@ -40,25 +39,14 @@ def _branches(plot: ActionPlot, name: str, path: Path, nesting: Nesting) -> Iter
             return
 
 
-def _targets(nesting: Nesting, path: Path) -> set[str]:
-    return {target for _, _, transition in nesting.leaving(path) for target in transition.targets}
+def _targets(nesting: Nesting, path: Path) -> list[str]:
+    return [target for _, _, transition in nesting.leaving(path) for target in transition.targets]
 
 
-def _has_circle(ways: Mapping[str, set[str]]) -> bool:
-    # Sound plots, which may have long chains of connectors, need no search from each of them.
+def _circle(ways: Mapping[str, list[str]]) -> frozenset[str]:
+    """The connectors of one circle; a second one is found when the first is mended."""
     try:
         TopologicalSorter(ways).prepare()
-    except CycleError:
-        return True
-    return False
-
-
-def _reached(start: str, ways: Mapping[str, set[str]]) -> set[str]:
-    """The connectors that are passed through after `start`."""
-    found: set[str] = set()
-    waiting = set(ways[start])
-    while waiting:
-        name = waiting.pop()
-        found.add(name)
-        waiting |= ways[name] - found
-    return found
+    except CycleError as error:
+        return frozenset(error.args[1])
+    return frozenset()

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.outcomes import outcomes_of, outputs_of
+from dsc.dynamic.outcomes import Outcomes, outcomes_of, outputs_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger, Withdraw
 from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot, Parameter, Path, Rule, Variable
-from dsc.model.states import AnyState, DynamicState, FinalState, State, SubmachineState
+from dsc.model.states import DynamicState, FinalState, State, SubmachineState
 from dsc.model.transitions import TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
+from dsc.validation.attributes import Skills, attributes_of
 from dsc.validation.nesting import Nesting
-from dsc.validation.wiring import Skills
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.check import check, check_effect
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, When
-from knowledge_base.language.effect import Assign as Change
+from knowledge_base.language.binding import unbound_error
+from knowledge_base.language.check import check, check_effect, check_term
+from knowledge_base.language.effect import Effect, mentioned
 from knowledge_base.language.expression import Expression, Term, free_variables
 from knowledge_base.schema import Schema
 
@@ -49,6 +50,8 @@ class _Data:
         self._assigned = {**plot.variables, **plot.outputs}
         declared: dict[str, Parameter | Variable] = {**plot.parameters, **self._assigned}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
+        self._sources = [outcomes for _, state, _ in nesting.states if (outcomes := outcomes_of(state, library))]
+        self._sources += [other.emits for other in library if other.implements]
 
     def findings(self) -> Iterator[Finding]:
         yield from self._declarations()
@@ -82,11 +85,16 @@ class _Data:
 
     def _continued(self, rule: Rule, event: Types, path: Path) -> Iterator[Finding]:
         """What goes on as if a state were done has the rule's event, not the outputs that `done` would bring."""
-        for name, state, _ in self._nesting.states:
-            answered = rule.on in outcomes_of(state, self._library) and (not rule.of or name in rule.of)
-            if answered and isinstance(state, State) and outputs_of(state, self._library):
+        for name, state, outcomes in self._handing_back:
+            if rule.on in outcomes and (not rule.of or name in rule.of):
                 for transition in state.on.get(DONE, ()):
                     yield from self._transition(transition, event, path)
+
+    @cached_property
+    def _handing_back(self) -> list[tuple[str, State, Outcomes]]:
+        """The states that bring outputs when they are done, with their outcomes."""
+        states = ((name, state) for name, state, _ in self._nesting.states if isinstance(state, State))
+        return [(n, s, outcomes_of(s, self._library)) for n, s in states if outputs_of(s, self._library)]
 
     # -- parts of a plot ---------------------------------------------------------------------------------
 
@@ -209,6 +217,9 @@ class _Data:
                 check(condition, self._schema, scope)
             except InputError as error:
                 yield Finding(_at(error, self._plot, path), "condition")
+            return
+        for name in sorted(free_variables(condition) - scope.keys()):
+            yield Finding(_at(unbound_error(name, None, scope), self._plot, path), "condition")
 
     def _effect(self, effect: Effect, scope: Types, path: Path) -> Iterator[Finding]:
         if self._schema is not None:
@@ -216,6 +227,9 @@ class _Data:
                 check_effect(effect, self._schema, scope)
             except InputError as error:
                 yield Finding(_at(error, self._plot, path), "effect")
+            return
+        for name in sorted(mentioned(effect) - scope.keys()):
+            yield Finding(_at(unbound_error(name, None, scope), self._plot, path), "effect")
 
     def _terms(
         self, terms: Iterable[tuple[str, Term]], attributes: Types | None, path: Path
@@ -225,12 +239,21 @@ class _Data:
 
     def _only(self, terms: Mapping[str, Term], scope: Types, path: Path) -> Iterator[Finding]:
         for key, term in terms.items():
-            for name in sorted(free_variables(term) - set(scope)):
+            unknown = sorted(free_variables(term) - set(scope))
+            if not unknown and self._schema is not None and self._plot.profile == "dsc":
+                yield from self._term(term, scope, (*path, key))
+            for name in unknown:
                 error = UnknownNameError(
                     f"there is no variable '?{name}' here", place=self._plot.place((*path, key)),
                     found=name, valid=scope,
                 )  # fmt: skip
                 yield Finding(error, "declared variable")
+
+    def _term(self, term: Term, scope: Types, path: Path) -> Iterator[Finding]:
+        try:
+            check_term(term, self._schema or Schema(), scope)
+        except InputError as error:
+            yield Finding(_at(error, self._plot, path), "term")
 
     def _scope(self, attributes: Types | None, used: Expression | Term | Effect | None) -> dict[str, str | None]:
         """Visible variables; where the event cannot be known, any of its attributes may be used."""
@@ -241,37 +264,16 @@ class _Data:
 
     def _event_types(self, state: State, event: str) -> Types | None:
         """Attribute types of an event as `event.name`; `None` if they are not known."""
-        declared = outcomes_of(state, self._library)
-        found: Mapping[str, str | None] | None = None
-        if event in declared:
-            found = declared[event] or {}
-        elif event in self._plot.receives:
-            found = self._plot.receives[event] or {}
-        elif event == DONE:
-            found = outputs_of(state, self._library)
-        else:
-            found = self._skill_event(state, event)
+        found = attributes_of(event, state, self._plot, self._library, self._skills)
         if found is None:
             return None
         return {f"event.{name}": self._type(kind) if kind else None for name, kind in found.items()}
-
-    def _skill_event(self, state: AnyState, event: str) -> Mapping[str, str | None] | None:
-        if self._skills is None or not isinstance(state, State):
-            return None
-        for action in state.entry:
-            if isinstance(action, Trigger) and action.trigger in self._skills:
-                for original, attributes in self._skills[action.trigger].outcomes.items():
-                    if action.names.get(original, original) == event:
-                        return attributes
-        return None
 
     def _rule_event(self, event: str) -> Types | None:
         """The attributes a rule's event has wherever it can come from, also from steps of a plan."""
         found: dict[str, str | None] = {}
         known = False
-        sources = [outcomes_of(state, self._library) for _, state, _ in self._nesting.states]
-        sources += [plot.emits for plot in self._library if plot.implements]
-        for outcomes in sources:
+        for outcomes in self._sources:
             if event in outcomes:
                 known = True
                 for name, kind in (outcomes[event] or {}).items():
@@ -290,21 +292,6 @@ class _Data:
         if name in {"number", "text", "boolean"}:
             return name
         return name if self._schema is not None and name in self._schema.types else None
-
-
-def mentioned(part: Expression | Term | Effect) -> frozenset[str]:
-    """The variables that a condition, term or effect mentions and does not itself bind."""
-    if isinstance(part, Add | Delete):
-        return free_variables(part.atom)
-    if isinstance(part, AllOf):
-        return frozenset().union(*(mentioned(inner) for inner in part.parts))
-    if isinstance(part, ForEach):
-        return mentioned(part.effect) - {variable.name for variable in part.variables}
-    if isinstance(part, When):
-        return free_variables(part.condition) | mentioned(part.effect)
-    if isinstance(part, Change):
-        return free_variables(part.call) | free_variables(part.value)
-    return free_variables(part)
 
 
 def _at(error: InputError, plot: ActionPlot, path: Path) -> InputError:

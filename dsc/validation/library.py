@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from itertools import chain, islice
 
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, PlotError
@@ -11,11 +12,17 @@ from dsc.skills import SkillSignature
 from dsc.validation.arguments import check_arguments
 from dsc.validation.components import check_components
 from dsc.validation.data import check_data
+from dsc.validation.kinds import check_kinds
 from dsc.validation.nesting import Nesting
 from dsc.validation.outputs import check_outputs
+from dsc.validation.reach import check_reach
+from dsc.validation.size import check_size
 from dsc.validation.structure import check_structure
 from dsc.validation.wiring import check_wiring
 from knowledge_base.schema import Schema
+
+MAX_FINDINGS = 50
+"""For one plot; more are not read, and each takes a search for the name that was meant."""
 
 
 def validate_library(
@@ -36,7 +43,7 @@ def validate_plot(
     skills: Iterable[SkillSignature] | None = None,
     components: Collection[str] | None = None,
 ) -> list[Finding]:
-    """What is wrong with a plot; empty if nothing is.
+    """What is wrong with a plot, at most `MAX_FINDINGS`; empty if nothing is.
 
     Args:
         plot: the plot.
@@ -47,16 +54,20 @@ def validate_plot(
     """
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
     nesting = Nesting(plot)
-    findings = list(check_structure(plot, library, nesting))
-    if findings:  # what follows would only repeat them in other words
-        return findings
-    findings = list(check_wiring(plot, library, signatures, nesting))
-    findings += check_arguments(plot, library, nesting)
-    findings += check_outputs(plot)
-    findings += check_data(plot, library, schema, signatures, nesting)
-    if components is not None:
-        findings += check_components(plot, components)
-    return findings
+    for check in (check_structure, check_size):
+        findings = list(islice(check(plot, library, nesting), MAX_FINDINGS))
+        if findings:  # what follows would only repeat them in other words, or take too long
+            return findings
+    checks = [
+        check_reach(plot, library, nesting),
+        check_wiring(plot, library, signatures, nesting),
+        check_arguments(plot, library, nesting),
+        check_outputs(plot),
+        check_data(plot, library, schema, signatures, nesting),
+        check_kinds(plot, library, schema, signatures, nesting),
+        check_components(plot, components) if components is not None else (),
+    ]
+    return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 
 
 def raise_findings(findings: list[Finding]) -> None:

@@ -30,6 +30,15 @@ RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
 
 def check_structure(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """Findings about the plot's own states, before anything is said about what they do."""
+    sound = True
+    for finding in _shape(plot, library, nesting):
+        sound = False
+        yield finding
+    if sound and plot.profile == "scxml":
+        yield from _tables(plot)
+
+
+def _shape(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     yield from check_profile(plot, nesting)
     yield from check_connectors(plot, nesting)
     yield from check_history(plot, nesting)
@@ -45,16 +54,12 @@ def check_structure(plot: ActionPlot, library: Library, nesting: Nesting) -> Ite
         if plot.profile == "dsc":
             yield from _dead_end(plot, name, state, path, nesting)
     yield from _rules(plot, set(nesting.names), library)
-    if plot.profile == "scxml":
-        yield from _tables(plot)
 
 
 def _tables(plot: ActionPlot) -> Iterator[Finding]:
-    """What only shows when all targets are known; names that are not there have findings of their own."""
+    """What only shows when all targets are known."""
     try:
         compile_plot(plot)
-    except UnknownNameError:
-        return
     except SchemaError as error:
         error.place = next((plot.place(path) for name, _, path in plot.walk() if name == error.found), None)
         yield Finding(error, "target")
@@ -101,7 +106,8 @@ def _elsewhere(
 def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> Iterator[Finding]:
     if isinstance(state, SubmachineState) and state.use.startswith("?"):
         if state.use[1:] not in plot.variables and state.use[1:] not in plot.parameters:
-            yield _unknown(plot, (*path, "use"), state.use, {f"?{name}" for name in plot.variables})
+            valid = {f"?{name}" for name in (*plot.variables, *plot.parameters)}
+            yield _unknown(plot, (*path, "use"), state.use, valid, "variable")
     elif isinstance(state, SubmachineState) and state.use not in library:
         yield _unknown(plot, (*path, "use"), state.use, {other.name for other in library})
     elif isinstance(state, DynamicState):
@@ -110,8 +116,8 @@ def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> It
                 yield _unknown(plot, (*path, "dynamic", number), name, {other.name for other in library})
 
 
-def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str]) -> Finding:
-    error = UnknownNameError(f"there is no plot '{name}'", place=plot.place(path), found=name, valid=valid)
+def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str], what: str = "plot") -> Finding:
+    error = UnknownNameError(f"there is no {what} '{name}'", place=plot.place(path), found=name, valid=valid)
     return Finding(error, "known plot")
 
 

@@ -12,24 +12,18 @@ from dsc.dynamic.outcomes import outcomes_of
 from dsc.errors import Finding
 from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED, TIMERS
 from dsc.model.actions import Trigger
-from dsc.model.connectors import Connector
-from dsc.model.plot import ActionPlot, Path, initial_of
+from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import (
     AnyState,
-    CompositeState,
-    DynamicState,
     FinalState,
-    OrthogonalState,
     State,
     SubmachineState,
 )
-from dsc.model.transitions import Source
-from dsc.skills import SkillSignature
+from dsc.validation.attributes import Skills
+from dsc.validation.completion import check_completion
 from dsc.validation.nesting import Nesting
 from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-
-Skills = Mapping[str, SkillSignature] | None
 
 _EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
 """Events that are nobody else's; the other two are passed on by who plans."""
@@ -59,8 +53,9 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Ne
             yield from _outcomes(plot, name, outcomes, handled, path)
             yield from _skills(plot, name, state, path, handled, skills)
         if plot.profile == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
-            yield from _completion(plot, name, state, wired[name], path, library)
             yield from _known_events(plot, state, path, skills, traffic)
+    if plot.profile == "dsc":
+        yield from check_completion(plot, wired, library, nesting)
 
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:
@@ -81,12 +76,13 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
-    for number, rule in enumerate(plot.rules):
-        if rule.do.then in RESPONSES:
-            continue
-        for siblings in (scope.states for scope in plot.scopes()):
-            for name, state in siblings.items():
-                answers = (not rule.of or name in rule.of) and rule.on in outcomes_of(state, library)
+    leading = [(number, rule) for number, rule in enumerate(plot.rules) if rule.do.then not in RESPONSES]
+    every = (scope.states for scope in plot.scopes()) if leading else ()
+    scopes = [(siblings, [(name, outcomes_of(s, library)) for name, s in siblings.items()]) for siblings in every]
+    for number, rule in leading:
+        for siblings, ends in scopes:
+            for name, outcomes in ends:
+                answers = rule.on in outcomes and (not rule.of or name in rule.of)
                 if answers and rule.do.then not in siblings:
                     error = SchemaError(
                         f"the rule's way from '{name}' to '{rule.do.then}' crosses a border",
@@ -150,59 +146,6 @@ def _skills(
             if event in _EXECUTIVES:
                 yield _reserved(plot, event, here)
         yield from _outcomes(plot, name, [event for event in events if event not in _EXECUTIVES], handled, path)
-
-
-def _completion(
-    plot: ActionPlot, name: str, state: AnyState, wired: AnyState, path: Path, library: Library
-) -> Iterator[Finding]:
-    completes = (
-        (isinstance(state, SubmachineState) and _ends_silently(_used(state, library)))
-        or (isinstance(state, DynamicState) and _dynamic_completes(state, library))
-        or (isinstance(state, CompositeState) and any(isinstance(s, FinalState) for s in state.states.values()))
-        or isinstance(state, OrthogonalState)
-    )
-    if type(state) is State and DONE in state.on and any(isinstance(a, Trigger) for a in state.entry):
-        error = SchemaError(
-            f"state '{name}' has no content, so it is done at once and would cancel its skill",
-            place=plot.place((*path, "on", DONE)),
-        )
-        yield Finding(error, "done at once", "wire the outcome of the skill")
-    if completes and isinstance(wired, State) and DONE not in wired.on:
-        error = SchemaError(f"state '{name}' does not handle its completion", place=plot.place((*path, "on")))
-        yield Finding(error, "completion is wired", "add `done: STATE` under `on`")
-
-
-def _used(state: SubmachineState, library: Library) -> ActionPlot | None:
-    return None if state.use.startswith("?") else library.plot(state.use)
-
-
-def _dynamic_completes(state: DynamicState, library: Library) -> bool:
-    return state.goal is not None or any(_ends_silently(library.plot(name)) for name in state.dynamic)
-
-
-def _ends_silently(plot: ActionPlot | None) -> bool:
-    """Whether the plot can reach a top-level final state without firing a declared outcome."""
-    if plot is None:
-        return True
-    waiting = {initial_of(plot)} | {
-        target for state in plot.states.values() if isinstance(state, State) for target in _silent_ways(plot, state)
-    }
-    seen: set[str] = set()
-    while waiting:  # connectors are passed through; what the way to them has fired, they need not fire again
-        name = waiting.pop()
-        seen.add(name)
-        reached = plot.states.get(name)
-        if isinstance(reached, FinalState) and reached.emit is None:
-            return True
-        if isinstance(reached, Connector):
-            waiting |= _silent_ways(plot, reached) - seen
-    return False
-
-
-def _silent_ways(plot: ActionPlot, source: Source) -> set[str]:
-    """Where transitions lead that fire no declared outcome."""
-    silent = (one for _, one in source.transitions() if not set(one.emitted) & set(plot.emits))
-    return {transition.target for transition in silent if transition.target is not None}
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,6 +73,11 @@ def check_effect(
     _Checker(schema, objects, variables or {}, "error").effect(effect)
 
 
+def check_term(term: Term, schema: Schema, variables: Mapping[str, str | None] | None = None) -> None:
+    """Raise an error with its place unless `term` has a value on worlds of `schema`; args and errors as `check`."""
+    _Checker(schema, None, variables or {}, "error").term(term)
+
+
 def check_parameters(parameters: tuple[TypedVariable, ...], schema: Schema) -> dict[str, str | None]:
     """Check the parameters' types; gives them in the form that `check` takes as `variables`.
 
@@ -205,7 +210,8 @@ class _Checker:
         """A term used as a number; a variable must be able to be one."""
         self.term(term)
         types = self.types_of(term)
-        if types is not None and "number" not in types:
+        word = isinstance(term, Constant) and isinstance(term.value, str | bool)
+        if word or (types is not None and "number" not in types):
             raise SchemaError(f"'{operator}' works on numbers, and this is none", place=term.place)
 
     def arguments(self, signature: Signature, used: Atom | Call) -> None:

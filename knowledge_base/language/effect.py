@@ -13,6 +13,7 @@ from knowledge_base.language.expression import (
     Located,
     Term,
     TypedVariable,
+    free_variables,
     substitute,
     substitute_term,
     unshadowed,
@@ -88,3 +89,18 @@ def substitute_effect(effect: Effect, bindings: Mapping[str, Value]) -> Effect:
         return Assign(effect.operator, call, substitute_term(effect.value, bindings))
     atom = Atom(effect.atom.predicate, tuple(substitute_term(arg, bindings) for arg in effect.atom.args))
     return type(effect)(atom)
+
+
+def mentioned(part: Expression | Term | Effect) -> frozenset[str]:
+    """The variables that a condition, term or effect mentions and does not itself bind."""
+    if isinstance(part, Add | Delete):
+        return free_variables(part.atom)
+    if isinstance(part, AllOf):
+        return frozenset().union(*(mentioned(inner) for inner in part.parts))
+    if isinstance(part, ForEach):
+        return mentioned(part.effect) - {variable.name for variable in part.variables}
+    if isinstance(part, When):
+        return free_variables(part.condition) | mentioned(part.effect)
+    if isinstance(part, Assign):
+        return free_variables(part.call) | free_variables(part.value)
+    return free_variables(part)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from dsc_charts import Run
 
+from dsc.text.files import MAX_BYTES
 from dsc.text.plots import parse_plot, plot_to_yaml
-from dsc.text.scxml.document import MAX_BYTES, MAX_DEPTH
+from dsc.text.scxml.document import MAX_DEPTH
 from dsc.text.scxml.ecmascript import condition, term
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.reader import parse_scxml

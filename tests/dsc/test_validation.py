@@ -71,11 +71,16 @@ HELPERS = [
     plot("{plot: wait, states: {s: {after: {seconds: 1, to: over}}, over: {final: true}}}"),
     plot("{plot: talk, emits: {said: }, states: {s: {after: {seconds: 1, to: over}}, over: {final: true, emit: said}}}"),
 ]  # fmt: skip
+RINGS = [
+    plot("{plot: ring, states: {s: {use: p, on: {done: over}}, over: {final: true}}}"),
+    plot("{plot: endless, states: {s: {use: endless, on: {done: over}}, over: {final: true}}}"),
+    plot("{plot: choice, states: {s: {dynamic: [p], on: {done: over, no_candidate: over}}, over: {final: true}}}"),
+]
 
 
 def findings_of(text, schema=SCHEMA, skills=SKILLS):
     made = parse_plot(text, "p.yaml")
-    return validate_plot(made, Library([made, *HELPERS]), schema, skills, {"arm", "base"})
+    return validate_plot(made, Library([made, *HELPERS, *RINGS]), schema, skills, {"arm", "base"})
 
 
 S = "plot: p\nstates:\n"
@@ -271,6 +276,40 @@ WRONG = [
         11, "?item", "",
     ),
     ("rule event", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lots\n    do: {then: e}\n", 10, "mean 'lost'", ""),
+    ("value fits", ITEM + "  a:\n    use: grasp\n    with: {item: ?item, speed: fast}\n" + WIRED + E, 6, "'speed' is of type number", ""),
+    ("value fits", S + "  a:\n    use: grasp\n    with: {item: table}\n" + WIRED + E, 5, "table is of type place", ""),
+    ("value fits", "plot: p\nparameters:\n  n: {type: number, default: x}\nstates: {e: {final: true}}\n", 3, "of type number", ""),
+    ("value fits", ITEM + "  a:\n    after: {seconds: ?item, to: e}\n" + E, 5, "?item is of type item", ""),
+    (
+        "value fits",
+        "plot: p\nvariables: {n: number}\nstates:\n  a:\n    on:\n      done: {to: e, assign: {n: true}}\n" + E,
+        6, "true is of type boolean", "",
+    ),
+    (
+        "value fits",
+        "plot: p\nemits: {lost: {n: number}}\nstates:\n  a: {on: {done: e}}\n  e: {final: true, emit: lost, with: {n: x}}\n",
+        5, "'n' is of type number", "",
+    ),
+    ("value fits", S + "  a:\n    entry:\n      - {trigger: arm.grasp, with: {item: 5}}\n    on: {grasped: e, slipped: e}\n" + E, 5, "5 is of type number", ""),
+    (
+        "term",
+        "plot: p\nvariables: {n: number}\nstates:\n  a:\n    on:\n      done: {to: e, assign: {n: (failurs table)}}\n" + E,
+        6, "mean 'failures'", "",
+    ),
+    # -- what can be entered
+    ("reachable", S + "  a: {on: {done: e}}\n  b: {on: {done: e}}\n" + E, 4, "nothing leads to the state 'b'", "`initial`"),
+    ("reachable", S + "  a:\n    on: {done: e}\n    states: {b: {final: true}, c: {final: true}}\n" + E, 5, "state 'c'", ""),
+    ("reachable", S + "  a:\n    on: {done: e}\n    regions: {r: {states: {b: {final: true}, c: {final: true}}}}\n" + E, 5, "state 'c'", ""),
+    ("no circle", S + "  a:\n    use: p\n    on: {done: e}\n" + E, 4, "in a circle: p -> p", "in a dynamic state"),
+    ("no circle", S + "  a:\n    use: ring\n    on: {done: e}\n" + E, 4, "in a circle: p -> ring -> p", "in a dynamic state"),
+    ("no circle", S + "  a:\n    use: endless\n    on: {done: e}\n" + E, 4, "in a circle: endless -> endless", ""),
+    (
+        "bounded rules",
+        S + "  a:\n    goal: (free)\n    on: {done: e, no_plan: e, gave_up: e}\n" + E + "rules:\n"
+        + "  - {on: no_plan, when: (free), do: {then: e}}\n" * 1001,
+        7, "the rules would make 1001 transitions; at most 1000", "with `of`",
+    ),
+    ("something to choose", S + "  a:\n    dynamic: []\n    on: {no_candidate: e}\n" + E, 4, "'a' has nothing to choose", "a `goal`"),
     # -- connectors
     ("target", S + "  a: {on: {done: b}}\n  b:\n    choice:\n      - {when: (free), to: d}\n      - e\n" + E, 6, "no state 'd'", ""),
     ("target", S + "  a: {on: {done: b}}\n  b:\n    select: 1\n    cases:\n      cup: d\n    else: e\n" + E, 7, "no state 'd'", ""),
@@ -366,8 +405,9 @@ WRONG = [
     ),
     (
         "parameters are given",
-        ITEM + "  a:\n    on:\n      done: {to: s, pass: {item: ?item}}\n" + FOUND.format("") + "initial: s\n",
-        7, "entered without a transition", "`with`",
+        ITEM + "  a:\n    on:\n      done: {to: s, pass: {item: ?item}}\n      error: e\n"
+        "  s: {use: search, on: {done: a}}\n" + E + "initial: s\n",
+        8, "entered without a transition", "`with`",
     ),
     (
         "parameters are given",
@@ -463,11 +503,19 @@ RIGHT = [
     .replace("item: cup", "item: ?i").replace("states:", "parameters: {i: item}\nstates:") + E,
     # a plot that never ends silently needs no `done`
     S + "  a: {use: talk, on: {said: e}}\n" + E,
+    # a choice may lead back
+    S + "  a: {use: choice, on: {done: e}}\n" + E,
+    # a response to the steps of a plan leads to a state
+    S + "  a:\n    goal: (free)\n    on: {done: e, no_plan: e, gave_up: e}\n  help: {use: wait, on: {done: e}}\n" + E
+    + "rules:\n  - {on: failed, do: {then: help}}\n",
+    # words are things, text and symbols alike; a variable may hold a thing of a type below
+    "plot: p\nparameters: {o: object, w: {type: symbol, default: up}}\nvariables: {t: {type: text, initial: any text}}\nstates:\n"
+    "  a: {use: grasp, with: {item: ?o, speed: (+ 1 2)}, on: {done: {to: e, assign: {t: ?w}}, failed: e, lost: e}}\n" + E,
     # a plot in a variable may end with anything
     "plot: p\nvariables: {plan: plot}\nstates:\n  a: {use: ?plan, on: {done: e, whatever: e}}\n" + E,
     # connectors: first, one after the other, fed by any event, on the way to an outcome that is fired before
     "plot: p\nemits: {yes: , no: }\nparameters: {i: item}\nstates:\n  first: {choice: [{when: (free), to: a}, second]}\n"
-    "  second: {select: ?i, cases: {cup: a, 1: {to: a, when: (free)}}, else: {to: e, emit: no}}\n"
+    "  second: {select: ?i, cases: {cup: a, can: {to: a, when: (free)}}, else: {to: e, emit: no}}\n"
     "  a: {entry: {trigger: arm.grasp, with: {item: ?i}}, on: {grasped: {to: over, emit: yes}, slipped: which}}\n"
     "  which: {select: ?event.item, cases: {cup: a}, else: {to: over, emit: no}}\n  over: {choice: [e]}\n" + E,
     # a rule may lead to a connector

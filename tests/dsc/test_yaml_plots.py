@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from dsc_charts import plot
 
+from dsc.text.files import MAX_BYTES
 from dsc.text.plots import load_library, load_plot, parse_plot, plot_to_yaml
-from dsc.text.yaml import MAX_BYTES, load_document
+from dsc.text.yaml import load_document
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.expression import Variable
 
@@ -67,7 +68,7 @@ BROKEN = [
     ("plot: p\nconfirm: later" + END, 2, "number"),
     ("plot: p\nconfirm: .inf" + END, 2, "finite"),
     ("plot: p\nwhen: (or" + END, 2, "'(' is never closed"),
-    ("plot: p\n1: 5" + END, 2, "found 1"),
+    ("plot: p\n1: 5" + END, 2, "a key is a name; '1' is none"),
     ("plot: p\nparameters:\n  Item: item" + END, 3, "'Item' is no name for a variable"),
     ("plot: p\nvariables:\n  two words: item" + END, 3, "'two words' is no name for a variable"),
     ("plot: p\nemits:\n  failed:\n    itemName: item" + END, 4, "'itemName' is no name for a variable"),
@@ -113,7 +114,7 @@ BROKEN = [
     (HEAD + "    on:\n      e: {to: s, pas: {a: 1}}", 5, "did you mean 'pass'?"),
     (HEAD + "    on:\n      e: {to: s, cleer: s}", 5, "did you mean 'clear'?"),
     (HEAD + "    choise: [s]", 4, "did you mean 'choice'?"),
-    (HEAD + "    choice: []", 4, "at least one entry is needed; found []"),
+    (HEAD + "    choice: []", 4, "at least one entry is needed; found an empty list"),
     (HEAD + "    choice:\n      - {when: (p), to: s}\n      - {wen: (p), to: s}", 6, "did you mean 'when'?"),
     (HEAD + "    choice:\n      - {when: (p), too: s}\n      - s", 5, "did you mean 'to'?"),
     (HEAD + "    choice:\n      - s\n      - {when: (p)}", 6, "nothing rests in a connector"),
@@ -161,11 +162,11 @@ BROKEN = [
     ("plot: p\nstates:\n  s: {}\n t: {}", 4, "not readable as YAML"),
     ("plot: 'p\nstates: {}", 2, "not readable as YAML"),
     ("plot: p\nstates: @s", 2, "not readable as YAML"),
-    ("plot: p\nstates: {s: \x00}", 1, "not readable as YAML"),
+    ("plot: p\nstates: {s: \x00}", 2, "not readable as YAML"),
     ("---\nplot: p\nstates: {s: {}}\n---\nplot: q", 4, "another document"),
-    ("plot: p\nstates: " + "[" * 100_000, 2, "nested deeper than 64 levels"),
-    ("plot: p\nstates: " + "{a: " * 10_000, 2, "nested deeper than 64 levels"),
-    ("plot: p\nstates:\n" + "".join("  " * i + "-\n" for i in range(1, 100)), 66, "nested deeper than 64 levels"),
+    ("plot: p\nstates: " + "[" * 100_000, 2, "nested deeper than 128 levels"),
+    ("plot: p\nstates: " + "{a: " * 10_000, 2, "nested deeper than 128 levels"),
+    ("plot: p\nstates:\n" + "".join("  " * i + "-\n" for i in range(1, 200)), 130, "nested deeper than 128 levels"),
 ]
 
 
@@ -189,14 +190,14 @@ def test_a_duplicate_key_does_not_print_what_it_holds():
 
 
 def test_a_text_too_large_is_refused_unread():
-    with pytest.raises(ParseError, match="larger than"):
+    with pytest.raises(InputError, match="250001 bytes; at most 250000"):
         parse_plot("#" * (MAX_BYTES + 1))
 
 
 def test_a_file_too_large_is_refused_unread(tmp_path):
     file = tmp_path / "huge.yaml"
     file.write_bytes(b"#" * (MAX_BYTES + 1))
-    with pytest.raises(InputError, match="larger than") as caught:
+    with pytest.raises(InputError, match="250001 bytes; at most 250000") as caught:
         load_plot(file)
     assert caught.value.place == Place(str(file))
 
@@ -208,9 +209,10 @@ def test_a_file_that_is_not_there_has_a_neighbour_that_is(tmp_path):
 
 
 def test_what_is_no_text_or_no_file_is_refused(tmp_path):
-    (tmp_path / "binary.yaml").write_bytes(b"plot: \xff\xfe")
-    with pytest.raises(InputError, match="cannot read"):
+    (tmp_path / "binary.yaml").write_bytes(b"plot: p\nabout: \xff\xfe")
+    with pytest.raises(InputError, match="byte 0xff") as caught:
         load_plot(tmp_path / "binary.yaml")
+    assert caught.value.place == Place(str(tmp_path / "binary.yaml"), 2, 8)
     with pytest.raises(InputError, match="cannot read"):
         load_plot(tmp_path)
 

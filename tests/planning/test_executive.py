@@ -391,6 +391,7 @@ states:
       done: {{to: lit, emit: ended, with: {{how: reached}}}}
       no_plan: {{to: lit, emit: ended, with: {{how: ?event.reason}}}}
       gave_up: {{to: lit, emit: ended, with: {{how: ?event.reason}}}}
+    after: {{seconds: 900, to: help}}
   help: {{always: step_1}}
   step_1: {{always: lit}}
   lit: {{final: true}}

@@ -37,6 +37,14 @@ def needed(element: Element, attribute: str) -> str:
     return element.attributes[attribute]
 
 
+def only_one(element: Element, *attributes: str) -> None:
+    """Raise `InputError` if two of the attributes are there, which exclude each other."""
+    both = [name for name in attributes if name in element.attributes]
+    if len(both) > 1:
+        message = f"<{element.name}> has both '{both[0]}' and '{both[1]}'"
+        raise InputError(message, place=element.place, found=both[1])
+
+
 def variable(name: str, names: Names, element: Element) -> str:
     """The variable for a datum; raises `UnknownNameError`."""
     if name not in names:
@@ -49,7 +57,7 @@ def _raise(element: Element, _: Names) -> Form:
 
 
 def _assign(element: Element, names: Names) -> Form:
-    text = element.attributes.get("expr") or element.text.strip()
+    text = element.attributes.get("expr") or element.text
     if not text:
         raise InputError("<assign> needs the attribute 'expr'", place=element.place)
     location = variable(needed(element, "location"), names, element)
@@ -107,6 +115,7 @@ def _constant(element: Element, attribute: str, names: Names) -> str:
     """An attribute, or a string in the expression attribute of that name."""
     if f"{attribute}expr" not in element.attributes:
         return needed(element, attribute)
+    only_one(element, attribute, f"{attribute}expr")
     found = term(element.attributes[f"{attribute}expr"], names, element.place)
     if isinstance(found, Constant) and isinstance(found.value, str):
         return found.value
@@ -131,12 +140,13 @@ def _arguments(element: Element, names: Names) -> dict[str, Term]:
             found[needed(child, "name").lower()] = _param(child, names)
         else:
             text = child.attributes.get("expr")
-            inline = Constant(child.text.strip(), quoted=True)
+            inline = Constant(child.text, quoted=True)
             found["data"] = term(text, names, child.place) if text else inline
     return found
 
 
 def _param(element: Element, names: Names) -> Term:
+    only_one(element, "expr", "location")
     if "location" in element.attributes:
         return Variable(variable(element.attributes["location"], names, element))
     return term(needed(element, "expr"), names, element.place)

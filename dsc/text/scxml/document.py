@@ -1,4 +1,4 @@
-"""XML read into elements that know their line; no DTD, no entities, bounded in size and depth."""
+"""XML read into elements that know their line; no DTD, no entities, no instructions, bounded in size and depth."""
 
 from __future__ import annotations
 
@@ -6,23 +6,34 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
+from dsc.text.files import check_size
 from knowledge_base.errors import ParseError, Place
 
 NAMESPACE = "http://www.w3.org/2005/07/scxml"
-MAX_BYTES = 500_000
-MAX_DEPTH = 64
+MAX_DEPTH = 30
+"""Of elements; a `parallel` in a `parallel` makes a plot four levels deeper, which must be readable as YAML."""
 
 
 @dataclass(slots=True)
 class Element:
-    """An element of the SCXML namespace (or of none), or of another, whose `foreign` is then true."""
+    """An element of the SCXML namespace (or of none), or of another, which is then `foreign`."""
 
     name: str
     attributes: Mapping[str, str]
     place: Place
-    foreign: bool = False
+    namespace: str = NAMESPACE
     children: list[Element] = field(default_factory=list)
-    text: str = ""
+    texts: list[str] = field(default_factory=list)
+
+    @property
+    def foreign(self) -> bool:
+        """Whether it is no element of SCXML."""
+        return self.namespace not in {"", NAMESPACE}
+
+    @property
+    def text(self) -> str:
+        """What stands in it besides elements, without the blanks around it."""
+        return "".join(self.texts).strip()
 
     def walk(self) -> Iterator[Element]:
         """The element and all inside it."""
@@ -37,9 +48,8 @@ def read_xml(text: str, source: str | None = None) -> Element:
     Raises:
         ParseError: it is not well-formed XML, has a document type or an entity of its own, or is too large or deep.
     """
-    data = text.encode()
-    if len(data) > MAX_BYTES:
-        raise ParseError(f"the text is larger than {MAX_BYTES} bytes", place=Place(source))
+    data = text.encode(errors="surrogatepass")  # half a character is refused with its place
+    check_size(len(data), Place(source))
     reader = _Reader(source)
     try:
         reader.parser.Parse(data, True)  # noqa: FBT003  # expat takes no names here
@@ -47,6 +57,11 @@ def read_xml(text: str, source: str | None = None) -> Element:
         place = Place(source, error.lineno, error.offset + 1)
         raise ParseError(f"not readable as XML: {expat.ErrorString(error.code)}", place=place) from None
     return reader.root
+
+
+def written(element: Element) -> str:
+    """How messages call an element; one of another namespace with that namespace."""
+    return f"<{element.name}>" + (f" of the namespace '{element.namespace}'" if element.foreign else "")
 
 
 class _Reader:
@@ -59,6 +74,7 @@ class _Reader:
         self.parser.EndElementHandler = self._end
         self.parser.CharacterDataHandler = self._text
         self.parser.StartDoctypeDeclHandler = self._doctype
+        self.parser.ProcessingInstructionHandler = self._instruction
 
     def _place(self) -> Place:
         return Place(self._source, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1)
@@ -66,7 +82,7 @@ class _Reader:
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         space, _, name = tag.rpartition(" ")
         own = {key: value for key, value in attributes.items() if " " not in key}
-        element = Element(name, own, self._place(), foreign=space not in {"", NAMESPACE})
+        element = Element(name, own, self._place(), namespace=space)
         if len(self._open) >= MAX_DEPTH:
             raise ParseError(f"nested deeper than {MAX_DEPTH} levels", place=element.place)
         if self._open:
@@ -79,7 +95,11 @@ class _Reader:
         self._open.pop()
 
     def _text(self, data: str) -> None:
-        self._open[-1].text += data
+        self._open[-1].texts.append(data)
 
     def _doctype(self, *_: object) -> None:
         raise ParseError("a document type (and with it entities) is not read", place=self._place())
+
+    def _instruction(self, target: str, _: str) -> None:
+        message = f"the processing instruction <?{target}?> has no counterpart"
+        raise ParseError(message, place=self._place(), found=target)

@@ -6,6 +6,7 @@ comparisons, `&& || !` and `In()`. Comparisons never convert: `==` is read as `=
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from dsc.engine.membership import IN_STATE
@@ -29,6 +30,8 @@ from knowledge_base.language.expression import (
 _COMPARE = {"===": "=", "==": "=", "!==": "!=", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 MAX_EXPONENT = 8
 MAX_NESTING = 50
+MAX_OPERATIONS = 100
+"""Of a term, counted after `Math.pow` is written out: `a + b - c` nests, and what follows recurses."""
 
 
 def condition(text: str, names: Mapping[str, str], place: Place | None = None) -> Expression:
@@ -160,6 +163,8 @@ class _Parser:
     def _simple(self, token: Token) -> Expression | Term:
         if token.kind == "number":
             number = float(token.text)
+            if not math.isfinite(number):
+                raise self._refused("a number is too large")
             return Constant(int(number) if number.is_integer() else number)
         if token.kind == "text":
             return Constant(token.text, quoted=True)
@@ -183,7 +188,7 @@ class _Parser:
             exponent = self._as_term(self._sum()) if self._take(",") else None
             self._close()
             if isinstance(exponent, Constant) and exponent.value in range(2, MAX_EXPONENT + 1):
-                return Arithmetic("*", (base,) * int(exponent.value))
+                return self._bounded(Arithmetic("*", (base,) * int(exponent.value)))
         raise self._refused(f"the function {function}() cannot be called")
 
     def _close(self) -> None:
@@ -207,7 +212,12 @@ class _Parser:
         sides = (self._as_term(left), self._as_term(right))
         if any(isinstance(side, Constant) and not _is_number(side) for side in sides):
             raise self._refused("text cannot be computed with")
-        return Arithmetic(sign, sides)
+        return self._bounded(Arithmetic(sign, sides))
+
+    def _bounded(self, term: Arithmetic) -> Term:
+        if _operations(term) > MAX_OPERATIONS:
+            raise self._refused(f"more than {MAX_OPERATIONS} operations")
+        return term
 
     def _condition(self, part: Expression | Term) -> Expression:
         if isinstance(part, Constant) and isinstance(part.value, bool):
@@ -222,6 +232,10 @@ class _Parser:
         if not isinstance(part, Term):
             raise self._refused("a condition is no value")
         return part
+
+
+def _operations(term: Term) -> int:
+    return len(term.args) - 1 + sum(map(_operations, term.args)) if isinstance(term, Arithmetic) else 0
 
 
 def _is_number(constant: Constant) -> bool:

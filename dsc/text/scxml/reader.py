@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import PurePath
 from typing import Any
 
@@ -20,13 +21,13 @@ from dsc.events import RESERVED, TIMERS
 from dsc.model.plot import ActionPlot, Path
 from dsc.text.form import read_model
 from dsc.text.scxml.content import Form, actions, needed
-from dsc.text.scxml.document import Element, read_xml
+from dsc.text.scxml.document import Element, read_xml, written
 from dsc.text.scxml.ecmascript import condition, term
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.vocabulary import STATES, check
 from dsc.text.yaml import Document
 from knowledge_base.errors import InputError, Place
-from knowledge_base.language.expression import Arithmetic, Constant, Term
+from knowledge_base.language.expression import Arithmetic, Constant, Term, is_plain_name
 
 
 def parse_scxml(text: str, source: str | None = None) -> ActionPlot:
@@ -39,7 +40,7 @@ def parse_scxml(text: str, source: str | None = None) -> ActionPlot:
     """
     root = read_xml(text, source)
     if root.name != "scxml" or root.foreign:
-        raise InputError(f"<scxml> was expected; found <{root.name}>", place=root.place)
+        raise InputError(f"<scxml> was expected; found {written(root)}", place=root.place)
     return _Reader(root, source).plot()
 
 
@@ -48,7 +49,8 @@ class _Reader:
         check(root)
         self._root, self._source = root, source
         self._names: dict[str, str] = {}
-        self._places: dict[Path, Place] = {(): root.place}
+        self._places: dict[Path, Place] = {}
+        self._note((), root.place)
         self._unnamed = 0
 
     def plot(self) -> ActionPlot:
@@ -57,10 +59,20 @@ class _Reader:
             raise NotExpressibleError("scxml/@datamodel", "only ecmascript is read", place=root.place)
         if root.attributes.get("binding", "early") != "early":
             raise NotExpressibleError("scxml/@binding", "data are bound early", place=root.place)
+        if root.attributes.get("version", "1.0") != "1.0":
+            raise InputError("the version of SCXML is 1.0", place=root.place, found=root.attributes["version"])
+        if not any(child.name in STATES for child in root.children):
+            raise InputError("a chart needs at least one state", place=root.place)
         form: Form = {"plot": self._name(), "profile": "scxml", "variables": self._variables()}
         form |= self._scope(root, ())
         form["receives"] = dict.fromkeys(self._received())
         return read_model(ActionPlot, Document(form, self._places)).written_at(self._places)
+
+    def _note(self, path: Path, place: Place) -> None:
+        """Remember where a part stands; the parts around it that are no elements stand where those do."""
+        for length in range(1, len(path)):
+            self._places.setdefault(path[:length], self._places[path[: length - 1]])
+        self._places[path] = place
 
     def _name(self) -> str:
         given = self._root.attributes.get("name") or (PurePath(self._source).stem if self._source else "chart")
@@ -73,14 +85,16 @@ class _Reader:
         data = [element for element in self._root.walk() if element.name == "data"]
         for element in data:
             name = needed(element, "id")
+            if not is_plain_name(name.lower()):
+                raise InputError(f"'{name}' is no name for data", place=element.place, found=name)
             if name.lower() in self._names.values():
                 raise InputError(f"two data are named '{name}', in lower case", place=element.place, found=name)
             self._names[name] = name.lower()
-            self._places["variables", name.lower()] = element.place
+            self._note(("variables", name.lower()), element.place)
         return {self._names[element.attributes["id"]]: self._variable(element) for element in data}
 
     def _variable(self, element: Element) -> Form:
-        text = element.attributes.get("expr") or element.text.strip()
+        text = element.attributes.get("expr") or element.text
         if not text:
             return {"type": "text"}
         initial = term(text, self._names, element.place)
@@ -103,8 +117,7 @@ class _Reader:
         for child in element.children:
             if child.name in STATES or child.name == "history":
                 name, form = self._state(child, (*path, "states"))
-                if name in states:
-                    raise InputError(f"two states are named '{name}'", place=child.place, found=name)
+                _new(name, states, child)
                 states[name] = form
         form = {"states": states}
         first = self._initial(element)
@@ -114,6 +127,7 @@ class _Reader:
         targets = element.attributes.get("initial", "").split()
         for child in (child for child in element.children if child.name == "initial"):
             transition = _only(child)
+            _default(transition)
             if transition.children:
                 raise NotExpressibleError("initial", "its transition cannot act", place=child.place)
             targets += transition.attributes.get("target", "").split()
@@ -124,8 +138,10 @@ class _Reader:
     def _state(self, element: Element, around: Path) -> tuple[str, Form]:
         self._unnamed += 1
         name = element.attributes.get("id") or f"{element.name}_{self._unnamed}"
+        if len(name.split()) != 1:
+            raise InputError(f"the id '{name}' has a blank", place=element.place, found=name)
         path = (*around, name)
-        self._places[path] = element.place
+        self._note(path, element.place)
         if element.name == "history":
             return name, self._history(element)
         form: Form = {"final": True} if element.name == "final" else {}
@@ -140,6 +156,8 @@ class _Reader:
         if not any(child.name in STATES for child in element.children):
             for child in (child for child in element.children if child.name == "history"):
                 raise InputError("a history needs states beside it", place=child.place)
+            if self._initial(element) is not None:
+                raise InputError("there is no state inside to begin with", place=element.place)
             return {}
         if element.name == "state":
             return self._scope(element, path)
@@ -147,15 +165,19 @@ class _Reader:
         connectors: Form = {}
         for child in element.children:
             if child.name == "history":
-                name, connectors[name] = self._state(child, (*path, "connectors"))
+                name, form = self._state(child, (*path, "connectors"))
+                _new(name, connectors, child)
+                connectors[name] = form
             elif child.name in STATES:
                 key = child.attributes.get("id") or f"{child.name}_{self._unnamed + 1}"
                 name, form = self._state(child, (*path, "regions", key, "states"))
+                _new(name, regions, child)
                 regions[name] = {"states": {name: form}}
         return {"regions": regions, "connectors": connectors}
 
     def _history(self, element: Element) -> Form:
         default = _only(element)
+        _default(default)
         targets = default.attributes.get("target", "").split()
         depth = element.attributes.get("type", "shallow")
         if depth not in {"shallow", "deep"}:
@@ -171,17 +193,18 @@ class _Reader:
         """Document order is kept also where transitions with the same descriptors have others between them."""
         on: dict[str, list[Form]] = {}
         always: list[Form] = []
+        repeats: Counter[str] = Counter()
         for child in (child for child in element.children if child.name == "transition"):
             words = _descriptors(child)
             if not words:
-                self._places[(*path, "always", len(always))] = child.place
+                self._note((*path, "always", len(always)), child.place)
                 always.append(self._transition(child))
                 continue
             for word in TIMERS.intersection(words):
                 problem = f"'{word}' is what the executive's clock says"
                 raise NotExpressibleError("transition/@event", problem, place=child.place)
-            key = _key(" ".join(words), on)
-            self._places[(*path, "on", key, len(on.setdefault(key, [])))] = child.place
+            key = _key(" ".join(words), on, repeats)
+            self._note((*path, "on", key, len(on.setdefault(key, []))), child.place)
             on[key].append(self._transition(child))
         form |= {key: value for key, value in (("on", on), ("always", always)) if value}
 
@@ -203,11 +226,27 @@ def _descriptors(transition: Element) -> list[str]:
     return transition.attributes.get("event", "").split()
 
 
-def _key(event: str, on: dict[str, list[Form]]) -> str:
+def _key(event: str, on: dict[str, list[Form]], repeats: Counter[str]) -> str:
+    """A key for a transition after those in `on`: new unless the last of them has the same descriptors."""
     # A list of descriptors means the same with one of them repeated, and is another key.
-    while event in on and event != next(reversed(on)):
-        event = f"{event} {event.split(maxsplit=1)[0]}"
-    return event
+    again = f" {event.split(maxsplit=1)[0]}"
+    key = event + again * repeats[event]
+    while key in on and key != next(reversed(on)):
+        repeats[event] += 1
+        key = event + again * repeats[event]
+    return key
+
+
+def _new(name: str, known: Form, element: Element) -> None:
+    if name in known:
+        raise InputError(f"two states are named '{name}'", place=element.place, found=name)
+
+
+def _default(transition: Element) -> None:
+    """The transition of an `initial` or a history just leads somewhere (SCXML 3.6, 3.10)."""
+    for name in ("event", "cond"):
+        if name in transition.attributes:
+            raise InputError(f"this transition is taken always, so it has no '{name}'", place=transition.place)
 
 
 def _only(element: Element) -> Element:

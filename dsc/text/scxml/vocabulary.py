@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from dsc.text.scxml.document import Element
 from dsc.text.scxml.errors import NotExpressibleError
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError, shortened
 
 ATTRIBUTES: Mapping[str, frozenset[str]] = {
     name: frozenset(words.split())
@@ -54,6 +54,8 @@ CHILDREN: Mapping[str, frozenset[str]] = {
     "if": _ACTIONS | {"elseif", "else"},
 }
 """Elements -> what may stand directly inside them."""
+_MEANINGLESS_IF_EMPTY = frozenset({"id", "target", "initial", "event", "location", "idlocation", "sendid"})
+_HOLDS_TEXT = frozenset({"data", "assign", "content"})
 _KNOWN_TO_SCXML = frozenset({"script", "foreach", "invoke", "finalize", "donedata", "onexit"})
 _KNOWN_ATTRIBUTES = frozenset({"src", "targetexpr", "typeexpr", "srcexpr", "autoforward"})
 
@@ -64,6 +66,7 @@ def check(element: Element) -> None:
     Raises:
         NotExpressibleError: an element or attribute of SCXML that action plots have nothing for.
         UnknownNameError: no element or attribute of SCXML, or not in this place.
+        InputError: an attribute says nothing, or text stands where none belongs.
     """
     known = ATTRIBUTES[element.name]
     for name in element.attributes:
@@ -73,6 +76,11 @@ def check(element: Element) -> None:
             raise UnknownNameError(
                 f"<{element.name}> has no attribute '{name}'", place=element.place, found=name, valid=known
             )
+        if name in _MEANINGLESS_IF_EMPTY and not element.attributes[name].strip():
+            raise InputError(f"the attribute '{name}' of <{element.name}> is empty", place=element.place)
+    if element.text and element.name not in _HOLDS_TEXT:
+        message = f"<{element.name}> holds the text '{shortened(element.text, 40)}', which belongs nowhere"
+        raise InputError(message, place=element.place)
     valid = CHILDREN.get(element.name, frozenset())
     for child in element.children:
         if child.foreign or (child.name in _KNOWN_TO_SCXML and child.name not in valid):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree as ET
 
 from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Withdraw
@@ -150,7 +150,7 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
                     ET.SubElement(around, "assign", {"location": identifier(name), "expr": term_text(term)})
             case Log(log=parts, label=label):
                 labelled = {"label": label} if label else {}
-                shown = {"expr": " + ".join(map(term_text, parts))} if parts else {}
+                shown = {"expr": _joined(parts)} if parts else {}
                 ET.SubElement(around, "log", {**labelled, **shown})
             case Emit():
                 _send(around, action)
@@ -161,6 +161,13 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
                 _if(around, action)
             case _:
                 raise NotExpressibleError(type(action).__name__.lower(), "SCXML knows no skills and no knowledge base")
+
+
+def _joined(parts: Sequence[Term]) -> str:
+    """The parts one after the other; `+` does so only where one of them is text."""
+    texts = list(map(term_text, parts))
+    joins = len(parts) == 1 or any(isinstance(part, Constant) and isinstance(part.value, str) for part in parts)
+    return " + ".join(texts if joins else ['""', *texts])
 
 
 def _send(around: ET.Element, action: Emit) -> None:

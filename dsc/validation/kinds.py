@@ -1,0 +1,164 @@
+"""Values of the wrong kind: text where a number is wanted, a place where an item is.
+
+Only what can never fit is found: a name may be any thing, and a variable of a type may hold one of a type below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from dsc.dynamic.library import Library
+from dsc.errors import Finding
+from dsc.model.actions import Assign, Emit, ExternalAction, Internal, Trigger, flat
+from dsc.model.connectors import SelectState, case_value
+from dsc.model.plot import ActionPlot, Path
+from dsc.model.states import FinalState, State
+from dsc.model.transitions import TimedTransition, Transition
+from dsc.validation.arguments import Holder, contents
+from dsc.validation.attributes import Attributes, Skills, attributes_of
+from dsc.validation.nesting import Nesting
+from knowledge_base.errors import SchemaError
+from knowledge_base.language.expression import Constant, Term, Variable
+from knowledge_base.language.printer import to_text
+from knowledge_base.schema import Schema
+
+_VALUES = frozenset({"number", "boolean"})
+_WORDS = frozenset({"text", "symbol"})
+
+
+def check_kinds(
+    plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
+) -> Iterator[Finding]:
+    """Findings about values that do not fit the types they are given to; SCXML's data have no types."""
+    if plot.profile == "dsc":
+        yield from _Kinds(plot, library, schema, skills, nesting).findings()
+
+
+class _Kinds:
+    def __init__(
+        self, plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
+    ) -> None:
+        self._plot, self._library, self._schema, self._nesting = plot, library, schema, nesting
+        self._skills = skills or {}
+        self._assigned = {name: one.type for name, one in (plot.variables | plot.outputs).items()}
+        parameters = {name: parameter.type for name, parameter in plot.parameters.items()}
+        self._own: dict[str, str | None] = {**parameters, **self._assigned}
+
+    def findings(self) -> Iterator[Finding]:
+        for name, parameter in self._plot.parameters.items():
+            yield from self._fits(parameter.default, parameter.type, {}, ("parameters", name, "default"))
+        for group, declared in (("variables", self._plot.variables), ("outputs", self._plot.outputs)):
+            for name, variable in declared.items():
+                yield from self._fits(variable.initial, variable.type, self._own, (group, name, "initial"))
+        for _, state, path in self._nesting.states:
+            if isinstance(state, State):
+                yield from self._state(state, path)
+            elif isinstance(state, FinalState):
+                yield from self._emitted(state.emit, state.arguments, self._own, path)
+            elif isinstance(state, SelectState):
+                yield from self._cases(state, path)
+            for inside, event, transition in self._nesting.leaving(path):
+                if transition.passed or transition.effect or isinstance(transition, TimedTransition):
+                    scope = self._scope(state, event) if isinstance(state, State) else self._own
+                    yield from self._transition(transition, scope, (*path, *inside))
+        for number, rule in enumerate(self._plot.rules):
+            if rule.do.use is not None:
+                used = self._library.plot(rule.do.use)
+                yield from self._given(used, rule.do.arguments, self._own, ("rules", number, "do", "with"))
+
+    def _state(self, state: State, path: Path) -> Iterator[Finding]:
+        if isinstance(state, Holder) and state.arguments:
+            for used in contents(state, self._library):
+                yield from self._given(used, state.arguments, self._own, (*path, "with"))
+        for key, actions in state.blocks() if state.entry or state.exit or state.on_break else ():
+            for position, action in enumerate(actions):
+                yield from self._action(action, self._own, (*path, key, position))
+        if state.at_least is not None:
+            yield from self._fits(state.at_least, "number", self._own, (*path, "at_least"))
+
+    def _cases(self, state: SelectState, path: Path) -> Iterator[Finding]:
+        """A case of another type than the selected value is never taken."""
+        selected = self._kind(state.select, self._own)
+        for key in state.cases:
+            value = case_value(key)
+            place = value if isinstance(value, int) else key
+            yield from self._fits(Constant(value), selected, {}, (*path, "cases", place), to_text(state.select))
+
+    def _transition(self, transition: Transition, scope: Attributes, path: Path) -> Iterator[Finding]:
+        if isinstance(transition, TimedTransition):
+            yield from self._fits(transition.seconds, "number", self._own, (*path, "seconds"))
+        if transition.passed and transition.target is not None:
+            target = self._nesting.state(transition.target)
+            for used in contents(target, self._library) if isinstance(target, Holder) else ():
+                yield from self._given(used, transition.passed, scope, (*path, "pass"))
+        for action in flat(transition.effect):
+            yield from self._action(action, scope, path)
+
+    def _action(self, action: ExternalAction | Internal, scope: Attributes, path: Path) -> Iterator[Finding]:
+        if isinstance(action, Assign):
+            yield from self._all(action.assign, self._assigned, scope, (*path, "assign"))
+        elif isinstance(action, Emit):
+            yield from self._emitted(action.emit, action.arguments, scope, path)
+        elif isinstance(action, Trigger) and action.trigger in self._skills:
+            yield from self._all(
+                action.arguments, self._skills[action.trigger].parameters, scope, (*path, "with")
+            )
+
+    def _given(
+        self, used: ActionPlot, arguments: Mapping[str, Term], scope: Attributes, path: Path
+    ) -> Iterator[Finding]:
+        wanted = {name: parameter.type for name, parameter in used.parameters.items()}
+        yield from self._all(arguments, wanted, scope, path)
+
+    def _emitted(
+        self, event: str | None, arguments: Mapping[str, Term], scope: Attributes, path: Path
+    ) -> Iterator[Finding]:
+        declared = self._plot.emits.get(event or "")
+        yield from self._all(arguments, declared or {}, scope, (*path, "with"))
+
+    def _all(
+        self, terms: Mapping[str, Term], wanted: Attributes, scope: Attributes, path: Path
+    ) -> Iterator[Finding]:
+        for name, term in terms.items():
+            yield from self._fits(term, wanted.get(name), scope, (*path, name))
+
+    def _fits(
+        self, term: Term | None, wanted: str | None, scope: Attributes, path: Path, what: str | None = None
+    ) -> Iterator[Finding]:
+        given = None if term is None else self._kind(term, scope)
+        if term is None or wanted is None or given is None or self._compatible(given, wanted):
+            return
+        error = SchemaError(
+            f"'{what or path[-1]}' is of type {wanted}, and {to_text(term)} is of type {given}",
+            place=self._plot.place(path), found=to_text(term),
+        )  # fmt: skip
+        yield Finding(error, "value fits")
+
+    def _kind(self, term: Term, scope: Attributes) -> str | None:
+        """The type of a term's value as far as it is known."""
+        match term:
+            case Variable(name):
+                return scope.get(name)
+            case Constant(bool()):
+                return "boolean"
+            case Constant(str() as name):
+                return "text" if self._schema is None else self._schema.constants.get(name, "text")
+            case _:
+                return "number"
+
+    def _compatible(self, given: str, wanted: str) -> bool:
+        if _VALUES & {given, wanted}:
+            return given == wanted or not self._known({given, wanted})
+        if self._schema is None or not {given, wanted} <= self._schema.types.keys():
+            return True  # a word may name a thing, a plot or a condition
+        return self._schema.is_a(given, wanted) or self._schema.is_a(wanted, given)
+
+    def _known(self, types: Iterable[str]) -> bool:
+        """Whether a number or truth value can be none of these for certain: misspelt types say nothing."""
+        things = frozenset() if self._schema is None else frozenset(self._schema.types)
+        return self._schema is None or set(types) <= _VALUES | _WORDS | {"condition", "plot"} | things
+
+    def _scope(self, state: State, event: str) -> Attributes:
+        """The types of what a transition can read: the plot's own, and what its event carries."""
+        attributes = attributes_of(event, state, self._plot, self._library, self._skills) or {}
+        return {**self._own, **{f"event.{name}": kind for name, kind in attributes.items()}}

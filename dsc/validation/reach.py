@@ -1,0 +1,109 @@
+"""What can be entered at all: every state from the first one, and every used plot without using itself for ever."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from dsc.dynamic.library import Library
+from dsc.errors import Finding
+from dsc.model.plot import ActionPlot, Path, Scope, initial_of
+from dsc.model.states import AnyState, CompositeState, DynamicState, OrthogonalState, SubmachineState
+from dsc.validation.arguments import Holder
+from dsc.validation.nesting import Nesting
+from knowledge_base.errors import InputError, SchemaError
+
+
+def check_reach(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
+    """Findings about states that nothing leads to, choices of nothing, and plots that use each other in a circle.
+
+    Connectors are reached and lead on as states do.
+    SCXML has no rule that all states can be reached, and a generated plot has its ends whether they are needed or not.
+    """
+    holders = [(state, path) for _, state, path in nesting.states if isinstance(state, Holder)]
+    yield from _circle(plot, _used(holders), library)
+    yield from _empty_choices(plot, holders)
+    if plot.profile == "dsc" and not plot.generated:
+        yield from _unreached(plot, library, nesting)
+
+
+def _unreached(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
+    try:
+        expanded = library.expanded(plot)
+    except InputError:  # rules that cannot be carried out have a finding of their own
+        return
+    ways = nesting if expanded is plot else Nesting(expanded)
+    written = set(nesting.names.values())
+    responses = {rule.do.then for rule in plot.rules}  # the steps of plans may end with what no state here does
+    for path in _unreached_in(expanded, (), ways, responses):
+        if path in written:
+            error = SchemaError(f"nothing leads to the state '{path[-1]}'", place=plot.place(path), found=str(path[-1]))
+            yield Finding(error, "reachable", "add a transition to it, or make it `initial`")
+
+
+def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]) -> Iterator[Path]:
+    """The states that nothing leads to, without what is inside them; a transition stays in its scope (S0.3)."""
+    reached: set[str] = set()
+    waiting = [initial_of(scope), *responses]
+    while waiting:
+        name = waiting.pop()
+        if name not in reached and name in scope.states:
+            reached.add(name)
+            leaving = ways.leaving((*around, "states", name))
+            waiting += [transition.target for _, _, transition in leaving if transition.target is not None]
+    for name, state in scope.states.items():
+        path = (*around, "states", name)
+        if name not in reached:
+            yield path
+        elif isinstance(state, CompositeState):
+            yield from _unreached_in(state, path, ways, responses)
+        elif isinstance(state, OrthogonalState):
+            for key, region in state.regions.items():
+                yield from _unreached_in(region, (*path, "regions", key), ways, responses)
+
+
+def _empty_choices(plot: ActionPlot, holders: list[tuple[Holder, Path]]) -> Iterator[Finding]:
+    for state, path in holders:
+        if isinstance(state, DynamicState) and not state.dynamic and state.goal is None:
+            place = plot.place((*path, "dynamic"))
+            error = SchemaError(f"the dynamic state '{path[-1]}' has nothing to choose from", place=place)
+            yield Finding(error, "something to choose", "name candidates, or a `goal`")
+
+
+def _circle(plot: ActionPlot, used: dict[str, Path], library: Library) -> Iterator[Finding]:
+    """The first circle of submachine states that this plot runs into; its own or one further down."""
+    for name, path in used.items():
+        circle = _found_circle([plot.name, name], library)
+        if circle:
+            error = SchemaError(
+                f"plots use each other in a circle: {' -> '.join(circle)}", place=plot.place((*path, "use")), found=name
+            )
+            yield Finding(error, "no circle", "choose one of them in a dynamic state")
+            return
+
+
+def _found_circle(way: list[str], library: Library) -> list[str]:
+    """Depth first along what is used; `way` is the plots entered so far, the last of them not yet looked into."""
+    seen = set(way[:-1])
+    open_: list[Iterator[str]] = [iter((way[-1],))]
+    way = way[:-1]
+    while open_:
+        name = next(open_[-1], None)
+        if name is None:
+            open_.pop()
+            way.pop()
+        elif name in way:
+            return [*way[way.index(name) :], name]
+        elif name not in seen and name in library:
+            seen.add(name)
+            way.append(name)
+            open_.append(iter(_used((state, path) for _, state, path in library.plot(name).walk())))
+    return []
+
+
+def _used(states: Iterable[tuple[AnyState, Path]]) -> dict[str, Path]:
+    """The plots that submachine states name, each with the first state that does."""
+    found: dict[str, Path] = {}
+    for state, path in states:
+        if isinstance(state, SubmachineState) and not state.use.startswith("?"):
+            found.setdefault(state.use, path)
+    return found

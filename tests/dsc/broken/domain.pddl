@@ -1,0 +1,5 @@
+(define (domain kitchen)
+  (:types item place - object)
+  (:constants table - place)
+  (:predicates (ready) (on ?i - item ?p - place))
+  (:functions (failures ?i - item)))
