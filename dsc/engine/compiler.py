@@ -110,12 +110,9 @@ class _Layout:
             raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
         return Edge(
             node.index, trigger, targets, transition.guard, transition.effect, transition.rule,
-            transition.internal and self._stays(node, targets), place, transition.passed,
+            transition.internal and isinstance(node.state, CompositeState), place, transition.passed,
             tuple(self._cleared(node, transition)) if transition.clear else (),
         )  # fmt: skip
-
-    def _stays(self, node: Node, targets: Sequence[int]) -> bool:
-        return isinstance(node.state, CompositeState) and all(node.index < at <= node.last for at in targets)
 
     def _together(self, targets: Sequence[int]) -> bool:
         """Whether all targets can be active at once: any two are in different regions (SCXML 3.11)."""

@@ -67,8 +67,9 @@ class _Work:
         return self.configuration.compiled
 
     def taking(self, edges: tuple[Edge, ...], keeps: tuple[str, ...]) -> Reaction:
-        left = {i for edge in edges for i in left_by(self.compiled, edge, self.present, self.remembered)}
-        exits = self._exits(left, {edge.source for edge in edges})
+        left_of = [left_by(self.compiled, edge, self.present, self.remembered) for edge in edges]
+        own = {edge.source for edge, left in zip(edges, left_of, strict=True) if edge.source in left}
+        exits = self._exits(set().union(*left_of), own)
         effects = [tuple(self._settled(edge.effect)) for edge in edges]
         for edge in edges:
             for history in edge.cleared:
@@ -107,15 +108,15 @@ class _Work:
             still=still,
         )  # fmt: skip
 
-    def _exits(self, left: set[int], sources: set[int]) -> tuple[Exit, ...]:
-        """Inner before outer, later before earlier: the reverse of document order."""
+    def _exits(self, left: set[int], own: set[int]) -> tuple[Exit, ...]:
+        """Inner before outer, later before earlier; all but those in `own` are interrupted."""
         ordered = sorted(left, reverse=True)
         for index in ordered:
             self._remember(index)
         exits = []
         for index in ordered:
             node = self.compiled.nodes[index]
-            actions = node.exit if index in sources else node.broken
+            actions = node.exit if index in own else node.broken
             cancels = node.timed or any(isinstance(action, Trigger) for action in node.entry)
             exits.append(Exit(node, tuple(self._settled(actions)), cancels))
             self.present.discard(index)
@@ -147,7 +148,7 @@ class _Work:
             if node.at_least is not None:
                 self.waiting.add(index)
             actions, after = self._settled(node.entry), self._settled(entry.after.get(index, ()))
-            completes = self._completed(node)
+            completes = tuple(self._completed(node))
             entrances.append(Entrance(node, tuple(actions), tuple(after), completes, _outcome(node)))
         return tuple(entrances)
 
@@ -167,27 +168,32 @@ class _Work:
     def _is_present(self, state: str) -> bool:
         return self.compiled.index.get(state) in self.present
 
-    def _completed(self, node: Node) -> int | None:
-        """The node whose content is complete now that this one is entered, if anybody wants to know."""
-        around = self._around_complete(node)
-        if around and not self.compiled.scxml and DONE not in self.compiled.nodes[around].edges:
-            return None
-        return around
+    def _completed(self, node: Node) -> Iterator[int]:
+        """The nodes whose content is complete now that this one is entered, if anybody wants to know."""
+        nodes, scxml = self.compiled.nodes, self.compiled.scxml
+        return (one for one in self._around_complete(node) if not one or scxml or DONE in nodes[one].edges)
 
-    def _around_complete(self, node: Node) -> int | None:
+    def _around_complete(self, node: Node) -> Iterator[int]:
         nodes = self.compiled.nodes
         if not node.final:
-            at_once = type(node.state) is State and not self.compiled.scxml
-            return node.index if at_once else None
+            if type(node.state) is State and not self.compiled.scxml:
+                yield node.index
+            return
         around = nodes[node.parent]
         if around.index == 0 or around.state is not None:
-            return around.index
-        regions = nodes[around.parent].children
-        return around.parent if all(map(self._is_finished, regions)) else None
+            yield around.index
+        region = around if around.state is None else nodes[around.parent]
+        ends = around.index > 0 and (region is around or region.transparent)
+        if ends and all(map(self._is_finished, nodes[region.parent].children)):
+            yield region.parent
 
     def _is_finished(self, region: int) -> bool:
+        """Whether a final state is reached there; a transparent region is as finished as the state it stands for."""
         nodes = self.compiled.nodes
-        return any(child in self.present and nodes[child].final for child in nodes[region].children)
+        inside = nodes[region].children
+        if nodes[region].transparent and not nodes[inside[0]].orthogonal:
+            inside = [*inside, *nodes[inside[0]].children]
+        return any(child in self.present and nodes[child].final for child in inside)
 
 
 def _names(nodes: Iterable[Node]) -> Iterator[str]:

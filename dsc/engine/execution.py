@@ -155,8 +155,8 @@ class Execution(Performer):
             self._bind_dynamic(frame, node.name, state, passed)
         if entrance.emits is not None:
             self.act(frame, node.name, (entrance.emits,))
-        if entrance.completes is not None:
-            self._complete(frame, entrance.completes)
+        for completed in entrance.completes:
+            self._complete(frame, completed)
 
     def _bind_submachine(self, frame: Frame, name: str, state: SubmachineState, passed: Mapping[str, Any]) -> None:
         try:

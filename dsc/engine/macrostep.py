@@ -198,11 +198,12 @@ class Macrostep(Execution):
         return True
 
     def _least_time_passed(self, frame: Frame, state: str) -> bool:
-        """The state can be left from now on; what it kept is offered again, before anything new."""
+        """The state can be left from now on; what it kept is offered again, to it alone and before anything new."""
         before = frame.configuration
         waiting = before.waiting - {frame.compiled.index[state]}
         frame.configuration = configuration_of(frame.compiled, before.active, waiting, before.history)
-        self.internal.extend(kept for name, kept in frame.kept if name == state)
+        own = frame.activations[state]
+        self.internal.extend(kept._replace(to=own, exact=True) for name, kept in frame.kept if name == state)
         frame.kept = tuple([one for one in frame.kept if one[0] != state])
         return True
 

@@ -42,21 +42,21 @@ class Entrance:
     Attributes:
         actions: those of its entry.
         after: those of a history's default that leads to it (a block of its own, appendix D).
-        completes: index of the node whose content is complete with it; 0 for the plot itself.
+        completes: indices of the nodes whose content is complete with it; 0 for the plot itself.
         emits: the outcome of a final state.
     """
 
     node: Node
     actions: tuple[Action, ...]
     after: tuple[Action, ...]
-    completes: int | None
+    completes: tuple[int, ...]
     emits: Emit | None = None
 
     @property
     def quiet(self) -> bool:
         """Whether the node is only entered."""
         acts = self.actions or self.after or self.emits
-        return not acts and self.completes is None and not self.node.addressed
+        return not acts and not self.completes and not self.node.addressed
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -65,9 +65,10 @@ def domain(compiled: CompiledPlot, edge: Edge, remembered: dict[int, tuple[int, 
 
     SCXML appendix D: getTransitionDomain, findLCCA. A source that is only left internally is its own domain.
     """
-    if edge.internal:
+    known = {history: kept for history, kept in remembered.items() if history not in edge.cleared}
+    real = effective_targets(compiled, edge.targets, known)
+    if edge.internal and all(compiled.inside(target, edge.source) for target in real):
         return edge.source
-    real = effective_targets(compiled, edge.targets, remembered)
     around = set.intersection(*(set(compiled.nodes[target].around) for target in real))
     return next(
         index for index in compiled.nodes[edge.source].around if index in around and _is_scope(compiled.nodes[index])
@@ -96,7 +97,11 @@ def select(root: Frame, trigger: Trigger, guard: Guard) -> tuple[list[Enabled], 
             enabled.setdefault((found.frame, found.edge), found)
     taken = _without_conflicts([one for one in enabled.values() if not _has_to_wait(one)])
     late = [one for one in enabled.values() if _has_to_wait(one)]
-    return taken, [one for one in late if not any(_is_inside(other, one) for other in taken)]
+    return taken, [one for one in late if not any(_preempts(other, one) for other in taken)]
+
+
+def _preempts(one: Enabled, other: Enabled) -> bool:
+    return _is_inside(one, other) and bool(one.left() & other.left())
 
 
 def _has_to_wait(one: Enabled) -> bool:

@@ -21,7 +21,7 @@ class Edge:
     Attributes:
         source, targets: the nodes that it leads from and to.
         trigger, guard, effect, rule: as in the model.
-        internal: only true where it makes a difference: a composite source with all targets inside it.
+        internal: whether a composite source is not left, if all targets turn out to be inside it (SCXML 3.5).
         place: where it stands in its source, e.g. `("on", "grasped", 0)`.
         passed: arguments for the plot inside the target.
         cleared: history nodes that forget.

@@ -31,17 +31,16 @@ class Grower:
         pick: makes all choices.
         scxml: whether the plots are in that profile.
         private: whether plots may do what depends on where they end: internal events, outcomes, `?event`, history.
-        free: whether a state with `on_break` may have transitions without target, and a transition may forget the
-            history that it leads to.
         depth: of states inside states.
+        bare: whether the chart is one plot without variables and actions, whose state is its configuration alone.
         quiet: whether states and transitions mostly have no actions, so that steps are mere moves; drawn.
     """
 
     pick: object
     scxml: bool = False
     private: bool = True
-    free: bool = True
     depth: int = 3
+    bare: bool = False
     quiet: bool = False
     plots: list = field(default_factory=list)
     names: object = field(default_factory=count)
@@ -76,22 +75,15 @@ class Inside:
         self.pick, self.chance = self.grower.pick, self.grower.chance
 
     def finish(self, states, **more):
-        form = {"plot": self.plot, "states": states, "variables": {"v": {"type": "number", "initial": 0}}, **more}
+        variables = {} if self.grower.bare else {"v": {"type": "number", "initial": 0}}
+        form = {"plot": self.plot, "states": states, "variables": variables, **more}
         if self.grower.scxml:
             form["profile"] = "scxml"
             Borders(self).cross()
         for transition in self.transitions():
             if "use" in self.states.get(transition.get("to"), ()) and self.chance(3):
                 transition["pass"] = {"w": self.pick((2, "?v"))}
-        if not self.grower.free:
-            self._break_only_what_moves()
         self.grower.plots.append(ActionPlot.model_validate(form))
-
-    def _break_only_what_moves(self):
-        for form in self.states.values():
-            listed = [*form.get("on", {}).values(), form.get("after", ()), form.get("every", ())]
-            if any("to" not in one for many in listed if not isinstance(many, str) for one in many):
-                form.pop("on_break", None)
 
     def transitions(self):
         """Those that an event from outside or time triggers."""
@@ -114,15 +106,16 @@ class Inside:
 
     def _kind(self, depth, is_last):
         kinds = ["simple", "simple", "simple", "final"]
+        bare = self.grower.bare
         if not is_last:
-            kinds += ["choice", "select"]
+            kinds += ["choice"] if bare else ["choice", "select"]
         if depth > 0:
-            kinds += ["composite", "orthogonal", "plot", "plot"]
+            kinds += ["composite", "orthogonal"] if bare else ["composite", "orthogonal", "plot", "plot"]
         return self.pick(kinds)
 
     def shown(self, name):
         """Keys that show when it is entered, left and interrupted."""
-        if self.grower.quiet and self.pick(range(5)):
+        if self.grower.bare or (self.grower.quiet and self.pick(range(5))):
             return {"entry": []}
         keys = dict(marked(name)[name])
         if self.chance(2):
@@ -202,7 +195,7 @@ class Inside:
         on |= {"k": [self._effect({})]} if self.chance(3) else {}
         on |= {self._error(): self.pick(later)} if later and self.chance(3) else {}
         ways = {"on": on}
-        if later and self.chance(2):
+        if later and not self.grower.bare and self.chance(2):
             on["done"] = [{"to": self.pick(later), **({"assign": {"v": 1}} if self.chance(2) else {})}]
         if later and self.chance(4):
             ways["always"] = [self._effect({"to": self.pick(later), "when": self._guard()})]
@@ -218,7 +211,7 @@ class Inside:
 
     def _times(self, anywhere):
         ways = {}
-        if self.grower.quiet and self.pick(range(5)):
+        if self.grower.bare or (self.grower.quiet and self.pick(range(5))):
             return ways
         if self.chance(5):
             ways["at_least"] = 1
@@ -235,15 +228,17 @@ class Inside:
         form = {"to": self.pick(anywhere)} if self.pick(range(4)) else {}
         if self.chance(3):
             form["when"] = self._guard()
-        if emits and self.grower.private and self.chance(4):
+        if emits and self.grower.private and not self.grower.bare and self.chance(4):
             form["emit"] = self.pick(emits)
         return self._effect(form)
 
     def _guard(self):
+        if self.grower.bare:
+            return self.pick(GUARDS[:4])
         return self.pick(GUARDS if self.grower.private else GUARDS[:-1])
 
     def _effect(self, form):
-        if self.grower.quiet and self.pick(range(5)):
+        if self.grower.bare or (self.grower.quiet and self.pick(range(5))):
             return form
         if self.chance(4):
             form["tell"] = self.pick(TELLS)
@@ -269,7 +264,7 @@ class Borders:
             self._completion(name, form)
         for transition in self.inside.transitions():
             self._lead_away(transition, [*self.inside.states, *histories, *histories], holders)
-            if remembering and self.chance(5) and (self.inside.grower.free or transition.get("to") not in histories):
+            if remembering and self.chance(5):
                 transition["clear"] = self.pick(remembering) + self.pick(("", "*"))
 
     def _histories(self, form):

@@ -7,7 +7,7 @@ what goes out besides `switch` actions are left out.
 Where the page is silent, this is assumed:
 
 - A transition without target leaves nothing, so it neither waits for `at_least` nor makes an exit the state's own.
-- What is kept comes again as it came: to everybody who saw it, before anything else. A period is not kept.
+- What is kept comes again for the state that kept it alone, before anything else. A period is not kept.
 - An event is kept unless a transition that is taken would preempt the one that waits for it.
 - `?event` stays the last event that came, taken or not; transitions without trigger read it too. A `done` that its
   state does not listen to does not come.
@@ -22,7 +22,7 @@ Where the page is silent, this is assumed:
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from reference_tree import Node, NoValueError, grow, holds, told, value
 
@@ -158,7 +158,8 @@ class Reference:
             return False
         if event.name == "at_least":
             self.waiting.discard(event.to)
-            self.queue.extend(kept for node, kept in self.kept if node is event.to)
+            own = {"to": event.to, "visit": event.to.visit, "exact": True}
+            self.queue.extend(replace(kept, **own) for node, kept in self.kept if node is event.to)
             self.kept = [one for one in self.kept if one[0] is not event.to]
             return True
         return self._take_ways(event)

@@ -93,7 +93,7 @@ def shape(root: Box, around: Box, name: str) -> Box:
     return box.boxes[0] if box.kind in {BoxKind.FINAL, BoxKind.HISTORY} else box
 
 
-@settings(PROPERTY, max_examples=15)
+@settings(PROPERTY, max_examples=8)
 @given(charts(), directions)
 def test_every_end_of_an_edge_lies_on_the_border_of_its_state(chart: ActionPlot, direction: str) -> None:
     root = lay_out(chart, direction=direction)  # type: ignore[arg-type]
@@ -103,7 +103,7 @@ def test_every_end_of_an_edge_lies_on_the_border_of_its_state(chart: ActionPlot,
             assert on_border(edge.points[-1], shape(root, box, edge.target))
 
 
-@settings(PROPERTY, max_examples=15)
+@settings(PROPERTY, max_examples=8)
 @given(charts(), directions)
 def test_edges_run_straight_inside_the_state_around_and_through_no_state(chart: ActionPlot, direction: str) -> None:
     root = lay_out(chart, direction=direction)  # type: ignore[arg-type]
@@ -117,7 +117,7 @@ def test_edges_run_straight_inside_the_state_around_and_through_no_state(chart: 
             assert all(apart(segment, area(leaf)) for leaf in leaves)
 
 
-@settings(PROPERTY, max_examples=15)
+@settings(PROPERTY, max_examples=8)
 @given(charts(), directions)
 def test_every_transition_is_drawn_to_all_its_targets_and_every_caption_is_there(
     chart: ActionPlot, direction: str

@@ -19,7 +19,7 @@ from dsc.errors import RunawayError
 from dsc.events import AFTER, AT_LEAST, EVERY
 from knowledge_base.facts import Fact
 
-CHARTS = st.one_of(libraries(depth=2), libraries(scxml=True, free=False, depth=2))
+CHARTS = st.one_of(libraries(depth=2), libraries(scxml=True, depth=2))
 ATTRIBUTES = st.sampled_from(({}, {"n": 1}, {"n": 2}))
 
 

@@ -195,3 +195,13 @@ def test_the_situation_is_asked_with_the_variables_and_the_event():
     step(library, state, Event("go", {"n": 3}), situation)
     (asked,) = situation.asked
     assert asked[1:] == ("p", {"x": "cup1", "event.n": 3})
+
+
+def test_an_outcome_for_a_state_that_is_left_in_the_same_microstep_reaches_nobody():
+    run = Run(
+        plot("{plot: p, states: {h: {use: q, on: {e: away, out: wrong}}, away: {on: {out: wrong}}, wrong: }}"),
+        plot("{plot: q, emits: {out: }, states: {o: {regions: {r: {states: {a: {on: {e: {emit: out}}}}}, s: {states: {b: }}}}}}"),
+    )
+    run.start()
+    assert len(run.send("e").microsteps) == 1
+    assert run.active == ["away"]
