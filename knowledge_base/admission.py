@@ -24,7 +24,7 @@ def check_delta(delta: Delta, world: World) -> None:
     """
     admission = _Admission(delta, world)
     # Facts may be removed together with the things they are about.
-    before = _Admission(replace(delta, removed_nodes=()), world)
+    before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission
     for name, type_name in delta.nodes.items():
         admission.node(name, type_name)
     for fact in delta.added:

@@ -58,19 +58,13 @@ class Archive:
                                       "SELECT version FROM snapshots)").fetchone()[0]  # fmt: skip
             return self._world(connection, last)
 
-    def append(  # a reader has no use for what is to be written
-        self,
-        change: Change,
-        key: str | None,
-        before: WorldState,
-        along: Writer | None,  # noqa: ARG002
-    ) -> None:
+    def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:  # noqa: ARG002
         """Refused.
 
         Raises:
             ConflictError: always.
         """
-        raise ConflictError(f"{self._place}: the store was opened with read_only=True and cannot be changed")
+        raise self._only_read()
 
     def first(self, key: str) -> Change | None:
         """The change that was kept under that key."""
@@ -109,7 +103,7 @@ class Archive:
         Raises:
             ConflictError: always.
         """
-        raise ConflictError(f"{self._place}: the store was opened with read_only=True and cannot be changed")
+        raise self._only_read()
 
     def close(self) -> None:
         """Nothing is kept open."""
@@ -121,6 +115,9 @@ class Archive:
             return schema_of(json.loads(text))
         except FORM_ERRORS as error:
             self._unreadable("the schema", error)
+
+    def _only_read(self) -> ConflictError:
+        return ConflictError(f"{self._place}: the store was opened with read_only=True and cannot be changed")
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:

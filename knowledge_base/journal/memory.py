@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
+from typing import NamedTuple
 
 from knowledge_base.errors import StoreError
 from knowledge_base.facts import Change, Delta, Fact
@@ -19,13 +19,23 @@ MOST_KEYS = 10_000
 """How many idempotency keys are remembered."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Kept:
-    """A change, with the types and numbers that it overwrote or took away."""
+class _Taken(NamedTuple):
+    """What a change took away that it does not say itself."""
 
+    numbers: Sequence[float | None] = ()
+    """What its fluents were before, in its order; `None` is not set."""
+    types: Mapping[str, str] = {}
+    fluents: Mapping[Fact, float] = {}
+    """All numbers about the things that it removed."""
+
+
+class _Kept(NamedTuple):
     change: Change
-    types: Mapping[str, str]
-    numbers: Mapping[Fact, float]
+    size: int
+    taken: _Taken
+
+
+_NOTHING = _Taken()
 
 
 class MemoryHistory:
@@ -56,12 +66,13 @@ class MemoryHistory:
             raise StoreError("a knowledge base in memory has no file to write along into")
         if key is not None:
             self._remember(key, change)
-        if not change.delta:
+        size = len(change.delta)
+        if not size:
             return
-        kept = _Kept(change, *_overwritten(change.delta, before))
+        kept = _Kept(change, size, _taken(change.delta, before))
         with self._lock:
             self._kept.append(kept)
-            self._size += len(change.delta)
+            self._size += size
             while self._size > MOST_KEPT:
                 self._forget_oldest()
 
@@ -105,8 +116,8 @@ class MemoryHistory:
             raise gone(version, self._oldest[0])
 
     def _forget_oldest(self) -> None:
-        change = self._kept.popleft().change
-        self._size -= len(change.delta)
+        change, size, _ = self._kept.popleft()
+        self._size -= size
         self._oldest = (change.version, change.time)
 
     def _remember(self, key: str, change: Change) -> None:
@@ -115,27 +126,31 @@ class MemoryHistory:
             del self._keys[next(iter(self._keys))]
 
 
-def _overwritten(delta: Delta, before: WorldState) -> tuple[Mapping[str, str], Mapping[Fact, float]]:
-    numbers = before.values
-    lost = {fluent: numbers[fluent] for fluent in delta.values if fluent in numbers}
+def _taken(delta: Delta, before: WorldState) -> _Taken:
+    if not (delta.values or delta.removed_nodes):
+        return _NOTHING
+    numbers = list(map(before.values.get, delta.values))
     if not delta.removed_nodes:
-        return {}, lost
-    gone_things = set(delta.removed_nodes)
-    lost.update({f: n for f, n in numbers.items() if not gone_things.isdisjoint(f.args)})
-    return {name: before.nodes[name] for name in delta.removed_nodes}, lost
+        return _Taken(numbers)
+    things = set(delta.removed_nodes)
+    fluents = {f: n for f, n in before.values.items() if not things.isdisjoint(f.args)}
+    return _Taken(numbers, {name: before.nodes[name] for name in delta.removed_nodes}, fluents)
 
 
 def _undone(state: WorldState, later: list[_Kept]) -> WorldState:
     nodes, facts, values = dict(state.nodes), dict.fromkeys(state.facts), dict(state.values)
-    for kept in reversed(later):
-        delta = kept.change.delta
+    for change, _, taken in reversed(later):
+        delta = change.delta
         for fact in delta.added:
             del facts[fact]
         facts.update(dict.fromkeys(delta.removed))
         for name in delta.nodes:
             del nodes[name]
-        nodes.update(kept.types)
-        for fluent in delta.values:
-            del values[fluent]
-        values.update(kept.numbers)
+        nodes.update(taken.types)
+        for fluent, number in zip(delta.values, taken.numbers, strict=True):
+            if number is None:
+                del values[fluent]
+            else:
+                values[fluent] = number
+        values.update(taken.fluents)
     return WorldState.of(state.schema, nodes, facts, values)
