@@ -94,6 +94,7 @@ class Journal(Archive):
 
     def first(self, key: str) -> Change | None:
         """The change that was kept under that key; asked by the one who writes."""
+        _require_text(key)
         with reported(self._path, "read"):
             return self._by_key(self._connection, key)
 
