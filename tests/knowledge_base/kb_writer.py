@@ -1,20 +1,21 @@
 """A process that writes a store until it is killed, and says each version once it is acknowledged.
 
-Run as `python kb_writer.py STORE DURABILITY`. What it commits at each version follows from the version alone,
+What it commits at each version follows from the version alone,
 so that whoever looks at the store afterwards knows what must be in it.
 """
 
 from __future__ import annotations
 
-import sys
+from multiprocessing.connection import Connection
 from random import Random
 
-from kb_strategies import SCHEMA
-
-from knowledge_base import Delta, Fact, KnowledgeBase, fact
+from knowledge_base import Delta, Fact, KnowledgeBase, Schema, fact
 from knowledge_base.journal import journal
 
-LONGEST = 300
+SCHEMA = Schema.parse(
+    "(define (domain d) (:types cup) (:predicates (quiet) (level ?c - cup ?n - number)) (:functions (time)))"
+)
+LONGEST = 100
 """The most things that one change adds: some are longer than a page of the file, most are not."""
 
 
@@ -25,22 +26,18 @@ def change(version: int) -> Delta:
     cups = {f"cup-{version}-{n}": "cup" for n in range(count)}
     told = [fact("level", cup, version) for cup in cups]
     flip = {"added": (Fact("quiet"), *told)} if version % 2 else {"removed": (Fact("quiet"),), "added": tuple(told)}
-    old = tuple(f"cup-{version - 20}-{n}" for n in range(LONGEST)) if version > 20 else ()  # the world stays small
+    old = tuple(f"cup-{version - 9}-{n}" for n in range(LONGEST))  # so the world stays small
     return Delta(nodes=cups, values={Fact("time"): version}, removed_nodes=old, **flip)
 
 
-def write(path: str, durability: str) -> None:
-    """Commit one version after the other, with snapshots and, now and then, compaction."""
+def write(path: str, durability: str, acknowledge: Connection) -> None:
+    """Commit one version after the other, with snapshots and, now and then, compaction; never return."""
     journal.SNAPSHOT_AFTER = 20_000
     with KnowledgeBase.open(SCHEMA, path, durability) as kb:
-        print("open", flush=True)  # noqa: T201
+        acknowledge.send(kb.version)
         while True:
             version = kb.version + 1
             kb.apply(change(version), author="writer", key=str(version))
-            print(version, flush=True)  # noqa: T201
+            acknowledge.send(version)
             if version % 97 == 0:
                 kb.compact(keep_since=version - 50)
-
-
-if __name__ == "__main__":
-    write(*sys.argv[1:])
