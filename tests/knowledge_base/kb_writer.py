@@ -21,13 +21,17 @@ LONGEST = 100
 
 def change(version: int) -> Delta:
     """The change that makes that version; it always changes something."""
-    random = Random(version)  # noqa: S311
-    count = random.choice([1, 1, 1, 3, LONGEST])
-    cups = {f"cup-{version}-{n}": "cup" for n in range(count)}
+    cups = cups_of(version)
     told = [fact("level", cup, version) for cup in cups]
     flip = {"added": (Fact("quiet"), *told)} if version % 2 else {"removed": (Fact("quiet"),), "added": tuple(told)}
-    old = tuple(f"cup-{version - 9}-{n}" for n in range(LONGEST))  # so the world stays small
-    return Delta(nodes=cups, values={Fact("time"): version}, removed_nodes=old, **flip)
+    old = cups_of(version - 9)  # they are taken away, so that the world stays small
+    return Delta(nodes=dict.fromkeys(cups, "cup"), values={Fact("time"): version}, removed_nodes=old, **flip)
+
+
+def cups_of(version: int) -> tuple[str, ...]:
+    """The things that come with a version."""
+    count = Random(version).choice([1, 1, 1, 1, 1, 1, 3, LONGEST])  # noqa: S311
+    return tuple(f"cup-{version}-{n}" for n in range(count))
 
 
 def write(path: str, durability: str, acknowledge: Connection) -> None:
