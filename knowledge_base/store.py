@@ -136,7 +136,7 @@ class KnowledgeBase(View):
             ConflictError: the version is not the expected one, or this thread is inside another transaction.
             StoreError: the file cannot be written; nothing was changed.
         """
-        with self._delivery(), self._lock:
+        with self._lock:
             self._refuse_nesting()
             first = self._first(key, expect)
             transaction = Transaction(Overlay(self._state), self._questions, first)
@@ -148,6 +148,7 @@ class KnowledgeBase(View):
                 transaction.close()
             if first is None:
                 transaction.change = self._commit(transaction.delta, author, key, along)
+        self._announcer.deliver()
 
     def apply(
         self,
@@ -170,14 +171,15 @@ class KnowledgeBase(View):
             ConflictError: the version is not the expected one, or this thread is inside a transaction.
             StoreError: the file cannot be written; nothing was changed.
         """
-        with self._delivery(), self._lock:
+        with self._lock:
             self._refuse_nesting()
-            first = self._first(key, expect)
-            if first is not None:
-                return first
-            pending = Overlay(self._state)
-            pending.apply(delta)
-            return self._commit(pending.delta, author, key, along)
+            change = self._first(key, expect)
+            if change is None:
+                pending = Overlay(self._state)
+                pending.apply(delta)
+                change = self._commit(pending.delta, author, key, along)
+        self._announcer.deliver()
+        return change
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` with every committed change from now on; the function returned ends that.
@@ -228,12 +230,6 @@ class KnowledgeBase(View):
             version = self._version if keep_since is None else keep_since
             self._require_reached(version)
             self._history.compact(version, self._present)
-
-    @contextmanager
-    def _delivery(self) -> Iterator[None]:
-        """Announces what was committed once the lock inside is released."""
-        yield
-        self._announcer.deliver()
 
     def _first(self, key: str | None, expect: int | None) -> Change | None:
         """The change that `key` stands for already; only a new one must meet the expected version."""
