@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check conformance soak bench-startup bench-broken bench-engine pictures clean
+.PHONY: help demo test check conformance soak kill-kb bench-startup bench-broken bench-engine pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -40,6 +40,9 @@ conformance: $(VENV)/.test   ## SCION's SCXML charts, fetched with npm into .con
 
 soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every report true? (SEEDS=N FAULTS=P)
 	$(BIN)/python benchmarks/clean_up_seeds.py --seeds $(or $(SEEDS),200) --faults $(or $(FAULTS),0.2)
+
+kill-kb: $(VENV)/.test   ## kill -9 a process that writes a store, for each durability: is all that it acknowledged there? (KILLS=N)
+	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/test_kb_kill.py
 
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py

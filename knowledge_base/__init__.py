@@ -8,10 +8,13 @@ from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
     from knowledge_base.errors import ConflictError as ConflictError
+    from knowledge_base.errors import HistoryError as HistoryError
     from knowledge_base.errors import InputError as InputError
     from knowledge_base.errors import ParseError as ParseError
     from knowledge_base.errors import Place as Place
     from knowledge_base.errors import SchemaError as SchemaError
+    from knowledge_base.errors import SchemaMismatchError as SchemaMismatchError
+    from knowledge_base.errors import StoreError as StoreError
     from knowledge_base.errors import UnknownNameError as UnknownNameError
     from knowledge_base.facts import Change as Change
     from knowledge_base.facts import Delta as Delta
@@ -22,14 +25,15 @@ if TYPE_CHECKING:
     from knowledge_base.schema import Schema as Schema
     from knowledge_base.schema import Signature as Signature
     from knowledge_base.state import WorldState as WorldState
-    from knowledge_base.store import Binding as Binding
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
     from knowledge_base.transaction import Transaction as Transaction
+    from knowledge_base.view import Binding as Binding
+    from knowledge_base.view import View as View
 
 __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
     {
-        "Binding": "store",
+        "Binding": "view",
         "Change": "facts",
         "ConflictError": "errors",
         "Delta": "facts",
@@ -46,6 +50,10 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "UnknownNameError": "errors",
         "Value": "facts",
         "WorldState": "state",
+        "HistoryError": "errors",
+        "StoreError": "errors",
+        "SchemaMismatchError": "errors",
+        "View": "view",
         "fact": "facts",
     },
 )

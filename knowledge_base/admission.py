@@ -24,7 +24,7 @@ def check_delta(delta: Delta, world: World) -> None:
     """
     admission = _Admission(delta, world)
     # Facts may be removed together with the things they are about.
-    before = _Admission(replace(delta, removed_nodes=()), world)
+    before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission
     for name, type_name in delta.nodes.items():
         admission.node(name, type_name)
     for fact in delta.added:
@@ -64,6 +64,8 @@ class _Admission:
         if known is not None and self.schema.fits(known, wanted):
             return
         if value_fits(value, wanted):
+            if not isinstance(value, str):
+                _require_finite(value, f"the argument '?{parameter.name}' of {fact.predicate}")
             return
         expected = f"the argument '?{parameter.name}' of {fact} is of type {' or '.join(wanted)}"
         if known is not None:
@@ -87,5 +89,13 @@ class _Admission:
     def number(self, fluent: Fact, number: float) -> None:
         if isinstance(number, bool) or not isinstance(number, int | float):
             raise SchemaError(f"{fluent} is a number, not {number!r}")
-        if not math.isfinite(number):
-            raise InputError(f"{fluent} is a finite number, not {number}")
+        _require_finite(number, str(fluent))
+
+
+def _require_finite(number: float, what: str) -> None:
+    try:
+        if math.isfinite(number):
+            return
+    except OverflowError:
+        raise InputError(f"{what} is a number of at most 1e308") from None
+    raise InputError(f"{what} is a finite number, not {number}")

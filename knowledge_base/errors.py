@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import heapq
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -126,3 +126,24 @@ class SchemaError(InputError):
 
 class ConflictError(Exception):
     """A transaction met a world that is not the one it was written for; nothing was changed."""
+
+
+class StoreError(InputError):
+    """A store's file cannot be opened, read or written; what was acknowledged before is untouched."""
+
+
+class SchemaMismatchError(SchemaError):
+    """What was written with one schema is read with another that is not an extension of it.
+
+    Attributes:
+        differences: what is missing or declared otherwise, one sentence each.
+    """
+
+    def __init__(self, differences: Sequence[str], *, place: Place | None = None) -> None:
+        more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
+        super().__init__(f"the schema is another one: {'; '.join(differences[:3])}{more}", place=place)
+        self.differences = tuple(differences)
+
+
+class HistoryError(InputError):
+    """A version or time that is not kept, or not there yet."""

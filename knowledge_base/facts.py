@@ -52,6 +52,10 @@ class Delta:
         """Whether it says anything at all."""
         return bool(self.nodes or self.removed or self.added or self.values or self.removed_nodes)
 
+    def __len__(self) -> int:
+        """How many things, facts and numbers it names."""
+        return len(self.nodes) + len(self.removed) + len(self.added) + len(self.values) + len(self.removed_nodes)
+
     def then(self, later: Delta) -> Delta:
         """This change followed by `later`, as one change."""
         undone, gone = set(later.removed), set(later.removed_nodes)
@@ -75,8 +79,10 @@ class Change:
         version: the knowledge base's version after it; versions count up by one.
         author: who changed it, e.g. a component's name.
         delta: the effective change.
+        time: when, in seconds of the knowledge base's clock; it never runs backwards. Not compared.
     """
 
     version: int
     author: str
     delta: Delta
+    time: float = field(default=0.0, compare=False)

@@ -78,6 +78,8 @@ class FactIndex:
         if fact.args not in known:
             return
         del known[fact.args]
+        if not known:  # so that the facts alone say in which order the predicates come
+            del self._facts[fact.predicate]
         for key in _keys(fact):
             listed = self._by_argument[key]
             del listed[fact.args]

@@ -97,11 +97,11 @@ class Overlay:
         return None if name in self._gone else self._base.type_of(name)
 
     def _base_value(self, fluent: Fact) -> float:
-        begins_anew = any(a in self._gone for a in fluent.args)
+        begins_anew = self._gone and not self._gone.keys().isdisjoint(fluent.args)
         return 0 if begins_anew else self._base.value(fluent.predicate, fluent.args)
 
     def _add(self, fact: Fact) -> None:
-        if any(a in self._gone for a in fact.args):  # went with its thing, so it has to be said again
+        if self._gone and not self._gone.keys().isdisjoint(fact.args):  # went with its thing, so it is said again
             self._added.add(fact)
         elif fact in self._removed:
             del self._removed[fact]

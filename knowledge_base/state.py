@@ -21,6 +21,28 @@ class WorldState:
         for name, type_name in schema.constants.items():
             self._add_node(name, type_name)
 
+    @classmethod
+    def of(
+        cls, schema: Schema, nodes: Mapping[str, str], facts: Iterable[Fact], values: Mapping[Fact, float]
+    ) -> WorldState:
+        """The state with exactly these things (constants too), facts and numbers, which fit the schema.
+
+        Their order is the order of insertion.
+        """
+        state = cls(schema)
+        state._types = {}
+        state._members = {t: {} for t in schema.types}
+        for name, type_name in nodes.items():
+            state._add_node(name, type_name)
+        for fact in facts:
+            state._facts.add(fact)
+        state._values = dict(values)
+        return state
+
+    def __len__(self) -> int:
+        """How many things, facts and numbers it holds."""
+        return len(self._types) + len(self._facts) + len(self._values)
+
     @property
     def schema(self) -> Schema:
         """What may be said about it."""

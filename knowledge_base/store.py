@@ -2,125 +2,184 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import time as wall
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import RLock, get_ident
+from pathlib import Path
+from threading import get_ident
+from types import TracebackType
+from typing import Self
 
 from knowledge_base.announcement import Announcer, Listener
-from knowledge_base.errors import ConflictError
-from knowledge_base.facts import Change, Delta, Fact, Value
-from knowledge_base.language.evaluation import Explanation, explain, holds, query
-from knowledge_base.language.expression import Expression
+from knowledge_base.errors import ConflictError, HistoryError, InputError
+from knowledge_base.exchange.json import read_json
+from knowledge_base.facts import Change, Delta
+from knowledge_base.journal.archive import Archive
+from knowledge_base.journal.file import Durability
+from knowledge_base.journal.history import History, Version, Writer
+from knowledge_base.journal.journal import Journal
+from knowledge_base.journal.memory import MemoryHistory
 from knowledge_base.overlay import Overlay
-from knowledge_base.questions import Questions
 from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
 from knowledge_base.transaction import Transaction
-from knowledge_base.world_graph import Graph, WorldGraph
+from knowledge_base.view import View
+from knowledge_base.world_graph import WorldGraph
 
-Binding = dict[str, Value]
-"""One answer of a query: variables' names (without `?`) with their values."""
+Clock = Callable[[], float]
+"""Tells the time in seconds."""
 
 
-class KnowledgeBase:
+class KnowledgeBase(View):
     """A world model that may be asked and changed from several threads.
 
     One lock orders everything: a question sees one version and its answer is a finished list; a change is
     made as a whole or, with an error, not at all. Listeners are called when the lock is released.
 
-    It is itself a `World` (`schema`, `holds`, `match`, `value`, `objects`, `type_of`).
+    Made like this it is in memory only and remembers its last changes; `open` makes one that lasts.
+
+    Args:
+        schema: what may be said.
+        clock: gives the time of changes, in seconds.
+        history: what it goes on from and where its changes are kept; the schema is that of the history then.
     """
 
-    def __init__(self, schema: Schema) -> None:
-        self._lock = RLock()
-        self._state = WorldState(schema)
-        self._graph = WorldGraph(schema)
-        self._questions = Questions()
+    def __init__(self, schema: Schema, clock: Clock = wall.time, history: History | None = None) -> None:
+        self._history = history or MemoryHistory(Version(WorldState(schema), 0, clock()))
+        start = self._history.newest()
+        super().__init__(start.state, start.version)
+        self._graph: WorldGraph = WorldGraph(start.state)
         self._announcer = Announcer(self._lock)
-        self._version = 0
+        self._clock = clock
+        self._time = start.time
         self._writer: tuple[int, str] | None = None
 
-    @property
-    def schema(self) -> Schema:
-        """What may be said."""
-        return self._state.schema
-
-    @property
-    def version(self) -> int:
-        """How many changes were committed."""
-        return self._version
-
-    @property
-    def graph(self) -> Graph:
-        """The world as a graph, live and read-only; see `world_graph` for its form.
-
-        It follows every commit; other threads must not commit while it is being walked.
-        """
-        return self._graph.view
-
-    def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[Binding]:
-        """The values of the free variables that make the text true, each choice once.
+    @classmethod
+    def open(
+        cls,
+        schema: Schema | None,
+        path: str | Path | None = None,
+        durability: Durability | None = None,
+        clock: Clock = wall.time,
+        *,
+        read_only: bool = False,
+    ) -> KnowledgeBase:
+        """A knowledge base in memory, or one that lasts in a file; close it, or use it in a `with` block.
 
         Args:
-            text: a condition such as `(and (on ?o ?table) (cup ?o))`.
-            params: variables that have a value already; they are not part of the answers.
+            schema: what may be said; for a file that is there already `None` takes what it was written with,
+                and an extension of that (more declarations, none changed) is accepted and recorded.
+            path: the store's file, made when it is not there; `None` keeps everything in memory.
+            durability: what a committed change outlives: "memory" nothing (without a path), "process" the
+                death of this process by whatever means (the default with a path), "power" a power cut too.
+            clock: gives the time of changes, in seconds.
+            read_only: look at a store, as it is now, that another process may be writing.
 
         Raises:
-            ParseError: the text is no condition.
-            UnknownNameError: an undeclared predicate, function or type, or a thing that is not there.
-            SchemaError: a wrong number of arguments or a type that can never fit.
-            InputError: a variable occurs only under `not` or in a comparison.
+            StoreError: the file cannot be read or written, is no store, or somebody else is writing it.
+            SchemaMismatchError: the file was written with a schema that this one does not extend.
+            InputError: there is no schema, or path and durability contradict each other.
         """
-        params = params or {}
-        with self._lock:
-            return query(self._questions.query(text, params, self._state), self._state, params)
+        if path is None:
+            if schema is None or durability not in (None, "memory") or read_only:
+                raise InputError("a knowledge base without a file has a schema and durability 'memory'")
+            return cls(schema, clock)
+        if durability == "memory":
+            raise InputError(f"with the file '{path}' durability is 'process' or 'power', not 'memory'")
+        file = Path(path).resolve()
+        archive = Archive(file, schema) if read_only else Journal(file, schema, durability or "process", clock)
+        try:
+            return cls(archive.schema, clock, archive)
+        except BaseException:
+            archive.close()
+            raise
 
-    def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
-        """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
-        params = params or {}
-        with self._lock:
-            return holds(self._questions.condition(text, params, self._state), self._state, params)
+    @classmethod
+    def from_json(
+        cls, text_or_path: str | Path, schema: Schema | None = None, clock: Clock = wall.time
+    ) -> KnowledgeBase:
+        """What `to_json` wrote, from its text or a file (a `Path`), at the same version, in memory.
 
-    def explain(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> Explanation:
-        """Why the text is true or false; errors as for `ask`."""
-        params = params or {}
+        Raises:
+            InputError: as `exchange.json.read_json`.
+        """
+        state, version = read_json(text_or_path, schema)
+        return cls(state.schema, clock, MemoryHistory(Version(state, version, clock())))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give back the file, if there is one; nothing can be changed then. What was committed is in it already."""
         with self._lock:
-            return explain(self._questions.condition(text, params, self._state), self._state, params)
+            self._history.close()
 
     @contextmanager
-    def transaction(self, author: str) -> Iterator[Transaction]:
+    def transaction(
+        self, author: str, *, expect: int | None = None, key: str | None = None, along: Writer | None = None
+    ) -> Iterator[Transaction]:
         """Several changes as one: committed when the block ends, dropped when it raises.
 
-        Other threads wait until the block is left.
+        Other threads wait until the block is left. A block with a `key` that was committed before runs, but
+        changes nothing: the transaction's `change` is the first one's from the beginning.
+
+        Args:
+            author: who changes it.
+            expect: the version that the world must have at the beginning.
+            key: a name for this change, by which a repetition is known, also after a restart.
+            along: writes more rows into the store's file in the same SQLite transaction.
 
         Raises:
-            ConflictError: this thread is inside another transaction.
+            ConflictError: the version is not the expected one, or this thread is inside another transaction.
+            StoreError: the file cannot be written; nothing was changed.
         """
-        with self._delivery(), self._lock:
+        with self._lock:
             self._refuse_nesting()
-            transaction = Transaction(Overlay(self._state), self._questions)
+            first = self._first(key, expect)
+            transaction = Transaction(Overlay(self._state), self._questions, first)
             self._writer = (get_ident(), author)
             try:
                 yield transaction
             finally:
                 self._writer = None
                 transaction.close()
-            self._commit(transaction.delta, author)
+            if first is None:
+                transaction.change = self._commit(transaction.delta, author, key, along)
+        self._announcer.deliver()
 
-    def apply(self, delta: Delta, author: str) -> Change:
+    def apply(
+        self,
+        delta: Delta,
+        author: str,
+        *,
+        expect: int | None = None,
+        key: str | None = None,
+        along: Writer | None = None,
+    ) -> Change:
         """Commit `delta` as a whole; the change returned holds what really became different.
+
+        Arguments as for `transaction`; with a `key` that was committed before, that change is returned and
+        nothing is changed.
 
         Raises:
             UnknownNameError: an undeclared type, predicate or function, or a thing that is not there.
             SchemaError: a wrong number of arguments or a wrong type.
             InputError: a number that is not finite.
-            ConflictError: this thread is inside a transaction.
+            ConflictError: the version is not the expected one, or this thread is inside a transaction.
+            StoreError: the file cannot be written; nothing was changed.
         """
-        with self._delivery(), self._lock:
+        with self._lock:
             self._refuse_nesting()
-            pending = Overlay(self._state)
-            pending.apply(delta)
-            return self._commit(pending.delta, author)
+            change = self._first(key, expect)
+            if change is None:
+                pending = Overlay(self._state)
+                pending.apply(delta)
+                change = self._commit(pending.delta, author, key, along)
+        self._announcer.deliver()
+        return change
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` with every committed change from now on; the function returned ends that.
@@ -131,74 +190,72 @@ class KnowledgeBase:
         """
         return self._announcer.subscribe(listener)
 
-    def overlay(self) -> Overlay:
-        """A world of pending changes on top of this one, which stays as it is."""
-        return Overlay(self)
+    def at(self, *, version: int | None = None, time: float | None = None) -> View:
+        """The world as it was, to be asked like this one.
 
-    def snapshot(self) -> WorldState:
-        """The world as it is now, as a copy that nothing changes."""
-        with self._lock:
-            return self._state.copy()
-
-    def facts(self) -> list[Fact]:
-        """All facts, predicate by predicate, in order of insertion."""
-        with self._lock:
-            return list(self._state.facts)
-
-    def values(self) -> dict[Fact, float]:
-        """The numeric fluents that were set."""
-        with self._lock:
-            return dict(self._state.values)
-
-    def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
-        """Whether the fact is true."""
-        with self._lock:
-            return self._state.holds(predicate, args)
-
-    def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> list[tuple[Value, ...]]:
-        """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
-        with self._lock:
-            return list(self._state.match(predicate, pattern))
-
-    def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """At most how many facts agree with `pattern`, without looking through them."""
-        with self._lock:
-            return self._state.estimate(predicate, pattern)
-
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value; 0 until it is set."""
-        with self._lock:
-            return self._state.value(function, args)
-
-    def objects(self, type_name: str) -> list[str]:
-        """The things of that type or a subtype, in order of insertion.
+        Args:
+            version: after so many changes.
+            time: in seconds of the clock; what was changed at that very time counts.
 
         Raises:
-            UnknownNameError: there is no such type.
+            HistoryError: that is not kept any more (`compact`; in memory the last 10,000 things, facts and
+                numbers changed are kept), or it is not there yet.
+            InputError: not exactly one of the two is given.
+        """
+        if (version is None) == (time is None):
+            raise InputError("at(...) takes a version or a time")
+        if version is None:
+            version = min(self._history.version_at(time or 0.0), self._version)
+        self._require_reached(version)
+        return View(self._history.state(version, self._present), version)
+
+    def changes(self, since: int = 0, until: int | None = None) -> list[Change]:
+        """The changes after version `since`, up to that which made version `until` (default: all).
+
+        Raises:
+            HistoryError: some of them are not kept any more, or are not there yet.
+        """
+        newest = self._version
+        self._require_reached(max(since, until or 0))
+        return self._history.changes(since, newest if until is None else until)
+
+    def compact(self, keep_since: int | None = None) -> None:
+        """Forget what only versions before `keep_since` need (default: the present one); keys are remembered.
+
+        Raises:
+            HistoryError: that version is not kept any more or not there yet.
+            StoreError: the file cannot be written.
         """
         with self._lock:
-            return self._state.objects(type_name)
+            version = self._version if keep_since is None else keep_since
+            self._require_reached(version)
+            self._history.compact(version, self._present)
 
-    def type_of(self, name: str) -> str | None:
-        """The thing's type; `None` if there is no such thing."""
-        with self._lock:
-            return self._state.type_of(name)
+    def _first(self, key: str | None, expect: int | None) -> Change | None:
+        """The change that `key` stands for already; only a new one must meet the expected version."""
+        first = None if key is None else self._history.first(key)
+        if first is None and expect is not None and expect != self._version:
+            raise ConflictError(f"version {expect} is expected, but the world is at version {self._version}")
+        return first
 
-    @contextmanager
-    def _delivery(self) -> Iterator[None]:
-        """Announces what was committed once the lock inside is released."""
-        yield
-        self._announcer.deliver()
-
-    def _commit(self, effective: Delta, author: str) -> Change:
-        if not effective:
-            return Change(self._version, author, effective)
-        self._state.commit(effective)
-        self._graph.commit(effective)
-        self._version += 1
-        change = Change(self._version, author, effective)
-        self._announcer.add(change)
+    def _commit(self, effective: Delta, author: str, key: str | None, along: Writer | None) -> Change:
+        self._time = max(self._time, self._clock())
+        change = Change(self._version + bool(effective), author, effective, self._time)
+        self._history.append(change, key, self._state, along)
+        if effective:
+            self._state.commit(effective)
+            self._graph.commit(effective)
+            self._version = change.version
+            self._announcer.add(change)
         return change
+
+    def _present(self) -> Version:
+        with self._lock:
+            return Version(self._state.copy(), self._version, self._time)
+
+    def _require_reached(self, version: int) -> None:
+        if version > self._version:
+            raise HistoryError(f"version {version} is not there yet; the newest is {self._version}")
 
     def _refuse_nesting(self) -> None:
         if self._writer is not None and self._writer[0] == get_ident():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from knowledge_base.errors import ConflictError, InputError, UnknownNameError
-from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.facts import Change, Delta, Fact, Value
 from knowledge_base.language.evaluation import holds, query
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
@@ -16,12 +16,18 @@ class Transaction:
     """The changes of one `with kb.transaction(...)` block; errors are raised where the mistake is made.
 
     Questions asked of it see its own changes; nobody else does before it is committed.
+
+    Attributes:
+        change: what was committed; `None` before the block has ended. When the block's key was committed
+            before, it is that change from the beginning, and what the block says has no effect.
     """
 
-    def __init__(self, view: Overlay, questions: Questions) -> None:
+    def __init__(self, view: Overlay, questions: Questions, first: Change | None = None) -> None:
         self._view = view
         self._questions = questions
         self._closed = False
+        self._repeated = first is not None
+        self.change = first
 
     @property
     def delta(self) -> Delta:
@@ -43,7 +49,7 @@ class Transaction:
         Raises:
             UnknownNameError: there is no such thing.
         """
-        if self._view.type_of(name) is None:
+        if self._view.type_of(name) is None and not self._repeated:
             raise UnknownNameError(f"there is no object '{name}'", found=name, valid=self._view.objects("object"))
         self.apply(Delta(removed_nodes=(name,)))
 
@@ -84,7 +90,8 @@ class Transaction:
         """
         if self._closed:
             raise ConflictError("the transaction is over; changes are made inside its 'with' block")
-        self._view.apply(delta)
+        if not self._repeated:  # the world may have moved on since, so it is not even checked
+            self._view.apply(delta)
 
     def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[dict[str, Value]]:
         """As `KnowledgeBase.query`, with the changes so far."""

@@ -15,7 +15,8 @@ from typing import Any, TypeAlias
 import networkx as nx
 
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.schema import VALUE_TYPES, Schema, Signature
+from knowledge_base.schema import VALUE_TYPES, Signature
+from knowledge_base.state import WorldState
 
 Graph: TypeAlias = "nx.MultiDiGraph[Any]"
 
@@ -23,12 +24,12 @@ Graph: TypeAlias = "nx.MultiDiGraph[Any]"
 class WorldGraph:
     """Keeps the graph in step with committed changes."""
 
-    def __init__(self, schema: Schema) -> None:
-        self._schema = schema
+    def __init__(self, state: WorldState) -> None:
+        self._schema = state.schema
         self._graph: Graph = nx.MultiDiGraph()
         self.view: Graph = self._graph.copy(as_view=True)
         """The graph, live and read-only."""
-        self._graph.add_nodes_from((name, {"type": t}) for name, t in schema.constants.items())
+        self.commit(Delta(nodes=state.nodes, added=tuple(state.facts), values=state.values))
 
     def commit(self, effective: Delta) -> None:
         """Make a change that lists exactly what becomes different."""

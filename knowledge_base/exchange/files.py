@@ -17,7 +17,7 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise InputError(f"there is no file '{path}'", found=path.name, valid=_beside(path)) from None
+        raise InputError(f"there is no file '{path}'", found=path.name, valid=files_beside(path)) from None
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise ParseError("the file is not UTF-8 text", place=Place(str(path), line)) from None
@@ -38,7 +38,8 @@ def text_and_source(text_or_path: str | Path, source: str | None) -> tuple[str, 
     return read_text(path), source or str(path)
 
 
-def _beside(path: Path) -> list[str]:
+def files_beside(path: Path) -> list[str]:
+    """The names of the files with the same ending in the same folder: what may have been meant."""
     try:
         return [p.name for p in path.parent.iterdir() if p.suffix == path.suffix]
     except OSError:

@@ -144,6 +144,12 @@ def deltas() -> st.SearchStrategy[Delta]:
     return st.builds(Delta, nodes=st.just(THINGS), removed=some, added=some, values=values)
 
 
+def removals() -> st.SearchStrategy[Delta]:
+    """Changes that take `THINGS` away."""
+    some_things = st.lists(st.sampled_from(["cup1", "cup2", "shelf"]), max_size=2).map(tuple)
+    return st.builds(Delta, removed_nodes=some_things)
+
+
 # --- the slow evaluator
 
 _COMPARE = {"=": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt,

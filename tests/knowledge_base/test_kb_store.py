@@ -8,7 +8,8 @@ import networkx as nx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kb_strategies import SCHEMA, THINGS, deltas
+from kb_strategies import SCHEMA, THINGS, deltas, removals
+from kb_worlds import graph_content
 
 from knowledge_base import ConflictError, Delta, Fact, InputError, KnowledgeBase, Overlay, fact
 
@@ -33,24 +34,11 @@ def described(world) -> tuple:
     return facts, things, [world.value(f[0], tuple(f[1:])) for f in fluents], list(map(world.type_of, THINGS))
 
 
-def graph_content(graph: nx.MultiDiGraph) -> tuple[dict, set[Fact], dict[Fact, float]]:
-    """Things, facts and numbers as the documented form of the graph says them."""
-    said = [(node, data.get("value")) for node, data in graph.nodes(data=True) if isinstance(node, Fact)]
-    for start, end, key, data in graph.edges(keys=True, data=True):
-        if isinstance(key, str):
-            signature = SCHEMA.predicates.get(key) or SCHEMA.functions[key]
-            said.append((Fact(key, (start, end)[: signature.arity]), data.get("value")))
-    things = {n: data["type"] for n, data in graph.nodes(data=True) if not isinstance(n, Fact)}
-    return things, {f for f, v in said if v is None}, {f: v for f, v in said if v is not None}
-
-
-some_things = st.lists(st.sampled_from(["cup1", "cup2", "shelf"]), max_size=2).map(tuple)
-removals = st.builds(Delta, removed_nodes=some_things)
 START = Delta(nodes=THINGS, added=(fact("on", "cup1", "shelf"), fact("heavy", "cup2")))
 
 
 @settings(max_examples=60)
-@given(st.lists(deltas() | removals, max_size=6))
+@given(st.lists(deltas() | removals(), max_size=6))
 def test_graph_and_index_agree_at_every_version(changes) -> None:
     kb = KnowledgeBase(SCHEMA)
     for change in changes:
@@ -68,7 +56,7 @@ def test_graph_and_index_agree_at_every_version(changes) -> None:
 
 
 @settings(max_examples=60)
-@given(st.lists(deltas() | removals, max_size=4))
+@given(st.lists(deltas() | removals(), max_size=4))
 def test_an_overlay_says_what_the_store_would(changes) -> None:
     kb, other = KnowledgeBase(SCHEMA), KnowledgeBase(SCHEMA)
     kb.apply(START, author="test")
@@ -90,7 +78,7 @@ def test_an_overlay_says_what_the_store_would(changes) -> None:
 
 
 @settings(max_examples=60)
-@given(st.lists(deltas() | removals, max_size=4))
+@given(st.lists(deltas() | removals(), max_size=4))
 def test_the_announced_changes_rebuild_the_world(changes) -> None:
     kb, mirror = KnowledgeBase(SCHEMA), KnowledgeBase(SCHEMA)
     kb.subscribe(lambda change: mirror.apply(change.delta, change.author))
@@ -101,7 +89,7 @@ def test_the_announced_changes_rebuild_the_world(changes) -> None:
 
 
 @settings(max_examples=60)
-@given(deltas() | removals, deltas() | removals)
+@given(deltas() | removals(), deltas() | removals())
 def test_one_change_after_the_other_is_their_composition(first, second) -> None:
     one, two = KnowledgeBase(SCHEMA), KnowledgeBase(SCHEMA)
     for kb in (one, two):

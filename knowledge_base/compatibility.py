@@ -1,0 +1,62 @@
+"""Whether what was written with one schema can be read with another: when nothing was taken away or changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from knowledge_base.errors import Place, SchemaMismatchError, nearest
+from knowledge_base.facts import Delta
+from knowledge_base.schema import ROOT_TYPE, Schema, Signature
+from knowledge_base.state import WorldState
+
+
+def require_extension(written: Schema, given: Schema, place: Place | None = None) -> None:
+    """Raise an error unless `given` declares all that `written` does, and that alike.
+
+    New types, constants, predicates and functions are welcome; parameters' names do not matter.
+
+    Raises:
+        SchemaMismatchError: each difference is named, with the nearest name of `given` for a missing one.
+    """
+    found = [
+        *_differences("type", written.types, given.types),
+        *_differences("constant", written.constants, given.constants),
+        *_differences("predicate", _shapes(written.predicates), _shapes(given.predicates)),
+        *_differences("function", _shapes(written.functions), _shapes(given.functions)),
+    ]
+    if found:
+        raise SchemaMismatchError(found, place=place)
+
+
+def missing_constants(state: WorldState, place: Place | None = None) -> Delta:
+    """The change that adds those constants that the schema got after the world was written.
+
+    Raises:
+        SchemaMismatchError: a thing of that name is there already, and of another type.
+    """
+    known, constants = state.nodes, state.schema.constants
+    wrong = [
+        f"the constant '{name}' is a thing of type '{known[name]}' there, not '{type_name}'"
+        for name, type_name in constants.items()
+        if known.get(name, type_name) != type_name
+    ]
+    if wrong:
+        raise SchemaMismatchError(wrong, place=place)
+    return Delta(nodes={name: t for name, t in constants.items() if name not in known})
+
+
+def _differences(kind: str, written: Mapping[str, str | None], given: Mapping[str, str | None]) -> Iterator[str]:
+    for name, declared in written.items():
+        if name not in given:
+            meant = nearest(name, given.keys() - written.keys())
+            yield f"the {kind} '{name}' is missing" + (f" (nearest: '{meant}')" if meant else "")
+        elif given[name] != declared:
+            yield f"the {kind} '{name}' was declared '{declared}', now it is '{given[name]}'"
+
+
+def _shapes(signatures: Mapping[str, Signature]) -> dict[str, str | None]:
+    """What a declaration means, in words: the types of its arguments."""
+    return {
+        name: " ".join([name, *("/".join(p.types or (ROOT_TYPE,)) for p in signature.parameters)])
+        for name, signature in signatures.items()
+    }

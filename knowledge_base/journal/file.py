@@ -1,0 +1,118 @@
+"""The SQLite file of a store: its tables, how it is opened, and what its errors mean to people.
+
+`changes` is the journal, one row a version. `snapshots` are whole worlds, the oldest of which is where the
+journal begins. `keys` leads from idempotency keys to changes; its own `delta` is null while the change is in
+the journal. `schemas` are the declarations used, each since a version. JSON as in `exchange.forms`.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal
+
+from knowledge_base.errors import Place, StoreError
+from knowledge_base.exchange.files import files_beside
+
+Durability = Literal["memory", "process", "power"]
+"""What a commit outlives: nothing; the death of the process; a power cut (as far as the disk is honest)."""
+
+APPLICATION_ID = 0x6473636B  # "dsck", by which a file is known as ours (SQLite's application_id)
+FORMAT = 1
+PATIENCE_S = 1.0
+"""How long to wait for others who lock the file; there should be none."""
+
+_SYNCHRONOUS = {"process": "NORMAL", "power": "FULL"}  # in WAL mode only FULL waits for the disk in each commit
+
+_TABLES = (
+    "CREATE TABLE schemas (version INTEGER NOT NULL, hash TEXT NOT NULL, declarations TEXT NOT NULL)",
+    "CREATE TABLE changes (version INTEGER PRIMARY KEY, time REAL NOT NULL, author TEXT NOT NULL, delta TEXT NOT NULL)",
+    "CREATE TABLE snapshots (version INTEGER PRIMARY KEY, time REAL NOT NULL, world TEXT NOT NULL)",
+    """CREATE TABLE keys (key TEXT PRIMARY KEY, version INTEGER NOT NULL, time REAL NOT NULL, author TEXT NOT NULL,
+        delta TEXT) WITHOUT ROWID""",
+    f"PRAGMA application_id = {APPLICATION_ID}",
+    f"PRAGMA user_version = {FORMAT}",
+)
+
+
+@contextmanager
+def reported(path: Path, doing: str) -> Iterator[None]:
+    """Turns SQLite's errors into a `StoreError` that says what could not be done to which file."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise StoreError(f"cannot {doing} the store: {error}", place=Place(str(path))) from error
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[sqlite3.Connection]:
+    """A connection that sees one version of the file, whatever is written meanwhile.
+
+    Raises:
+        StoreError: the file is not there, not a store, or cannot be read.
+    """
+    if not path.exists():
+        beside = files_beside(path)
+        raise StoreError(f"there is no store '{path.name}'", place=Place(str(path)), found=path.name, valid=beside)
+    with reported(path, "read"):
+        connection = _connect(path, "ro")
+        try:
+            connection.execute("BEGIN")
+            require_store(connection, path)
+            yield connection
+        finally:
+            connection.close()
+
+
+def writing(path: Path, durability: Durability) -> sqlite3.Connection:
+    """A connection to write with; the file is made when it is not there, still without tables.
+
+    Raises:
+        StoreError: it cannot be opened or made, or is something else than a store.
+    """
+    with reported(path, "open"):
+        connection = _connect(path, "rwc")
+        try:
+            if is_new(connection):
+                connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
+            else:
+                require_store(connection, path)
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute(f"PRAGMA synchronous = {_SYNCHRONOUS[durability]}")
+        except BaseException:
+            connection.close()
+            raise
+    return connection
+
+
+def is_new(connection: sqlite3.Connection) -> bool:
+    """Whether nothing was ever written, or the first writer died before it had begun."""
+    return not _number(connection, "SELECT count(*) FROM sqlite_master") and not _number(
+        connection, "PRAGMA application_id"
+    )
+
+
+def create_tables(connection: sqlite3.Connection) -> None:
+    """Make a new file a store; to be done inside a transaction."""
+    for statement in _TABLES:
+        connection.execute(statement)
+
+
+def require_store(connection: sqlite3.Connection, path: Path) -> None:
+    """Raise `StoreError` unless the file is a store of a format known here."""
+    if _number(connection, "PRAGMA application_id") != APPLICATION_ID:
+        raise StoreError("this is a database, but no knowledge store", place=Place(str(path)))
+    form = _number(connection, "PRAGMA user_version")
+    if form != FORMAT:
+        raise StoreError(f"the store has format {form}, this program reads format {FORMAT}", place=Place(str(path)))
+
+
+def _number(connection: sqlite3.Connection, statement: str) -> int:
+    return int(connection.execute(statement).fetchone()[0])
+
+
+def _connect(path: Path, mode: str) -> sqlite3.Connection:
+    uri = f"{path.absolute().as_uri()}?mode={mode}"
+    return sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False, timeout=PATIENCE_S)

@@ -1,0 +1,187 @@
+"""A store's file with the right to write it: each change is one SQLite transaction, acknowledged when written."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from knowledge_base.compatibility import missing_constants, require_extension
+from knowledge_base.errors import InputError, Place
+from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
+from knowledge_base.facts import Change
+from knowledge_base.journal.archive import Archive
+from knowledge_base.journal.file import Durability, create_tables, is_new, reported, writing
+from knowledge_base.journal.history import Version, Writer
+from knowledge_base.journal.lock import WriterLock
+from knowledge_base.schema import Schema
+from knowledge_base.state import WorldState
+
+SNAPSHOT_AFTER = 2_000_000
+"""How many characters of changes follow a snapshot at least before the next.
+
+They are read back in a fraction of a second. A world that is longer than this is written only after as many
+characters of changes as it has itself: so snapshots at most double the file and the work.
+"""
+
+_INSERT_CHANGE = "INSERT INTO changes VALUES (?, ?, ?, ?)"
+_INSERT_KEY = "INSERT INTO keys VALUES (?, ?, ?, ?, ?)"
+_INSERT_SNAPSHOT = "INSERT OR IGNORE INTO snapshots SELECT version, time, :world FROM changes WHERE version = :version"
+_LAST_SNAPSHOT = "SELECT version, length(world) FROM snapshots ORDER BY version DESC LIMIT 1"
+_SIZE_SINCE = "SELECT coalesce(sum(length(delta)), 0) FROM changes WHERE version > ?"
+_FORGET = (
+    """UPDATE keys SET delta = (SELECT delta FROM changes WHERE changes.version = keys.version)
+        WHERE delta IS NULL AND version <= :oldest""",
+    "DELETE FROM changes WHERE version <= :oldest",
+    "DELETE FROM snapshots WHERE version < :oldest",
+)
+
+
+class Journal(Archive):
+    """A `History` that is written by one process, one thread at a time.
+
+    Args:
+        path: the store; it is made when it is not there.
+        schema: that of a new store, or an extension of the store's own; `None` takes that.
+        durability: what a commit outlives.
+        clock: gives the time of what opening it writes, in seconds.
+
+    Raises:
+        StoreError: another writer has it, it is something else, or cannot be read or written.
+        SchemaMismatchError: the store was written with a schema that `schema` does not extend.
+        InputError: there is no store yet and no schema for it.
+    """
+
+    def __init__(self, path: Path, schema: Schema | None, durability: Durability, clock: Callable[[], float]) -> None:
+        self._path = path
+        if schema is None and not path.exists():
+            raise _no_schema(path)
+        self._place = Place(str(path))
+        self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
+        self._writers = WriterLock(path)
+        try:
+            self._connection = writing(path, durability)
+            try:
+                self._prepare(schema, clock)
+            except BaseException:
+                self._connection.close()
+                raise
+        except BaseException:
+            self._writers.release()
+            raise
+
+    def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:
+        """Write a change, and first a snapshot when much was written since the last one."""
+        if not change.delta and key is None and along is None:
+            return
+        _require_text(change.author, key or "")
+        delta = compact(delta_form(change.delta))
+        snapshot = None if self._tail < max(SNAPSHOT_AFTER, self._snapshot_size) else compact(world_form(before))
+        with self._transaction() as connection:
+            if snapshot is not None:
+                self._put_snapshot(snapshot, change.version - 1)
+            if change.delta:
+                connection.execute(_INSERT_CHANGE, (change.version, change.time, change.author, delta))
+            if key is not None:
+                kept = None if change.delta else delta
+                connection.execute(_INSERT_KEY, (key, change.version, change.time, change.author, kept))
+            if along is not None:
+                along(connection)
+        if snapshot is not None:
+            self._tail, self._snapshot_size = 0, len(snapshot)
+        self._tail += len(delta)
+
+    def first(self, key: str) -> Change | None:
+        """The change that was kept under that key; asked by the one who writes."""
+        _require_text(key)
+        with reported(self._path, "read"):
+            return self._by_key(self._connection, key)
+
+    def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  the file knows
+        """Make version `keep_since` the oldest: a snapshot of it takes the place of all before."""
+        with self._reading() as connection:
+            world = compact(world_form(self._world(connection, keep_since).state))
+        with self._transaction() as connection:
+            self._put_snapshot(world, keep_since)
+            for statement in _FORGET:
+                connection.execute(statement, {"oldest": keep_since})
+        with reported(self._path, "shrink"):
+            self._connection.executescript("PRAGMA incremental_vacuum")  # `execute` would free a single page
+            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+            self._measure()
+
+    def close(self) -> None:
+        """Let others write."""
+        self._connection.close()
+        self._writers.release()
+
+    def _prepare(self, schema: Schema | None, clock: Callable[[], float]) -> None:
+        with reported(self._path, "read"):
+            if is_new(self._connection):
+                self._create(schema, clock())
+            else:
+                written = self.written_schema(self._connection)
+                self._schema = schema or written
+                if schema_hash(self._schema) != schema_hash(written):
+                    self._extend(written, clock)
+            self._measure()
+
+    def _create(self, schema: Schema | None, time: float) -> None:
+        if schema is None:
+            raise _no_schema(self._path)
+        self._schema = schema
+        with self._transaction() as connection:
+            create_tables(connection)
+            self._put_schema(0)
+            world = compact(world_form(WorldState(schema)))
+            connection.execute("INSERT INTO snapshots VALUES (0, ?, ?)", (time, world))
+
+    def _extend(self, written: Schema, clock: Callable[[], float]) -> None:
+        """Go on with more declarations; new constants come into the world by a change of their own."""
+        require_extension(written, self._schema, self._place)
+        last = self.newest()
+        constants = missing_constants(last.state, self._place)
+        with self._transaction() as connection:
+            self._put_schema(last.version + bool(constants))
+            if constants:
+                row = (last.version + 1, max(last.time, clock()), "schema", compact(delta_form(constants)))
+                connection.execute(_INSERT_CHANGE, row)
+
+    def _put_schema(self, version: int) -> None:
+        row = (version, schema_hash(self._schema), compact(schema_form(self._schema)))
+        self._connection.execute("INSERT INTO schemas VALUES (?, ?, ?)", row)
+
+    def _put_snapshot(self, world: str, version: int) -> None:
+        """Keep the world of a version that is in the journal, or in a snapshot already."""
+        self._connection.execute(_INSERT_SNAPSHOT, {"version": version, "world": world})
+
+    def _measure(self) -> None:
+        version, self._snapshot_size = self._connection.execute(_LAST_SNAPSHOT).fetchone()
+        (self._tail,) = self._connection.execute(_SIZE_SINCE, (version,)).fetchone()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        """All that is written in the block, or nothing."""
+        with reported(self._path, "write"):
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._connection
+                self._connection.execute("COMMIT")
+            except BaseException:
+                if self._connection.in_transaction:  # SQLite ends it by itself when the disk is full
+                    self._connection.execute("ROLLBACK")
+                raise
+
+
+def _no_schema(path: Path) -> InputError:
+    return InputError(f"there is no store '{path}' yet; a new one needs a schema")
+
+
+def _require_text(*words: str) -> None:
+    for word in words:
+        if not word.isascii():
+            try:
+                word.encode()
+            except UnicodeEncodeError:
+                raise InputError(f"{word!r} is no text that can be written to a file") from None

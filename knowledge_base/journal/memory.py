@@ -1,0 +1,156 @@
+"""The last changes of a world that is only in memory, so that one can look back a little."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from threading import Lock
+from typing import NamedTuple
+
+from knowledge_base.errors import StoreError
+from knowledge_base.facts import Change, Delta, Fact
+from knowledge_base.journal.history import Version, Writer, gone, too_early
+from knowledge_base.state import WorldState
+
+MOST_KEPT = 10_000
+"""How many things, facts and numbers the kept changes name together."""
+MOST_KEYS = 10_000
+"""How many idempotency keys are remembered."""
+
+
+class _Taken(NamedTuple):
+    """What a change took away that it does not say itself."""
+
+    numbers: Sequence[float | None] = ()
+    """What its fluents were before, in its order; `None` is not set."""
+    types: Mapping[str, str] = {}
+    fluents: Mapping[Fact, float] = {}
+    """All numbers about the things that it removed."""
+
+
+class _Kept(NamedTuple):
+    change: Change
+    size: int
+    taken: _Taken
+
+
+_NOTHING = _Taken()
+
+
+class MemoryHistory:
+    """A `History` that costs next to nothing: older worlds are reached by undoing changes.
+
+    Facts that are undone to be true again come last, so the order of facts may not be that of then.
+    """
+
+    def __init__(self, start: Version) -> None:
+        self._start = start
+        self._lock = Lock()
+        self._kept: deque[_Kept] = deque()
+        self._size = 0
+        self._oldest = (start.version, start.time)
+        self._keys: dict[str, Change] = {}
+
+    def newest(self) -> Version:
+        """The world it was made with."""
+        return self._start
+
+    def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:
+        """Keep a change and forget the oldest beyond `MOST_KEPT`.
+
+        Raises:
+            StoreError: `along` is given, and there is no file for it.
+        """
+        if along is not None:
+            raise StoreError("a knowledge base in memory has no file to write along into")
+        if key is not None:
+            self._remember(key, change)
+        size = len(change.delta)
+        if not size:
+            return
+        kept = _Kept(change, size, _taken(change.delta, before))
+        with self._lock:
+            self._kept.append(kept)
+            self._size += size
+            while self._size > MOST_KEPT:
+                self._forget_oldest()
+
+    def first(self, key: str) -> Change | None:
+        """The change that was kept under that key, if it is one of the last `MOST_KEYS`."""
+        return self._keys.get(key)
+
+    def changes(self, since: int, until: int) -> list[Change]:
+        """The changes after version `since`, up to that which made version `until`."""
+        with self._lock:
+            self._require(since)
+            return [k.change for k in self._kept if since < k.change.version <= until]
+
+    def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
+        """The world of that version: the newest with all later changes undone."""
+        present = newest()
+        with self._lock:
+            self._require(version)
+            later = [k for k in self._kept if version < k.change.version <= present.version]
+        return _undone(present.state, later)
+
+    def version_at(self, time: float) -> int:
+        """The version that the world had at that time."""
+        with self._lock:
+            oldest, begin = self._oldest
+            if time < begin:
+                raise too_early(time, oldest)
+            return oldest + bisect_right(self._kept, time, key=lambda k: k.change.time)
+
+    def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  nothing to write down
+        """Forget the changes up to version `keep_since`."""
+        with self._lock:
+            while self._kept and self._oldest[0] < keep_since:
+                self._forget_oldest()
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    def _require(self, version: int) -> None:
+        if version < self._oldest[0]:
+            raise gone(version, self._oldest[0])
+
+    def _forget_oldest(self) -> None:
+        change, size, _ = self._kept.popleft()
+        self._size -= size
+        self._oldest = (change.version, change.time)
+
+    def _remember(self, key: str, change: Change) -> None:
+        self._keys[key] = change
+        if len(self._keys) > MOST_KEYS:
+            del self._keys[next(iter(self._keys))]
+
+
+def _taken(delta: Delta, before: WorldState) -> _Taken:
+    if not (delta.values or delta.removed_nodes):
+        return _NOTHING
+    numbers = list(map(before.values.get, delta.values))
+    if not delta.removed_nodes:
+        return _Taken(numbers)
+    things = set(delta.removed_nodes)
+    fluents = {f: n for f, n in before.values.items() if not things.isdisjoint(f.args)}
+    return _Taken(numbers, {name: before.nodes[name] for name in delta.removed_nodes}, fluents)
+
+
+def _undone(state: WorldState, later: list[_Kept]) -> WorldState:
+    nodes, facts, values = dict(state.nodes), dict.fromkeys(state.facts), dict(state.values)
+    for change, _, taken in reversed(later):
+        delta = change.delta
+        for fact in delta.added:
+            del facts[fact]
+        facts.update(dict.fromkeys(delta.removed))
+        for name in delta.nodes:
+            del nodes[name]
+        nodes.update(taken.types)
+        for fluent, number in zip(delta.values, taken.numbers, strict=True):
+            if number is None:
+                del values[fluent]
+            else:
+                values[fluent] = number
+        values.update(taken.fluents)
+    return WorldState.of(state.schema, nodes, facts, values)

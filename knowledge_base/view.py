@@ -1,0 +1,146 @@
+"""A world of one version, asked in all ways: the reading half of the knowledge base, and its past worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from threading import RLock
+
+from knowledge_base.exchange.json import to_json
+from knowledge_base.facts import Fact, Value
+from knowledge_base.language.evaluation import Explanation, explain, holds, query
+from knowledge_base.language.expression import Expression
+from knowledge_base.overlay import Overlay
+from knowledge_base.questions import Questions
+from knowledge_base.schema import Schema
+from knowledge_base.state import WorldState
+from knowledge_base.world_graph import Graph, WorldGraph
+
+Binding = dict[str, Value]
+"""One answer of a query: variables' names (without `?`) with their values."""
+
+
+class View:
+    """A world that may be asked from several threads; each answer is a finished list about one version.
+
+    It is itself a `World` (`schema`, `holds`, `match`, `value`, `objects`, `type_of`).
+    """
+
+    def __init__(self, state: WorldState, version: int) -> None:
+        self._lock = RLock()
+        self._state = state
+        self._version = version
+        self._questions = Questions()
+        self._graph: WorldGraph | None = None
+
+    @property
+    def schema(self) -> Schema:
+        """What may be said."""
+        return self._state.schema
+
+    @property
+    def version(self) -> int:
+        """How many changes were committed before."""
+        return self._version
+
+    @property
+    def graph(self) -> Graph:
+        """The world as a graph, read-only; see `world_graph` for its form.
+
+        That of a `KnowledgeBase` follows every commit; other threads must not commit while it is being walked.
+        """
+        with self._lock:
+            if self._graph is None:
+                self._graph = WorldGraph(self._state)
+            return self._graph.view
+
+    def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[Binding]:
+        """The values of the free variables that make the text true, each choice once.
+
+        Args:
+            text: a condition such as `(and (on ?o ?table) (cup ?o))`.
+            params: variables that have a value already; they are not part of the answers.
+
+        Raises:
+            ParseError: the text is no condition.
+            UnknownNameError: an undeclared predicate, function or type, or a thing that is not there.
+            SchemaError: a wrong number of arguments or a type that can never fit.
+            InputError: a variable occurs only under `not` or in a comparison.
+        """
+        params = params or {}
+        with self._lock:
+            return query(self._questions.query(text, params, self._state), self._state, params)
+
+    def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
+        """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
+        params = params or {}
+        with self._lock:
+            return holds(self._questions.condition(text, params, self._state), self._state, params)
+
+    def explain(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> Explanation:
+        """Why the text is true or false; errors as for `ask`."""
+        params = params or {}
+        with self._lock:
+            return explain(self._questions.condition(text, params, self._state), self._state, params)
+
+    def overlay(self) -> Overlay:
+        """A world of pending changes on top of this one, which stays as it is."""
+        return Overlay(self)
+
+    def snapshot(self) -> WorldState:
+        """The world as it is now, as a copy that nothing changes."""
+        with self._lock:
+            return self._state.copy()
+
+    def to_json(self) -> str:
+        """All of it as JSON, schema and version included; `KnowledgeBase.from_json` reads it back."""
+        with self._lock:
+            return to_json(self._state, self._version)
+
+    def nodes(self) -> dict[str, str]:
+        """All things with their types, in order of insertion."""
+        with self._lock:
+            return dict(self._state.nodes)
+
+    def facts(self) -> list[Fact]:
+        """All facts, predicate by predicate, in order of insertion."""
+        with self._lock:
+            return list(self._state.facts)
+
+    def values(self) -> dict[Fact, float]:
+        """The numeric fluents that were set."""
+        with self._lock:
+            return dict(self._state.values)
+
+    def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
+        """Whether the fact is true."""
+        with self._lock:
+            return self._state.holds(predicate, args)
+
+    def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> list[tuple[Value, ...]]:
+        """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
+        with self._lock:
+            return list(self._state.match(predicate, pattern))
+
+    def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
+        """At most how many facts agree with `pattern`, without looking through them."""
+        with self._lock:
+            return self._state.estimate(predicate, pattern)
+
+    def value(self, function: str, args: tuple[Value, ...]) -> float:
+        """The numeric fluent's value; 0 until it is set."""
+        with self._lock:
+            return self._state.value(function, args)
+
+    def objects(self, type_name: str) -> list[str]:
+        """The things of that type or a subtype, in order of insertion.
+
+        Raises:
+            UnknownNameError: there is no such type.
+        """
+        with self._lock:
+            return self._state.objects(type_name)
+
+    def type_of(self, name: str) -> str | None:
+        """The thing's type; `None` if there is no such thing."""
+        with self._lock:
+            return self._state.type_of(name)

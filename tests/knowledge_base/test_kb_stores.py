@@ -1,0 +1,167 @@
+"""Files that are opened as stores: with another schema, of another kind, of another program, damaged."""
+
+from __future__ import annotations
+
+import sqlite3
+
+import pytest
+
+from knowledge_base import (
+    Delta,
+    InputError,
+    KnowledgeBase,
+    Schema,
+    SchemaMismatchError,
+    StoreError,
+    fact,
+)
+
+TYPES = "item place - object cup - item"
+PREDICATES = "(on ?i - item ?p - place) (clean ?i - item)"
+FUNCTIONS = "(weight ?i - item)"
+
+
+def schema(types=TYPES, constants="home - place", predicates=PREDICATES, functions=FUNCTIONS) -> Schema:
+    return Schema.parse(
+        f"(define (domain d) (:types {types}) (:constants {constants}) (:predicates {predicates})"
+        f" (:functions {functions}))"
+    )
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "world.kb"
+    with KnowledgeBase.open(schema(), path) as kb:
+        kb.apply(Delta(nodes={"cup1": "cup", "tray": "place"}, added=(fact("on", "cup1", "home"),)), author="a")
+        kb.apply(Delta(added=(fact("clean", "cup1"),), values={fact("weight", "cup1"): 0.2}), author="b")
+    return path
+
+
+# --- schemas
+
+
+def test_a_store_knows_its_own_schema(path):
+    with KnowledgeBase.open(None, path) as kb:
+        assert kb.query("(and (on ?c home) (cup ?c))") == [{"c": "cup1"}]
+        assert kb.schema.constants == {"home": "place"}
+
+
+@pytest.mark.parametrize(
+    ("given", "difference"),
+    [
+        ({"types": "item place - object mug - item"}, r"the type 'cup' is missing"),
+        ({"types": "item place - object cups - item"}, r"the type 'cup' is missing \(nearest: 'cups'\)"),
+        ({"types": "item place cup"}, "the type 'cup' was declared 'item', now it is 'object'"),
+        ({"constants": "hme - place"}, r"the constant 'home' is missing \(nearest: 'hme'\)"),
+        ({"constants": "home - item"}, "the constant 'home' was declared 'place', now it is 'item'"),
+        ({"predicates": "(on ?i - item ?p - place)"}, "the predicate 'clean' is missing"),
+        ({"predicates": "(clean ?i - item) (onn ?i - item ?p - place)"}, r"'on' is missing \(nearest: 'onn'\)"),
+        ({"predicates": "(clean ?i - item) (on ?i - item)"}, "the predicate 'on' was declared 'on item place', now it is 'on item'"),
+        ({"functions": ""}, "the function 'weight' is missing"),
+        ({"functions": "(weight ?i - cup)"}, "the function 'weight' was declared 'weight item', now it is 'weight cup'"),
+        ({"constants": "home - place cup1 - place"}, "the constant 'cup1' is a thing of type 'cup' there, not 'place'"),
+    ],
+)  # fmt: skip
+def test_another_schema_is_refused_with_what_differs(path, given, difference):
+    with pytest.raises(SchemaMismatchError, match=rf"world\.kb: the schema is another one: .*{difference}") as caught:
+        KnowledgeBase.open(schema(**given), path)
+    assert caught.value.differences
+    with KnowledgeBase.open(schema(), path) as kb:  # nothing was changed, and nobody holds it
+        assert kb.version == 2
+
+
+def test_many_differences_are_counted(path):
+    with pytest.raises(SchemaMismatchError, match="; and 2 more") as caught:
+        KnowledgeBase.open(schema("item place", "", "", ""), path)
+    assert len(caught.value.differences) == 5
+
+
+def test_more_declarations_are_accepted_and_recorded(path):
+    more = schema(
+        TYPES + " can - item", "home shelf tray - place", PREDICATES + " (full ?c - can)", FUNCTIONS + " (age)"
+    )
+    with KnowledgeBase.open(more, path) as kb:
+        assert (kb.version, kb.changes(since=2)[0].author) == (3, "schema")
+        assert kb.changes(since=2)[0].delta == Delta(nodes={"shelf": "place"})  # there is a tray already
+        assert kb.at(version=2).type_of("shelf") is None
+        kb.apply(Delta(nodes={"can1": "can"}, added=(fact("full", "can1"), fact("on", "can1", "shelf"))), author="c")
+    with KnowledgeBase.open(None, path) as kb:
+        assert kb.ask("(and (full can1) (on can1 shelf))")
+        assert kb.schema.functions.keys() == {"weight", "age"}
+    with pytest.raises(SchemaMismatchError, match="the type 'can' is missing"):
+        KnowledgeBase.open(schema(), path)
+    with KnowledgeBase.open(more, path) as kb:
+        assert kb.version == 4
+
+
+def test_renamed_parameters_are_no_difference(path):
+    with KnowledgeBase.open(schema(functions="(weight ?thing - item)"), path) as kb:
+        assert kb.value("weight", ("cup1",)) == 0.2
+
+
+# --- other files
+
+
+def database(path, *statements):
+    connection = sqlite3.connect(path, isolation_level=None)
+    for statement in statements:
+        connection.execute(statement)
+    connection.close()
+
+
+def scribble(path):
+    """Overwrite all pages but the first."""
+    page = 4096
+    content = path.read_bytes()
+    path.write_bytes(content[:page] + bytes(range(256)) * ((len(content) - page) // 256))
+
+
+FOREIGN = {
+    "text": (lambda p: p.write_text("(define (domain d))\n" * 100), "file is not a database"),
+    "other database": (lambda p: (p.unlink(), database(p, "CREATE TABLE t (x)")), "no knowledge store"),
+    "other application": (lambda p: (p.unlink(), database(p, "PRAGMA application_id = 7")), "no knowledge store"),
+    "later format": (lambda p: database(p, "PRAGMA user_version = 9"), "format 9, this program reads format 1"),
+    "folder": (lambda p: (p.unlink(), p.mkdir()), "cannot (open|read) the store"),
+    "schema": (lambda p: database(p, "UPDATE schemas SET declarations = '[1]'"), "the schema cannot be read"),
+    "change": (lambda p: database(p, "UPDATE changes SET delta = '{' WHERE version = 2"), "the change to version 2 cannot be read"),
+    "change of nothing known": (
+        lambda p: database(p, """UPDATE changes SET delta = '{"removed_nodes": ["ghost"]}' WHERE version = 2"""),
+        "what follows version 1 cannot be read",
+    ),
+    "gap": (lambda p: database(p, "DELETE FROM changes WHERE version = 1"), "version 1 is missing"),
+    "snapshot": (lambda p: database(p, "UPDATE snapshots SET world = '{}'"), "what follows version 0 cannot be read"),
+    "pages": (scribble, "cannot read the store: database disk image is malformed|cannot (open|read) the store"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_what_is_no_store_or_damaged_is_refused_in_one_line(path, kind, read_only):
+    spoil, message = FOREIGN[kind]
+    spoil(path)
+    with pytest.raises(StoreError, match=message) as caught:
+        KnowledgeBase.open(schema(), path, read_only=read_only)
+    assert "world.kb" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_empty_file_becomes_a_store_but_needs_a_schema(tmp_path):
+    path = tmp_path / "empty.kb"
+    path.touch()
+    with pytest.raises(InputError, match="a new one needs a schema"):
+        KnowledgeBase.open(None, path)
+    with KnowledgeBase.open(schema(), path) as kb:
+        assert kb.objects("place") == ["home"]
+
+
+def test_a_store_in_no_folder_is_refused(tmp_path):
+    with pytest.raises(StoreError, match="No such file or directory"):
+        KnowledgeBase.open(schema(), tmp_path / "nowhere" / "world.kb")
+
+
+def test_odd_names_of_files_are_taken_literally(tmp_path):
+    path = tmp_path / "100% ?mode=ro&x#y.kb"
+    with KnowledgeBase.open(schema(), path) as kb:
+        kb.apply(Delta(nodes={"cup1": "cup"}), author="a")
+        assert kb.at(version=1).objects("cup") == ["cup1"]
+    assert path.exists()
