@@ -7,6 +7,12 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from knowledge_base.conditions.clock import Clock as Clock
+    from knowledge_base.conditions.condition import Condition as Condition
+    from knowledge_base.conditions.condition import Firing as Firing
+    from knowledge_base.conditions.watch import Missed as Missed
+    from knowledge_base.conditions.watch import Watch as Watch
+    from knowledge_base.errors import ConditionCancelledError as ConditionCancelledError
     from knowledge_base.errors import ConflictError as ConflictError
     from knowledge_base.errors import InputError as InputError
     from knowledge_base.errors import ParseError as ParseError
@@ -31,11 +37,16 @@ __getattr__, __dir__, __all__ = lazy_exports(
     {
         "Binding": "store",
         "Change": "facts",
+        "Clock": "conditions.clock",
+        "Condition": "conditions.condition",
+        "ConditionCancelledError": "errors",
         "ConflictError": "errors",
         "Delta": "facts",
         "Fact": "facts",
+        "Firing": "conditions.condition",
         "InputError": "errors",
         "KnowledgeBase": "store",
+        "Missed": "conditions.watch",
         "Overlay": "overlay",
         "ParseError": "errors",
         "Place": "errors",
@@ -45,6 +56,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Transaction": "transaction",
         "UnknownNameError": "errors",
         "Value": "facts",
+        "Watch": "conditions.watch",
         "WorldState": "state",
         "fact": "facts",
     },

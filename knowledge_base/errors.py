@@ -91,3 +91,7 @@ class SchemaError(InputError):
 
 class ConflictError(Exception):
     """A transaction met a world that is not the one it was written for; nothing was changed."""
+
+
+class ConditionCancelledError(Exception):
+    """Someone waits for a condition that is not installed any more and will not fire again."""

@@ -7,6 +7,10 @@ from contextlib import contextmanager
 from threading import RLock, get_ident
 
 from knowledge_base.announcement import Announcer, Listener
+from knowledge_base.conditions.clock import Clock
+from knowledge_base.conditions.condition import Condition, Fire
+from knowledge_base.conditions.installed import Installed, terms
+from knowledge_base.conditions.watch import Watch, watch
 from knowledge_base.errors import ConflictError
 from knowledge_base.facts import Change, Delta, Fact, Value
 from knowledge_base.language.evaluation import Explanation, explain, holds, query
@@ -37,6 +41,7 @@ class KnowledgeBase:
         self._graph = WorldGraph(schema)
         self._questions = Questions()
         self._announcer = Announcer(self._lock)
+        self._installed = Installed(self._state, self._lock, self._announcer)
         self._version = 0
         self._writer: tuple[int, str] | None = None
 
@@ -131,6 +136,62 @@ class KnowledgeBase:
         """
         return self._announcer.subscribe(listener)
 
+    def install(
+        self,
+        text: str | Expression,
+        params: Mapping[str, Value] | None = None,
+        *,
+        fire: Fire = "edge",
+        hold_s: float = 0.0,
+        once: bool = False,
+        hysteresis: float | None = None,
+        clock: Clock | None = None,
+    ) -> Condition:
+        """Keep a condition evaluated at every version from now on, and fire when it becomes true (S2.4).
+
+        What an update costs depends on what it changes, see `conditions.relation`. What is true already does
+        not fire; it begins to hold.
+
+        Args:
+            text: a condition; it is true if there are values for its free variables, which then are its witness.
+            params: variables that have a value already.
+            fire: `edge`, when it becomes true; `each`, also at every change of the set of its witnesses while
+                it is true.
+            hold_s: it fires when it has been true for so many seconds without a break.
+            once: it is cancelled by its first firing.
+            hysteresis: it stays true until its comparisons fail by more than that: `(> (level) 9)` becomes
+                true above 9 and false when `(> (level) (- 9 hysteresis))` is.
+            clock: what `hold_s` is measured with.
+
+        Raises:
+            InputError: as for `query`; a negative or not finite time, a time without a clock, a hysteresis
+                without a comparison; another word for `fire`.
+        """
+        params = params or {}
+        firing = terms(fire, hold_s=hold_s, once=once, clock=clock)
+        with self._delivery(), self._lock:
+            e = self._questions.query(text, params, self._state)
+            return self._installed.install(e, params, firing, hysteresis)
+
+    def watch(
+        self, pattern: str | Expression | None = None, params: Mapping[str, Value] | None = None, *, limit: int = 1000
+    ) -> Watch:
+        """The committed changes from now on that touch `pattern`, as an asynchronous iterator.
+
+        When `limit` changes wait to be read and another one comes, all of them are dropped and the next item
+        is a `Missed` that says since when.
+
+        Args:
+            pattern: a predicate, function or type with arguments, e.g. `(on ?o table)`; `None` for all changes.
+            params: variables of the pattern that have a value.
+            limit: how many changes may wait, at least 1.
+
+        Raises:
+            InputError: the pattern is none, or names what is not declared.
+        """
+        with self._lock:
+            return watch(self, pattern, params or {}, limit)
+
     def overlay(self) -> Overlay:
         """A world of pending changes on top of this one, which stays as it is."""
         return Overlay(self)
@@ -193,11 +254,13 @@ class KnowledgeBase:
     def _commit(self, effective: Delta, author: str) -> Change:
         if not effective:
             return Change(self._version, author, effective)
+        departures = self._installed.departures(effective)
         self._state.commit(effective)
         self._graph.commit(effective)
         self._version += 1
         change = Change(self._version, author, effective)
         self._announcer.add(change)
+        self._installed.commit(effective, departures, self._version)
         return change
 
     def _refuse_nesting(self) -> None:
