@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from threading import RLock
+from typing import NamedTuple
 
 from knowledge_base.announcement import Announcer
 from knowledge_base.conditions.clock import Clock
@@ -48,14 +48,16 @@ def terms(fire: Fire, *, hold_s: float, once: bool, clock: Clock | None) -> Term
     return Terms(fire, once, Hold(clock, hold_s))
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(NamedTuple):
     """One fact, number or type that a change makes different: `sign` is `MORE`, `LESS` or `BOTH`."""
 
     kind: Kind
     name: str
     args: Args
     sign: int
+
+
+_NOBODY: dict[Trigger, Relation] = {}
 
 
 class Installed:
@@ -115,9 +117,9 @@ class Installed:
         if not self._relations:
             return
         hits: dict[Relation, list[Hit]] = {}
-        for event in (*departures, *self._events(effective)):
-            for trigger, relation in self._readers.get((event.kind, event.name), {}).items():
-                hits.setdefault(relation, []).append((trigger, event.args, event.sign))
+        for kind, name, args, sign in (*departures, *self._events(effective)):
+            for trigger, relation in self._readers.get((kind, name), _NOBODY).items():
+                hits.setdefault(relation, []).append((trigger, args, sign))
         changed: dict[Row, None] = {}
         for relation, own in hits.items():
             changed.update(dict.fromkeys(relation.update(own, self._world)))

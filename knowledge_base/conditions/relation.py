@@ -74,18 +74,22 @@ class Relation:
     def update(self, hits: list[Hit], world: WorldState) -> Iterable[Row]:
         """Take a change into account that `world` has already; the rows whose witnesses are others now."""
         self._touched = {}
-        broken = self._break([hit for hit in hits if _may_break(hit)], world)
-        for row in {**broken, **self._failed}:
+        hits = [hit for hit in hits if hit[0].fits(hit[1])]
+        broken = self._break(hits, world)
+        for row in (*broken, *self._failed):
             self._renew(row, world)
-        for hit in hits:
-            if _may_make(hit):
-                self._make(hit, world)
+        for trigger, args, sign in hits:
+            if sign * trigger.polarity >= 0:
+                self._make(trigger, args, world)
         return self._touched
 
     def _break(self, hits: list[Hit], world: WorldState) -> dict[Row, None]:
         """Drop the witnesses that are none any more; the rows that have to be searched."""
         lost: dict[Row, None] = {}
-        suspects = dict.fromkeys(one for trigger, args, _ in hits for one in trigger.relying(args))
+        suspects: dict[tuple[Row, Args], None] = {}
+        for trigger, args, sign in hits:
+            if sign * trigger.polarity <= 0:
+                suspects.update(trigger.relying(args))
         for row, witness in suspects:
             if not self._holds(row, witness, world):
                 self._remove(row, witness)
@@ -100,14 +104,13 @@ class Relation:
             self._failed[row] = error
             return False
 
-    def _make(self, hit: Hit, world: WorldState) -> None:
+    def _make(self, trigger: Trigger, args: Args, world: WorldState) -> None:
         """Find the open rows that the change gives a witness."""
-        trigger, args, _ = hit
         try:
             if trigger.covers:
                 row = self.rows.get(trigger.key(args))
                 if row is not None and row.is_open:
-                    self._keep(row, trigger.search(world, {**row.bindings, **trigger.bindings(args)}))
+                    self._complete(row, trigger, trigger.bindings(args), world)
             elif not trigger.finds:
                 for row in self._reached(trigger, args):
                     self._renew(row, world)
@@ -138,9 +141,14 @@ class Relation:
             self._add(row, witness)
         self._settle(row)
 
-    def _keep(self, row: Row, found: Iterator[Bindings]) -> None:
-        for bindings in self._few(row, found):
-            self._add(row, self._witness(bindings))
+    def _complete(self, row: Row, trigger: Trigger, bindings: Bindings, world: WorldState) -> None:
+        """Find what the change, which determines the row, makes a witness of."""
+        if not trigger.leaves_open:
+            if self._test(world, bindings):
+                self._add(row, self._witness(bindings))
+            return
+        for found in self._few(row, trigger.search(world, bindings)):
+            self._add(row, self._witness(found))
 
     def _few(self, row: Row, found: Iterator[Bindings]) -> list[Bindings]:
         if row.wants_all:
@@ -178,12 +186,3 @@ class Relation:
         else:
             self._open.discard(row_fact(row))
 
-
-def _may_break(hit: Hit) -> bool:
-    trigger, args, sign = hit
-    return sign * trigger.occurrence.polarity <= 0 and trigger.fits(args)
-
-
-def _may_make(hit: Hit) -> bool:
-    trigger, args, sign = hit
-    return sign * trigger.occurrence.polarity >= 0 and trigger.fits(args)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from kb_random_schemas import brute_witnesses, changes, conditions, languages, parameters
 from kb_strategies import brute
@@ -13,7 +13,7 @@ from knowledge_base import Delta, KnowledgeBase
 from knowledge_base.errors import InputError
 from knowledge_base.language import expression as ex
 
-PROPERTY = settings(deadline=None, derandomize=True, max_examples=150)
+PROPERTY = settings(deadline=None, derandomize=True, max_examples=150, phases=[Phase.generate])
 
 
 class Undone(Exception):
