@@ -168,7 +168,7 @@ class Condition:
             if after is not None and self._last is not None and self._last.number > after:
                 return self._last
             if self._closed:
-                raise ConditionCancelledError(self)
+                raise ConditionCancelledError(f"{self.text} is cancelled and will not fire again")
             future = self._waiters.join()
         try:
             return await future
@@ -271,7 +271,7 @@ class Condition:
     def _close(self) -> None:
         with self._guard:
             self._closed = True
-            self._waiters.fail(ConditionCancelledError(self))
+            self._waiters.fail(ConditionCancelledError(f"{self.text} is cancelled and will not fire again"))
 
     def _hold(self) -> None:
         hold = self._terms.hold

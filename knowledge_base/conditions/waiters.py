@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from asyncio import AbstractEventLoop, Future, get_running_loop
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Generic, TypeVar
 
 _T = TypeVar("_T")
@@ -37,7 +38,7 @@ class Waiters(Generic[_T]):
     def _complete(self, settle: Callable[[Future[_T]], None]) -> None:
         waiting, self._waiting = self._waiting, {}
         for future, loop in waiting.items():
-            if not loop.is_closed():
+            with suppress(RuntimeError):  # the loop is closed, so nobody waits there any more
                 loop.call_soon_threadsafe(_unless_done, future, settle)
 
 

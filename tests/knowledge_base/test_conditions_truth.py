@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 
-from hypothesis import Phase, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from kb_random_schemas import brute_witnesses, changes, conditions, languages, parameters
 from kb_strategies import brute
@@ -13,10 +13,10 @@ from knowledge_base import Delta, KnowledgeBase
 from knowledge_base.errors import InputError
 from knowledge_base.language import expression as ex
 
-PROPERTY = settings(deadline=None, derandomize=True, max_examples=150, phases=[Phase.generate])
+PROPERTY = settings(deadline=None, derandomize=True, max_examples=100)
 
 
-class Undone(Exception):
+class UndoneError(Exception):
     pass
 
 
@@ -36,12 +36,12 @@ class Model:
 
 
 def commit(kb, deltas, *, rolled_back) -> None:
-    with contextlib.suppress(Undone), kb.transaction(author="test") as tx:
+    with contextlib.suppress(UndoneError), kb.transaction(author="test") as tx:
         for delta in deltas:
             with contextlib.suppress(InputError):  # about a thing that was removed
                 tx.apply(delta)
         if rolled_back:
-            raise Undone
+            raise UndoneError
 
 
 @PROPERTY
