@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from threading import RLock
-from typing import NamedTuple
 
 from knowledge_base.announcement import Announcer
 from knowledge_base.conditions.clock import Clock
@@ -48,13 +47,8 @@ def terms(fire: Fire, *, hold_s: float, once: bool, clock: Clock | None) -> Term
     return Terms(fire, once, Hold(clock, hold_s))
 
 
-class Event(NamedTuple):
-    """One fact, number or type that a change makes different: `sign` is `MORE`, `LESS` or `BOTH`."""
-
-    kind: Kind
-    name: str
-    args: Args
-    sign: int
+Event = tuple[Kind, str, Args, int]
+"""One fact, number or type that a change makes different: its name, arguments, and `MORE`, `LESS` or `BOTH`."""
 
 
 _NOBODY: dict[Trigger, Relation] = {}
@@ -107,8 +101,8 @@ class Installed:
         numbers = [f for f in self._world.values if not gone.isdisjoint(f.args)]
         types = [(name, t) for name in gone if (t := self._world.type_of(name)) is not None]
         return [
-            *(Event("said", f.predicate, f.args, BOTH) for f in numbers),
-            *(Event("type", t, (name,), LESS) for name, own in types for t in self._schema.ancestors(own)),
+            *(("said", f.predicate, f.args, BOTH) for f in numbers),
+            *(("type", t, (name,), LESS) for name, own in types for t in self._schema.ancestors(own)),
         ]
 
     def commit(self, effective: Delta, departures: list[Event], version: int) -> None:
@@ -141,14 +135,14 @@ class Installed:
 
     def _events(self, effective: Delta) -> Iterator[Event]:
         for fact in effective.removed:
-            yield Event("said", fact.predicate, fact.args, LESS)
+            yield "said", fact.predicate, fact.args, LESS
         for name, own in effective.nodes.items():
             for type_name in self._schema.ancestors(own):
-                yield Event("type", type_name, (name,), MORE)
+                yield "type", type_name, (name,), MORE
         for fact in effective.added:
-            yield Event("said", fact.predicate, fact.args, MORE)
+            yield "said", fact.predicate, fact.args, MORE
         for fluent in effective.values:
-            yield Event("said", fluent.predicate, fluent.args, BOTH)
+            yield "said", fluent.predicate, fluent.args, BOTH
 
     def _place(self, e: Expression, params: Mapping[str, Value]) -> Place:
         shape, key = lifted(e, params)

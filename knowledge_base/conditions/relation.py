@@ -74,28 +74,27 @@ class Relation:
     def update(self, hits: list[Hit], world: WorldState) -> Iterable[Row]:
         """Take a change into account that `world` has already; the rows whose witnesses are others now."""
         self._touched = {}
-        hits = [hit for hit in hits if hit[0].fits(hit[1])]
-        broken = self._break(hits, world)
-        for row in (*broken, *self._failed):
-            self._renew(row, world)
-        for trigger, args, sign in hits:
-            if sign * trigger.polarity >= 0:
-                self._make(trigger, args, world)
-        return self._touched
-
-    def _break(self, hits: list[Hit], world: WorldState) -> dict[Row, None]:
-        """Drop the witnesses that are none any more; the rows that have to be searched."""
-        lost: dict[Row, None] = {}
         suspects: dict[tuple[Row, Args], None] = {}
         for trigger, args, sign in hits:
             if sign * trigger.polarity <= 0:
                 suspects.update(trigger.relying(args))
+        broken = self._break(suspects, world) if suspects else ()
+        for row in (*broken, *self._failed):
+            self._renew(row, world)
+        for trigger, args, sign in hits:
+            if sign * trigger.polarity >= 0 and trigger.fits(args):
+                self._make(trigger, args, world)
+        return self._touched
+
+    def _break(self, suspects: Iterable[tuple[Row, Args]], world: WorldState) -> Iterable[Row]:
+        """Drop the witnesses that are none any more; the rows that have to be searched."""
+        lost: dict[Row, None] = {}
         for row, witness in suspects:
             if not self._holds(row, witness, world):
                 self._remove(row, witness)
                 if not row.wants_all:
                     lost[row] = None
-        return {row: None for row in lost if not row.witnesses}
+        return [row for row in lost if not row.witnesses]
 
     def _holds(self, row: Row, witness: Args, world: WorldState) -> bool:
         try:
