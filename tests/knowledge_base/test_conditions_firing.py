@@ -363,3 +363,27 @@ def test_threads_that_install_cancel_and_commit_at_once_lose_nothing(kb) -> None
         assert [version for version, _ in own] == sorted(version for version, _ in own)
     versions = [f.version for f in everyone]
     assert versions == sorted(set(versions))
+
+
+@pytest.mark.parametrize(
+    ("text", "change", "truths"),
+    [
+        ("(forall (?c - cup) (heavy ?c))", Delta(nodes={"cup9": "cup"}), (True, False)),
+        ("(forall (?c - cup) (heavy ?c))", Delta(nodes={"can9": "can"}), (True, True)),
+        ("(forall (?i - item) (or (heavy ?i) (on ?i shelf)))", Delta(removed_nodes=("can1",)), (False, True)),
+        ("(exists (?i - can) (not (on ?i shelf)))", Delta(removed_nodes=("can1",)), (True, False)),
+        ("(= (weight cup1) 0)", Delta(removed_nodes=("cup1",)), (False, True)),
+        ("(item ?new)", Delta(nodes={"can9": "can"}), (False, True)),
+        ("(and (on ?x ?p) (near ?p ?q) (place ?q))", Delta(added=(fact("near", "shelf", "home"),)), (False, True)),
+        ("(imply (heavy cup1) (quiet))", Delta(removed=(fact("heavy", "cup1"),)), (False, True)),
+        ("(imply (heavy cup1) (quiet))", Delta(added=(fact("quiet"),)), (False, True)),
+        ("(level can1 (+ (weight cup1) 1))", Delta(values={fact("weight", "cup1"): 4}), (False, True)),
+    ],
+)
+def test_whatever_a_condition_reads_reaches_it(kb, text, change, truths) -> None:
+    tell(kb, ("heavy", "cup1"), ("heavy", "cup2"), ("on", "cup1", "shelf"), ("level", "can1", 5))
+    weigh(kb, "cup1", 2)
+    condition = kb.install(text, {"new": "can9"})
+    before = condition.truth
+    kb.apply(change, author="test")
+    assert (before, condition.truth) == truths
