@@ -7,6 +7,12 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from knowledge_base.conditions.clock import Clock as Clock
+    from knowledge_base.conditions.condition import Condition as Condition
+    from knowledge_base.conditions.condition import Firing as Firing
+    from knowledge_base.conditions.watch import Missed as Missed
+    from knowledge_base.conditions.watch import Watch as Watch
+    from knowledge_base.errors import ConditionCancelledError as ConditionCancelledError
     from knowledge_base.errors import ConflictError as ConflictError
     from knowledge_base.errors import HistoryError as HistoryError
     from knowledge_base.errors import InputError as InputError
@@ -35,25 +41,31 @@ __getattr__, __dir__, __all__ = lazy_exports(
     {
         "Binding": "view",
         "Change": "facts",
+        "Clock": "conditions.clock",
+        "Condition": "conditions.condition",
+        "ConditionCancelledError": "errors",
         "ConflictError": "errors",
         "Delta": "facts",
         "Fact": "facts",
+        "Firing": "conditions.condition",
+        "HistoryError": "errors",
         "InputError": "errors",
         "KnowledgeBase": "store",
+        "Missed": "conditions.watch",
         "Overlay": "overlay",
         "ParseError": "errors",
         "Place": "errors",
         "Schema": "schema",
         "SchemaError": "errors",
+        "SchemaMismatchError": "errors",
         "Signature": "schema",
+        "StoreError": "errors",
         "Transaction": "transaction",
         "UnknownNameError": "errors",
         "Value": "facts",
-        "WorldState": "state",
-        "HistoryError": "errors",
-        "StoreError": "errors",
-        "SchemaMismatchError": "errors",
         "View": "view",
+        "Watch": "conditions.watch",
+        "WorldState": "state",
         "fact": "facts",
     },
 )

@@ -1,9 +1,10 @@
-"""Committed changes handed to listeners: outside the lock, in commit order, to each listener all of them."""
+"""What a commit tells others: outside the lock, in commit order, to each listener all of it."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from threading import RLock
 
 from knowledge_base.facts import Change
@@ -12,7 +13,7 @@ Listener = Callable[[Change], None]
 
 
 class Announcer:
-    """A queue of changes that one thread at a time delivers.
+    """A queue of calls that one thread at a time makes.
 
     A listener may commit changes itself; they are delivered after the current one. A thread that commits
     while another one delivers leaves its change to that thread.
@@ -22,7 +23,7 @@ class Announcer:
         self._lock = lock
         self._listeners: dict[int, Listener] = {}
         self._next_key = 0
-        self._waiting: deque[tuple[Change, tuple[Listener, ...]]] = deque()
+        self._waiting: deque[Callable[[], None]] = deque()
         self._delivering = False
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
@@ -40,11 +41,14 @@ class Announcer:
 
     def add(self, change: Change) -> None:
         """Queue a change for those who listen now; called under the lock."""
-        if self._listeners:
-            self._waiting.append((change, tuple(self._listeners.values())))
+        self._waiting.extend(partial(listener, change) for listener in self._listeners.values())
+
+    def queue(self, call: Callable[[], None]) -> None:
+        """Queue a call after what is queued already; called under the lock."""
+        self._waiting.append(call)
 
     def deliver(self) -> None:
-        """Hand over what is queued; called without the lock.
+        """Make the queued calls; called without the lock.
 
         Raises:
             ExceptionGroup: listeners failed; all others have heard everything nevertheless.
@@ -55,8 +59,11 @@ class Announcer:
             self._delivering = True
         errors: list[Exception] = []
         try:
-            while (item := self._take()) is not None:
-                errors += _call(*item)
+            while (call := self._take()) is not None:
+                try:
+                    call()
+                except Exception as error:  # noqa: BLE001  one listener must not silence the others
+                    errors.append(error)
         except BaseException:  # an interrupt must not leave the queue without anyone to empty it
             with self._lock:
                 self._delivering = False
@@ -64,19 +71,9 @@ class Announcer:
         if errors:
             raise ExceptionGroup("listeners to the knowledge base failed", errors)
 
-    def _take(self) -> tuple[Change, tuple[Listener, ...]] | None:
+    def _take(self) -> Callable[[], None] | None:
         with self._lock:
             if self._waiting:
                 return self._waiting.popleft()
             self._delivering = False
             return None
-
-
-def _call(change: Change, listeners: tuple[Listener, ...]) -> list[Exception]:
-    errors: list[Exception] = []
-    for listener in listeners:
-        try:
-            listener(change)
-        except Exception as error:  # noqa: BLE001  one listener must not silence the others
-            errors.append(error)
-    return errors

@@ -147,3 +147,7 @@ class SchemaMismatchError(SchemaError):
 
 class HistoryError(InputError):
     """A version or time that is not kept, or not there yet."""
+
+
+class ConditionCancelledError(Exception):
+    """Someone waits for a condition that is not installed any more and will not fire again."""

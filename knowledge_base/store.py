@@ -10,7 +10,6 @@ from threading import get_ident
 from types import TracebackType
 from typing import Self
 
-from knowledge_base.announcement import Announcer, Listener
 from knowledge_base.errors import ConflictError, HistoryError, InputError
 from knowledge_base.exchange.json import read_json
 from knowledge_base.facts import Change, Delta
@@ -19,6 +18,7 @@ from knowledge_base.journal.file import Durability
 from knowledge_base.journal.history import History, Version, Writer
 from knowledge_base.journal.journal import Journal
 from knowledge_base.journal.memory import MemoryHistory
+from knowledge_base.observable import Observable
 from knowledge_base.overlay import Overlay
 from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
@@ -30,7 +30,7 @@ Clock = Callable[[], float]
 """Tells the time in seconds."""
 
 
-class KnowledgeBase(View):
+class KnowledgeBase(Observable):
     """A world model that may be asked and changed from several threads.
 
     One lock orders everything: a question sees one version and its answer is a finished list; a change is
@@ -49,7 +49,6 @@ class KnowledgeBase(View):
         start = self._history.newest()
         super().__init__(start.state, start.version)
         self._graph: WorldGraph = WorldGraph(start.state)
-        self._announcer = Announcer(self._lock)
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
@@ -181,15 +180,6 @@ class KnowledgeBase(View):
         self._announcer.deliver()
         return change
 
-    def subscribe(self, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with every committed change from now on; the function returned ends that.
-
-        Changes come in commit order; a commit that changes nothing is not announced. A listener may ask and
-        change the knowledge base. When listeners raise, the committing call raises an `ExceptionGroup`
-        after all have been told; the change stays.
-        """
-        return self._announcer.subscribe(listener)
-
     def at(self, *, version: int | None = None, time: float | None = None) -> View:
         """The world as it was, to be asked like this one.
 
@@ -243,10 +233,12 @@ class KnowledgeBase(View):
         change = Change(self._version + bool(effective), author, effective, self._time)
         self._history.append(change, key, self._state, along)
         if effective:
+            departures = self._installed.departures(effective)
             self._state.commit(effective)
             self._graph.commit(effective)
             self._version = change.version
             self._announcer.add(change)
+            self._installed.commit(effective, departures, self._version)
         return change
 
     def _present(self) -> Version:

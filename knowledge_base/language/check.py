@@ -252,7 +252,8 @@ class _Checker:
             return ("boolean",)
         if not isinstance(value, str):
             return ("number",)
-        known = self.schema.constants.get(value) or (self.objects or {}).get(value)
+        # Whether there are any objects is not asked: a world would have to count them.
+        known = self.schema.constants.get(value) or (None if self.objects is None else self.objects.get(value))
         if known is not None:
             return (known, "text") if quoted else (known,)
         return ("text",) if quoted and self.objects is not None else None

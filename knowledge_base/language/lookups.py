@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import Atom, TypedVariable, Variable
+from knowledge_base.language.expression import Atom, TypedVariable, Variable, free_variables
 from knowledge_base.language.terms import Bindings, Getter, compile_term
 from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
@@ -19,6 +19,7 @@ class Lookup:
     def __init__(self, atom: Atom, schema: Schema, finds: frozenset[str]) -> None:
         first: dict[str, int] = {}
         self._repeated: list[tuple[int, int]] = []
+        self._computed: list[tuple[int, Getter]] = []
         self._getters: list[Getter | None] = []
         self._predicate = atom.predicate
         for position, arg in enumerate(atom.args):
@@ -26,15 +27,20 @@ class Lookup:
                 self._getters.append(None)
                 if first.setdefault(arg.name, position) != position:
                     self._repeated.append((first[arg.name], position))
-            else:
+            elif free_variables(arg).isdisjoint(finds):
                 self._getters.append(compile_term(arg, schema))
+            else:  # computed from what the other arguments find
+                self._getters.append(None)
+                self._computed.append((position, compile_term(arg, schema)))
         self._found = tuple(first.items())
 
     def __call__(self, world: World, bindings: Bindings) -> Iterator[Bindings]:
         """`bindings` with the values of the open variables, for every fact that matches."""
         for args in world.match(self._predicate, self._pattern(world, bindings)):
             if all(args[i] == args[j] for i, j in self._repeated):
-                yield {**bindings, **{name: args[i] for name, i in self._found}}
+                found = {**bindings, **{name: args[i] for name, i in self._found}}
+                if not self._computed or all(args[i] == get(world, found) for i, get in self._computed):
+                    yield found
 
     def size(self, world: World, bindings: Bindings) -> int:
         """At most how many facts match; 0 if the world cannot say so cheaply."""

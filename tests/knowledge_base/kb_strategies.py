@@ -174,7 +174,7 @@ def brute(e, world, b) -> bool:  # noqa: PLR0911  one line a form, as in the tex
     match e:
         case ex.Atom(name, args):
             values = tuple(brute_term(a, world, b) for a in args)
-            return values[0] in world.objects(name) if name in SCHEMA.types else world.holds(name, values)
+            return values[0] in world.objects(name) if name in world.schema.types else world.holds(name, values)
         case ex.Comparison(op, left, right):
             return _COMPARE[op](brute_term(left, world, b), brute_term(right, world, b))
         case ex.Not(body):

@@ -234,3 +234,14 @@ def test_quantifiers_are_explained_by_one_choice(world) -> None:
     assert str(missed.deciding) == "(> (weight cup1) 9) is false: 2 > 9"
     nothing = explain(parse_condition("(exists (?i - can ?p - place) (near ?p ?p))"), WorldState(SCHEMA))
     assert nothing.deciding.detail == "there is nothing to choose from"
+
+
+def test_an_argument_computed_from_a_variable_of_the_same_atom() -> None:
+    world = world_of(
+        Delta(
+            nodes=THINGS,
+            added=(fact("level", "cup1", 2), fact("level", "cup2", 3)),
+            values={fact("weight", "cup1"): 1, fact("weight", "cup2"): 1},
+        )
+    )
+    assert query(parse_condition("(level ?i (+ (weight ?i) 1))"), world) == [{"i": "cup1"}]

@@ -1,0 +1,98 @@
+"""The conditions of one shape as rows of a relation, and a world in which that relation can be looked up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact, Value
+from knowledge_base.index import FactIndex
+from knowledge_base.language.expression import TypedVariable
+from knowledge_base.schema import Schema, Signature
+from knowledge_base.state import WorldState
+
+if TYPE_CHECKING:
+    from knowledge_base.conditions.condition import Condition
+    from knowledge_base.conditions.shape import Args
+
+ROWS = "installed rows"
+"""The name of the relation as a predicate; nobody can declare or write it."""
+
+
+class Row:
+    """All installed conditions of one shape with the same values.
+
+    Attributes:
+        key: the values of the shape's parameters.
+        bindings: the same, by name.
+        witnesses: choices for the shape's answers that make it true: one is kept, or all (`wants_all`).
+        wants_all: whether each change of the set of witnesses counts.
+        conditions: who is told, in the order of installation.
+    """
+
+    __slots__ = ("bindings", "conditions", "key", "wants_all", "witnesses")
+
+    def __init__(self, key: Args, names: tuple[str, ...]) -> None:
+        self.key = key
+        self.bindings: dict[str, Value] = dict(zip(names, key, strict=True))
+        self.witnesses: dict[Args, None] = {}
+        self.wants_all = False
+        self.conditions: dict[Condition, None] = {}
+
+    @property
+    def truth(self) -> bool:
+        """Whether there is a witness."""
+        return bool(self.witnesses)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether another witness would make a difference."""
+        return self.wants_all or not self.witnesses
+
+
+class RowsWorld:
+    """The world with a relation of open rows, so that a join can start from them or end at them."""
+
+    def __init__(self, world: WorldState, rows: FactIndex) -> None:
+        self._world = world
+        self._rows = rows
+
+    @property
+    def schema(self) -> Schema:
+        """That of the world, which does not know the rows."""
+        return self._world.schema
+
+    def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
+        """Whether the fact is true or the row open."""
+        return (self._rows if predicate == ROWS else self._world).holds(predicate, args)
+
+    def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
+        """The facts or open rows that agree with `pattern`."""
+        return (self._rows if predicate == ROWS else self._world).match(predicate, pattern)
+
+    def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
+        """At most how many they are."""
+        return (self._rows if predicate == ROWS else self._world).estimate(predicate, pattern)
+
+    def value(self, function: str, args: tuple[Value, ...]) -> float:
+        """The numeric fluent's value."""
+        return self._world.value(function, args)
+
+    def objects(self, type_name: str) -> list[str]:
+        """The things of that type."""
+        return self._world.objects(type_name)
+
+    def type_of(self, name: str) -> str | None:
+        """The thing's type."""
+        return self._world.type_of(name)
+
+
+def row_fact(row: Row) -> Fact:
+    """The row as it stands in the relation."""
+    return Fact(ROWS, row.key)
+
+
+def schema_with_rows(schema: Schema, params: tuple[str, ...]) -> Schema:
+    """`schema` with the relation of rows declared, for compiling joins with it."""
+    rows = Signature(ROWS, tuple(map(TypedVariable, params)))
+    return Schema(schema.types, schema.constants, {**schema.predicates, ROWS: rows}, schema.functions)
