@@ -49,6 +49,7 @@ bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare i
 
 bench-broken: $(VENV)/.run   ## how long the error in a broken plot takes, median and longest (RUNS=N)
 	$(BIN)/python benchmarks/broken_plots.py --runs $(or $(RUNS),3)
+
 bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this engine, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/engine.py $(if $(WRITE),--write)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from threading import RLock
 
@@ -25,6 +26,19 @@ class Announcer:
         self._next_key = 0
         self._waiting: deque[Callable[[], None]] = deque()
         self._delivering = False
+        self._quiet = False
+
+    @contextmanager
+    def quiet(self) -> Iterator[None]:
+        """Nothing is delivered meanwhile; used under the lock, by a thread that goes on holding it.
+
+        Within a transaction whoever listens would hear of other commits under the lock.
+        """
+        self._quiet = True
+        try:
+            yield
+        finally:
+            self._quiet = False
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` with every later change, until the function returned is called."""
@@ -54,7 +68,7 @@ class Announcer:
             ExceptionGroup: listeners failed; all others have heard everything nevertheless.
         """
         with self._lock:
-            if self._delivering:
+            if self._delivering or self._quiet:
                 return
             self._delivering = True
         errors: list[Exception] = []

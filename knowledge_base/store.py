@@ -26,7 +26,7 @@ from knowledge_base.transaction import Transaction
 from knowledge_base.view import View
 from knowledge_base.world_graph import WorldGraph
 
-Clock = Callable[[], float]
+Now = Callable[[], float]
 """Tells the time in seconds."""
 
 
@@ -44,7 +44,7 @@ class KnowledgeBase(Observable):
         history: what it goes on from and where its changes are kept; the schema is that of the history then.
     """
 
-    def __init__(self, schema: Schema, clock: Clock = wall.time, history: History | None = None) -> None:
+    def __init__(self, schema: Schema, clock: Now = wall.time, history: History | None = None) -> None:
         self._history = history or MemoryHistory(Version(WorldState(schema), 0, clock()))
         start = self._history.newest()
         super().__init__(start.state, start.version)
@@ -59,7 +59,7 @@ class KnowledgeBase(Observable):
         schema: Schema | None,
         path: str | Path | None = None,
         durability: Durability | None = None,
-        clock: Clock = wall.time,
+        clock: Now = wall.time,
         *,
         read_only: bool = False,
     ) -> KnowledgeBase:
@@ -95,7 +95,7 @@ class KnowledgeBase(Observable):
 
     @classmethod
     def from_json(
-        cls, text_or_path: str | Path, schema: Schema | None = None, clock: Clock = wall.time
+        cls, text_or_path: str | Path, schema: Schema | None = None, clock: Now = wall.time
     ) -> KnowledgeBase:
         """What `to_json` wrote, from its text or a file (a `Path`), at the same version, in memory.
 
@@ -135,19 +135,22 @@ class KnowledgeBase(Observable):
             ConflictError: the version is not the expected one, or this thread is inside another transaction.
             StoreError: the file cannot be written; nothing was changed.
         """
-        with self._lock:
-            self._refuse_nesting()
-            first = self._first(key, expect)
-            transaction = Transaction(Overlay(self._state), self._questions, first)
-            self._writer = (get_ident(), author)
-            try:
-                yield transaction
-            finally:
-                self._writer = None
-                transaction.close()
-            if first is None:
-                transaction.change = self._commit(transaction.delta, author, key, along)
-        self._announcer.deliver()
+        try:
+            with self._lock:
+                self._refuse_nesting()
+                first = self._first(key, expect)
+                transaction = Transaction(Overlay(self._state), self._questions, first)
+                self._writer = (get_ident(), author)
+                try:
+                    with self._announcer.quiet():
+                        yield transaction
+                finally:
+                    self._writer = None
+                    transaction.close()
+                if first is None:
+                    transaction.change = self._commit(transaction.delta, author, key, along)
+        finally:
+            self._announcer.deliver()
 
     def apply(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from threading import RLock
 
 import pytest
 from hypothesis import given, settings
@@ -12,6 +13,7 @@ from kb_strategies import SCHEMA, THINGS
 from kb_worlds import PROPERTY, Ticks
 
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
+from knowledge_base.announcement import Announcer
 from knowledge_base.journal.history import Version
 from knowledge_base.journal.memory import MemoryHistory
 
@@ -174,3 +176,15 @@ def commit(kb, delta) -> None:
         kb.apply(delta, author="test")
     except InputError:  # about a thing that was removed
         return
+
+
+def test_nobody_is_called_while_a_transaction_is_open():
+    lock, heard = RLock(), []
+    announcer = Announcer(lock)
+    with lock:
+        announcer.queue(lambda: heard.append("of another commit"))
+        with announcer.quiet():
+            announcer.deliver()  # as `install` does inside a transaction
+            assert heard == []
+    announcer.deliver()
+    assert heard == ["of another commit"]
