@@ -14,7 +14,7 @@ from dsc.model.states import AnyState, DynamicState, FinalState, OrthogonalState
 from knowledge_base.language.expression import Expression
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)  # never changed; frozen, it would take five times as long to make
 class Edge:
     """A transition between nodes, by their indices; without targets nothing is left or entered.
 
@@ -110,14 +110,16 @@ class Node:
     def __post_init__(self) -> None:
         # Worked out once: a step asks for it too often.
         self.parent = self.around[0] if self.around else -1
-        self.final = isinstance(self.state, FinalState)
-        self.orthogonal = isinstance(self.state, OrthogonalState)
-        self.holds_plot = isinstance(self.state, SubmachineState | DynamicState)
+        kind = type(self.state)
+        self.final = kind is FinalState
+        self.orthogonal = kind is OrthogonalState
+        self.holds_plot = kind is SubmachineState or kind is DynamicState
 
     def settle(self) -> None:
         """Work out what follows from its transitions and actions, when all of them are there."""
         self.timed = bool(self.timeouts or self.cycles) or self.at_least is not None
-        starts = any(isinstance(action, Trigger) for action in (*self.entry, *self.exit, *self.broken))
+        actions = (*self.entry, *self.exit, *self.broken)
+        starts = bool(actions) and any(isinstance(action, Trigger) for action in actions)
         self.addressed = starts or self.timed or self.holds_plot or DONE in self.edges
 
 
