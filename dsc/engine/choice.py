@@ -66,6 +66,11 @@ def _first_choice(configuration: Configuration, trigger: Trigger) -> Choice | No
     return _work_out(configuration, trigger, {})
 
 
+def settled(guard: Expression, configuration: Configuration) -> Expression:
+    """A guard of the configuration's plot; what it asks about active states is answered."""
+    return settle(guard, configuration.is_active) if configuration.compiled.scxml else guard
+
+
 class _Open(Exception):  # noqa: N818  # no error: the search stops at a question
     def __init__(self, edge: Edge, condition: Expression) -> None:
         super().__init__()
@@ -77,7 +82,7 @@ def _work_out(configuration: Configuration, trigger: Trigger, answers: Mapping[E
     def guard(_frame: Frame, edge: Edge) -> bool:
         if edge.guard is None:
             return True
-        condition = settle(edge.guard, configuration.is_active) if configuration.compiled.scxml else edge.guard
+        condition = settled(edge.guard, configuration)
         if condition in (TRUE, FALSE):
             return condition == TRUE
         if edge not in answers:

@@ -42,7 +42,7 @@ class Execution(Performer):
     def enter_plot(self, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> Frame:
         """A plot as the outermost one; raises `InputError` if the arguments do not fit."""
         frame = self._new_frame(compiled, arguments)
-        self._enter_initial(frame, initial_reaction(compiled))
+        self._enter_initial(frame)
         return frame
 
     def leave_plot(self, frame: Frame) -> None:
@@ -54,9 +54,7 @@ class Execution(Performer):
         if reaction.exits:
             self.exit(frame, reaction.exits)
         frame.configuration = reaction.following
-        passed = [self._act(frame, part) if part.acts else NOTHING for part in reaction.parts]
-        for part, arguments in zip(reaction.parts, passed, strict=True):
-            self._enter_part(frame, part, arguments)
+        self._act_and_enter([(frame, part) for part in reaction.parts])
 
     def take_together(self, reactions: Mapping[Frame, Reaction], parts: Sequence[tuple[Frame, Part]]) -> None:
         """The same for several plots at once; `parts` are those of all of them, in the order in which they act."""
@@ -65,6 +63,10 @@ class Execution(Performer):
             self.exit(frame, (one,))
         for frame, reaction in reactions.items():
             frame.configuration = reaction.following
+        self._act_and_enter(parts)
+
+    def _act_and_enter(self, parts: Sequence[tuple[Frame, Part]]) -> None:
+        """All transitions act before anything is entered."""
         passed = [self._act(frame, part) if part.acts else NOTHING for frame, part in parts]
         for (frame, part), arguments in zip(parts, passed, strict=True):
             self._enter_part(frame, part, arguments)
@@ -121,9 +123,8 @@ class Execution(Performer):
 
     # -- entering ----------------------------------------------------------------------------------------
 
-    def _enter_initial(self, frame: Frame, reaction: Reaction) -> None:
-        frame.configuration = reaction.following
-        for part in reaction.parts:
+    def _enter_initial(self, frame: Frame) -> None:
+        for part in initial_reaction(frame.compiled).parts:
             self._enter_part(frame, part, NOTHING)
 
     def _enter_part(self, frame: Frame, part: Part, passed: Mapping[str, Any]) -> None:
@@ -198,7 +199,7 @@ class Execution(Performer):
             raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [frame.prefix + name])
         inner = self._new_frame(compiled, arguments, frame.prefix + name)
         inner.put_into(frame, name)
-        self._enter_initial(inner, initial_reaction(compiled))
+        self._enter_initial(inner)
 
     def _new_frame(self, compiled: CompiledPlot, arguments: Mapping[str, Any], path: str = "") -> Frame:
         variables = fill_parameters(compiled.plot, arguments, self.situation)

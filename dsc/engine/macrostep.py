@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from dsc.engine.choice import Question, choice_of
+from dsc.engine.choice import Question, choice_of, settled
 from dsc.engine.configuration import configuration_of
 from dsc.engine.determinisation import reaction_of
 from dsc.engine.execution import Execution
 from dsc.engine.frames import Frame, freeze, thaw
-from dsc.engine.membership import settle
 from dsc.engine.reaction import Part, Reaction, report
 from dsc.engine.selection import Addressed, Enabled, Trigger, select
 from dsc.engine.situation import Situation
@@ -174,8 +173,7 @@ class Macrostep(Execution):
     def _guard(self, frame: Frame, edge: Edge) -> bool:
         if edge.guard is None:
             return True
-        condition = settle(edge.guard, frame.configuration.is_active) if frame.compiled.scxml else edge.guard
-        return self._holds(frame, edge, condition)
+        return self._holds(frame, edge, settled(edge.guard, frame.configuration))
 
     def _holds(self, frame: Frame, edge: Edge, condition: Expression) -> bool:
         try:

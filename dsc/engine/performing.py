@@ -90,7 +90,7 @@ class Performer(Record):
         for index, timed in enumerate(node.cycles):
             self.start_timer(frame, node, activation, EVERY, index, timed.seconds)
 
-    def start_timer(  # all that names a timer
+    def start_timer(
         self, frame: Frame, node: Node, activation: int, event: str, index: int, seconds: TermField
     ) -> None:
         """Ask for one timer of a state; a delay that cannot be worked out is a failure like others."""
