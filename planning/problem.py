@@ -15,6 +15,7 @@ from knowledge_base.facts import Fact
 from knowledge_base.language.check import check
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import Expression, Term
+from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.printer import to_text
 from planning.assembly import Assembly
 from planning.conditions import Every, Grounder, Leaf, Literal, Residual, Some
@@ -45,6 +46,8 @@ _MOST_KEPT = 8  # goals of different kinds, each with its ground actions
 def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Metric | None = None) -> Problem:
     """The problem of reaching `goal` from `world`, which stays as it is.
 
+    What the next problem of the same domain needs again is kept; see `Poser`.
+
     Args:
         domain: the planning actions.
         world: the present.
@@ -57,7 +60,8 @@ def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Metric 
             predicate that cannot be planned with.
         UnsupportedActionError: so does an action that matters, or it has too many alternatives.
     """
-    return Poser(domain).pose(world, goal, metric)
+    poser = _posers.find(domain, None) or _posers.keep(domain, None, Poser(domain))
+    return poser.pose(world, goal, metric)
 
 
 def check_goal(goal: Expression, world: World) -> None:
@@ -207,6 +211,9 @@ def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Leaf, ...]
             return (chosen,)
         case _:
             return ()
+
+
+_posers: IdentityCache[PlanningDomain, Poser] = IdentityCache(size=8)
 
 
 def said(numbering: Numbering, missing: int, goal: Expression) -> str:

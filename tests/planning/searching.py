@@ -22,7 +22,7 @@ def breadth_first(problem, most=20_000):
     return None
 
 
-def cheapest(problem):
+def cheapest(problem, most=20_000):
     """A cheapest sequence of action numbers, or None (Dijkstra)."""
     counter = itertools.count()
     agenda, seen = [(0.0, next(counter), _start(problem), ())], set()
@@ -33,6 +33,7 @@ def cheapest(problem):
         if _key(state, numbers) in seen:
             continue
         seen.add(_key(state, numbers))
+        assert len(seen) < most, "too large to search through"
         for number, after in _successors(problem, state, numbers):
             heapq.heappush(agenda, (cost + problem.actions[number].cost, next(counter), after, (*taken, number)))
     return None

@@ -127,4 +127,4 @@ def test_a_poser_poses_the_same_numeric_problem_again(actions, turns):
     poser = Poser(domain)
     for (facts, numbers, limit), goal_text in turns:
         world, goal = world_of(domain, (frozenset(facts), numbers), limit), parse_condition(goal_text)
-        assert poser.pose(world, goal) == pose(domain, world, goal)
+        assert poser.pose(world, goal) == Poser(domain).pose(world, goal)

@@ -301,13 +301,13 @@ def test_a_poser_that_posed_before_poses_the_same_problem(actions, turns):
         removed = tuple(one for one, there in changes if not there)
         world.apply(Delta(removed=removed, added=tuple(one for one, there in changes if there)), author="test")
         goal = parse_condition(goal_text)
-        assert poser.pose(world, goal) == pose(domain, world, goal)
+        assert poser.pose(world, goal) == Poser(domain).pose(world, goal)
 
 
 def test_a_poser_follows_things_that_come_and_go(clean_up, table):
     poser = Poser(clean_up)
     for world in (table(2), table(3, 2, ["two"]), table(1), table(3, 1, ["one"]), table(2, 2, ["two"])):
-        assert poser.pose(world, ALL_TIDY) == pose(clean_up, world, ALL_TIDY)
+        assert poser.pose(world, ALL_TIDY) == Poser(clean_up).pose(world, ALL_TIDY)
 
 
 def test_a_poser_follows_what_conditions_were_evaluated_on():
@@ -326,4 +326,4 @@ def test_a_poser_follows_what_conditions_were_evaluated_on():
     ]
     for change in turns:
         world.apply(change, author="test")
-        assert poser.pose(world, goal) == pose(domain, world, goal)
+        assert poser.pose(world, goal) == Poser(domain).pose(world, goal)
