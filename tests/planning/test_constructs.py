@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import pytest
+
+from knowledge_base.language.parser import parse_condition
+from planning.constructs import numeric_constructs, why_no_engine
+from planning.domain import PlanningDomain
+
+JARS = """(define (domain jars) (:types jar)
+  (:predicates (sealed ?j - jar) (full ?j - jar) (washed ?j - jar))
+  (:functions (litres ?j - jar) (size ?j - jar))
+  (:derived (full ?j - jar) (>= (litres ?j) (size ?j)))
+  (:action fill :parameters (?j - jar) :precondition (> (size ?j) 1) :effect (increase (litres ?j) 1))
+  (:action seal :parameters (?j - jar) :precondition (> (litres ?j) 2) :effect (sealed ?j))
+  (:action wash :parameters (?j - jar) :effect (washed ?j)))
+"""
+
+
+@pytest.fixture(scope="module")
+def jars():
+    return PlanningDomain.parse(JARS, "jars.pddl")
+
+
+def found(domain, goal):
+    return [str(one) for one in numeric_constructs(domain, parse_condition(goal))]
+
+
+def test_the_action_and_the_place_are_named(jars):
+    [said] = found(jars, "(forall (?j - jar) (sealed ?j))")
+    assert said.startswith("jars.pddl:6:")
+    assert said.endswith("planning action 'seal' compares numbers that actions change: (> (litres ?j) 2)")
+
+
+def test_a_goal_about_numbers_is_named_before_actions(jars):
+    said = found(jars, "(forall (?j - jar) (and (sealed ?j) (< (litres ?j) 9)))")
+    assert "the goal compares numbers that actions change: (< (litres ?j) 9)" in said[0]
+    assert "'seal'" in said[1]
+
+
+def test_a_derived_predicate_is_named_by_what_it_follows_from(jars):
+    [said] = found(jars, "(exists (?j - jar) (full ?j))")
+    assert "jars.pddl:4:" in said
+
+
+def test_numbers_that_nobody_changes_ask_nothing_of_an_engine(jars):
+    assert found(jars, "(forall (?j - jar) (and (washed ?j) (> (size ?j) 1)))") == []
+
+
+def test_who_could_plan_is_said_with_how_to_get_it(jars):
+    goal = parse_condition("(exists (?j - jar) (sealed ?j))")
+    assert "enhsp could (pip install x)" in why_no_engine(jars, goal, {"enhsp": "pip install x"})
+    assert why_no_engine(jars, goal, {}).endswith("(> (litres ?j) 2); no engine known here can do that")
