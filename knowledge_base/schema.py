@@ -258,7 +258,9 @@ def _typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
             raise SchemaError(f"the {kind} '{name}' can have only one type", place=place)
         declared = TypedName(name, types or (ROOT_TYPE,), place)
         first = found.setdefault(name, declared)
-        if first.types != declared.types:
+        if first.types == (ROOT_TYPE,):  # says nothing: everything is an object
+            found[name] = declared
+        elif declared.types not in (first.types, (ROOT_TYPE,)):
             before = f"{name} - {first.types[0]}", first.place
             raise _twice(kind, name, before, (f"{name} - {declared.types[0]}", place))
     return found

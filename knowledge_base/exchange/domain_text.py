@@ -142,18 +142,18 @@ def _declarations(nodes: Sequence[Node], result: str | None = None) -> list[Decl
         if isinstance(node, Word):
             position = _after_result_type(nodes, position, result)
             continue
-        declared = _declaration(node)
+        declared = _declaration(node, distinct=False)  # only the types count there
         if declared.name != "=":  # declared by old files, though the language has it
             found.append(declared)
         position += 1
     return found
 
 
-def _declaration(group: Group) -> DeclarationText:
+def _declaration(group: Group, *, distinct: bool = True) -> DeclarationText:
     head = group.head()
     if head is None or head[0] in "?:":
         raise ParseError("a declaration begins with a name: (NAME ?x - TYPE)", place=group.place)
-    return DeclarationText(head, typed_variables(group.items[1:]), group.place)
+    return DeclarationText(head, typed_variables(group.items[1:], distinct=distinct), group.place)
 
 
 def _after_result_type(nodes: Sequence[Node], position: int, result: str | None) -> int:

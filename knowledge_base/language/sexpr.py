@@ -1,8 +1,9 @@
 r"""Text to nested groups of words: the outer form of all PDDL text.
 
-A word is a run of characters other than blanks, parentheses, quotes and semicolons; `;` starts a comment;
-`"..."` is text with the escapes `\"`, `\\` and `\n`. Reading is iterative; nesting is limited to
-`MAX_DEPTH` because everything that follows recurses, and nobody writes conditions that deep.
+A word is a run of characters other than blanks, parentheses, quotes and semicolons, and `?` begins a new one
+(`(on?x ?y)` is found in files); `;` starts a comment; `"..."` is text with the escapes `\"`, `\\` and `\n`. Reading
+is iterative; nesting is limited to `MAX_DEPTH` because everything that follows recurses, and nobody writes conditions
+that deep.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from knowledge_base.errors import ParseError, Place
 MAX_DEPTH = 100
 
 _TOKEN = re.compile(
-    r"""(?P<skip>\s+|;[^\n]*)|(?P<open>\()|(?P<close>\))|(?P<text>"(?:[^"\\]|\\.)*")|(?P<word>[^\s()";]+)""",
+    r"""(?P<skip>\s+|;[^\n]*)|(?P<open>\()|(?P<close>\))|(?P<text>"(?:[^"\\]|\\.)*")|(?P<word>[^\s()";][^\s()";?]*)""",
     re.DOTALL,
 )
 _HALF = re.compile("[\udc80-\udcff]")  # what a file's other bytes are read as

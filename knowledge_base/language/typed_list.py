@@ -71,20 +71,22 @@ def parse_variables(node: Node) -> tuple[TypedVariable, ...]:
     return typed_variables(node.items)
 
 
-def typed_variables(nodes: Sequence[Node]) -> tuple[TypedVariable, ...]:
+def typed_variables(nodes: Sequence[Node], *, distinct: bool = True) -> tuple[TypedVariable, ...]:
     """The variables of a typed list that is not in parentheses of its own, as in `(on ?a ?b - item)`.
 
     Raises:
-        ParseError: a name without `?`, or the same name twice.
+        ParseError: a name without `?`, or the same name twice where they have to be `distinct`.
     """
-    variables: dict[str, TypedVariable] = {}
+    seen: set[str] = set()
+    found: list[TypedVariable] = []
     for name, types, place in parse_typed_list(nodes):
         if not name.startswith("?") or name == "?":
             raise ParseError(f"a variable begins with '?': ?{name.lstrip('?') or 'x'}", place=place)
-        if name in variables:
+        if distinct and name in seen:
             raise ParseError(f"the variable '{name}' is declared twice", place=place)
-        variables[name] = TypedVariable(name[1:], types, place=place)
-    return tuple(variables.values())
+        seen.add(name)
+        found.append(TypedVariable(name[1:], types, place=place))
+    return tuple(found)
 
 
 def _unglued(nodes: Sequence[Node]) -> list[Node]:

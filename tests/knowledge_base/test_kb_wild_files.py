@@ -7,6 +7,7 @@ import pytest
 from knowledge_base import InputError, KnowledgeBase, Schema, fact
 from knowledge_base.exchange.pddl import read_domain, read_problem
 from knowledge_base.language.expression import TRUE
+from knowledge_base.language.printer import to_text
 
 SMALL = Schema.parse(
     "(define (domain small) (:types cup can) (:predicates (full ?c - cup) (dry)) (:functions (f ?c) (g)))"
@@ -83,6 +84,22 @@ def test_an_installed_condition_ranges_over_the_type_not_over_the_predicate_of_i
 def test_such_a_predicate_is_noted() -> None:
     (remark,) = read_domain(TRUCKS, "d").remarks()
     assert remark.startswith("d:2:16: the predicate 'truck' has the name of a type (at d:1:33)")
+
+
+def test_a_variable_glued_to_its_predicate() -> None:
+    (action,) = read_domain("(define (domain d) (:action a :parameters(?x?y) :precondition (on?x?y)))").actions
+    assert [p.name for p in action.parameters] == ["x", "y"]
+    assert to_text(action.precondition) == "(on ?x ?y)"
+
+
+def test_a_declaration_whose_variables_have_one_name() -> None:
+    assert domain("(:types cup) (:predicates (in ?x ?x - cup))").predicates["in"].arity == 2
+
+
+def test_a_type_declared_as_any_object_and_more_closely() -> None:
+    assert domain("(:types area - object crate - area area - surface surface)").ancestors("crate") == (
+        *("crate", "area", "surface", "object"),
+    )
 
 
 def test_a_type_said_again_as_a_fact() -> None:
