@@ -131,7 +131,9 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
 
 
 def _misspelt(name: str, valid: Collection[str]) -> bool:
-    return bool(difflib.get_close_matches(name, valid, n=1, cutoff=0.8))
+    """Whether a name is much like a valid one, and not because one goes on where the other ends (kiln, kiln8)."""
+    close = difflib.get_close_matches(name, valid, cutoff=0.8)
+    return any(not other.startswith(name) and not name.startswith(other) for other in close)
 
 
 def _declarations(nodes: Sequence[Node], result: str | None = None) -> list[DeclarationText]:

@@ -18,11 +18,12 @@ class TypedName(NamedTuple):
     place: Place
 
 
-def parse_typed_list(nodes: Sequence[Node]) -> list[TypedName]:
+def parse_typed_list(nodes: Sequence[Node], *, perhaps_none: bool = False) -> list[TypedName]:
     """The names of a typed list with their types, in order.
 
     Raises:
-        ParseError: a `-` without names before it or a type after it, or a group where a name is expected.
+        ParseError: a `-` without a type after it, or without names before it unless there are `perhaps_none`; a
+            group where a name is expected.
     """
     nodes = _unglued(nodes)
     found: list[TypedName] = []
@@ -36,7 +37,7 @@ def parse_typed_list(nodes: Sequence[Node]) -> list[TypedName]:
             untyped.append(node)
             position += 1
             continue
-        if not untyped:
+        if not untyped and not perhaps_none:
             raise ParseError("'-' without a name before it", place=node.place)
         if position + 1 == len(nodes):
             raise ParseError("'-' without a type after it", place=node.place)
@@ -50,10 +51,12 @@ def parse_typed_list(nodes: Sequence[Node]) -> list[TypedName]:
 def parse_names(nodes: Sequence[Node]) -> list[TypedName]:
     """A typed list of things or types, whose names must be told from variables, numbers and keywords.
 
+    There may be none of a type: files that were generated have that.
+
     Raises:
         ParseError: as `parse_typed_list`, or such a name.
     """
-    names = parse_typed_list(nodes)
+    names = parse_typed_list(nodes, perhaps_none=True)
     for name, _types, place in names:
         if name[:1] in ("?", ":") or name == "" or name in TRUTH_VALUES or is_number(name):
             raise ParseError(f"'{name}' cannot be a name; a name begins with a letter", place=place)

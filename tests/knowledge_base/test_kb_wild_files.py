@@ -42,6 +42,14 @@ def test_a_parent_that_nobody_declares_is_a_type() -> None:
     ]
 
 
+def test_a_parent_whose_name_begins_like_another_is_no_typing_error() -> None:
+    assert domain("(:types kiln8 - kiln cup - objects)").ancestors("kiln8") == ("kiln8", "kiln", "object")
+
+
+def test_no_things_of_a_type() -> None:
+    assert dict(problem("(:domain small) (:objects a - cup - can b - can)").objects) == {"a": "cup", "b": "can"}
+
+
 def test_a_requirement_that_nobody_knows_is_a_note() -> None:
     read = read_domain("(define (domain d) (:requirements :typing :strip :fancy))", "d")
     assert read.requirements == (":typing", ":strip", ":fancy")
