@@ -64,7 +64,8 @@ class Result:
     """What became of one pair.
 
     Attributes:
-        verdict: `plan`, `unsolvable`, `timed out`, `not read`, `not posed`, `engine failed` or `wrong`.
+        verdict: `plan`, `unsolvable`, `no sequential plan`, `timed out`, `not read`, `not posed`, `engine failed` or
+            `wrong`.
         engine: who said so.
         steps: the length of the plan.
         detail: why not; for a plan, what unified-planning says to it.
@@ -143,7 +144,8 @@ def tried(pair: Pair, seconds: float) -> Result:
             verdict = "wrong" if said.startswith("invalid") else "plan"
             return Result(pair.name, verdict, engine, len(plan.steps), said)
         case ProvenUnsolvable(engine, reason):
-            return Result(pair.name, "unsolvable", engine, detail=reason)
+            verdict = "no sequential plan" if _durative(domain) else "unsolvable"
+            return Result(pair.name, verdict, engine, detail=reason)
         case TimedOut(engine, limit):
             return Result(pair.name, "timed out", engine, detail=f"after {limit:g} s")
         case EngineFailed(engine, message):
@@ -160,7 +162,7 @@ def judged(pair: Pair, plan: Plan, domain: PlanningDomain, problem: ProblemText)
         ActionInstance(theirs.action(step.action), tuple(map(theirs.object, step.args))) for step in plan.steps
     ]
     try:
-        if any(action.duration for action in domain.actions.values()):
+        if _durative(domain):
             timed = TimeTriggeredPlan(list(_timed(plan, instances, domain, problem)))
             verdict = TimeTriggeredPlanValidator().validate(theirs, timed)
         else:
@@ -182,6 +184,10 @@ def _timed(
         yield now, instance, seconds
         world.apply(domain.effects(step, world), author="plan")
         now += (seconds or 0) + PAUSE
+
+
+def _durative(domain: PlanningDomain) -> bool:
+    return any(action.duration is not None for action in domain.actions.values())
 
 
 async def _solved(posed: Any, seconds: float) -> PlanningOutcome:
