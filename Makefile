@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check conformance soak kill-kb bench-startup bench-broken bench-engine pictures clean
+.PHONY: help demo test check conformance sweep-pddl soak kill-kb bench-startup bench-broken bench-engine pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -37,6 +37,9 @@ check: $(VENV)/.test   ## ruff, mypy strict, import contracts
 
 conformance: $(VENV)/.test   ## SCION's SCXML charts, fetched with npm into .conformance/, on this engine (WRITE=1 writes the docs)
 	$(BIN)/python tests/conformance/charts.py $(if $(WRITE),--write)
+
+sweep-pddl: $(VENV)/.test   ## the PDDL files that come with unified-planning: read, planned for, plans checked by their validator (WRITE=1 writes the docs)
+	$(BIN)/python -W ignore tests/conformance/pddl_sweep.py $(if $(WRITE),--write)
 
 soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every report true? (SEEDS=N FAULTS=P)
 	$(BIN)/python benchmarks/clean_up_seeds.py --seeds $(or $(SEEDS),200) --faults $(or $(FAULTS),0.2)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import difflib
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from knowledge_base.errors import ParseError, Place
@@ -34,7 +35,7 @@ class DeclarationText:
 
     name: str
     parameters: tuple[TypedVariable, ...]
-    place: Place
+    place: Place | None = field(compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,8 @@ class AxiomText:
 class DomainText:
     """All of a domain file, in the order of the file; names are in lower case.
 
-    `notes` says with its place what deserves a look though it changes nothing.
+    `notes` says with its place what deserves a look in the file though it changes nothing; `source` is what the
+    file is called in messages.
     """
 
     name: str
@@ -61,6 +63,32 @@ class DomainText:
     actions: tuple[ActionText, ...]
     axioms: tuple[AxiomText, ...] = ()
     notes: tuple[str, ...] = ()
+    source: str | None = field(default=None, compare=False)
+
+    def implied_types(self) -> tuple[TypedName, ...]:
+        """Types that are named only as what others are below: they are types of their own.
+
+        One that is written much like a declared type is not among them: that is a typing error.
+        """
+        declared = {"object", *(name for name, _, _ in self.types)}
+        used: dict[str, Place] = {}
+        for parent, place in ((p, place) for _, parents, place in self.types for p in parents):
+            if parent not in declared:
+                used.setdefault(parent, place)
+        return tuple(TypedName(name, (), place) for name, place in used.items() if not _misspelt(name, declared))
+
+    def remarks(self) -> Iterator[str]:
+        """The notes of the files, and what deserves a look in all that they declare together."""
+        yield from self.notes
+        for name, _, place in self.implied_types():
+            yield f"{place}: the type '{name}' is not declared and taken to be one of its own"
+        types = {name: place for name, _, place in self.types}
+        for predicate in self.predicates:
+            if predicate.name in types and len(predicate.parameters) == 1:
+                yield (
+                    f"{predicate.place}: the predicate '{predicate.name}' has the name of a type"
+                    f" (at {types[predicate.name]}); ({predicate.name} ?x) asks for the predicate"
+                )
 
 
 def read_domain(text_or_path: str | Path, source: str | None = None) -> DomainText:
@@ -74,7 +102,7 @@ def read_domain(text_or_path: str | Path, source: str | None = None) -> DomainTe
         InputError: the file cannot be read.
         ParseError: the form is wrong.
         UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
-        SchemaError: two actions have one name.
+        SchemaError: two different actions have one name.
     """
     return parse_domain(*text_and_source(text_or_path, source))
 
@@ -85,7 +113,7 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
     Raises:
         ParseError: the form is wrong.
         UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
-        SchemaError: two actions have one name.
+        SchemaError: two different actions have one name.
     """
     definition = read_definition(text, source, "domain", _SECTIONS)
     return DomainText(
@@ -98,7 +126,14 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
         actions=read_actions(definition.sections),
         axioms=tuple(_axiom(group) for keyword, group in definition.sections if keyword == ":derived"),
         notes=tuple(definition.notes()),
+        source=source,
     )
+
+
+def _misspelt(name: str, valid: Collection[str]) -> bool:
+    """Whether a name is much like a valid one, and not because one goes on where the other ends (kiln, kiln8)."""
+    close = difflib.get_close_matches(name, valid, cutoff=0.8)
+    return any(not other.startswith(name) and not name.startswith(other) for other in close)
 
 
 def _declarations(nodes: Sequence[Node], result: str | None = None) -> list[DeclarationText]:
@@ -109,18 +144,18 @@ def _declarations(nodes: Sequence[Node], result: str | None = None) -> list[Decl
         if isinstance(node, Word):
             position = _after_result_type(nodes, position, result)
             continue
-        declared = _declaration(node)
+        declared = _declaration(node, distinct=False)  # only the types count there
         if declared.name != "=":  # declared by old files, though the language has it
             found.append(declared)
         position += 1
     return found
 
 
-def _declaration(group: Group) -> DeclarationText:
+def _declaration(group: Group, *, distinct: bool = True) -> DeclarationText:
     head = group.head()
     if head is None or head[0] in "?:":
         raise ParseError("a declaration begins with a name: (NAME ?x - TYPE)", place=group.place)
-    return DeclarationText(head, typed_variables(group.items[1:]), group.place)
+    return DeclarationText(head, typed_variables(group.items[1:], distinct=distinct), group.place)
 
 
 def _after_result_type(nodes: Sequence[Node], position: int, result: str | None) -> int:

@@ -33,6 +33,8 @@ REQUIREMENTS = frozenset(
         ":constraints",
         ":action-costs",
         ":time",
+        ":domain-axioms",
+        ":goal-utilities",
         ":hierarchy",
         ":method-preconditions",
         ":contingent",

@@ -15,7 +15,7 @@ from knowledge_base.errors import Place
 from knowledge_base.facts import Value
 
 # What can be written without quotes and is read back as the same text (names are folded to lower case).
-_PLAIN_NAME = re.compile(r"[^\s()\";?:]+[^\s()\";]*")
+_PLAIN_NAME = re.compile(r"[^\s()\";?:]+[^\s()\";?]*")
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?")
 TRUTH_VALUES: Mapping[str, bool] = {"true": True, "false": False}
 """The two words that are read as truth values, not as names."""

@@ -1,8 +1,9 @@
 r"""Text to nested groups of words: the outer form of all PDDL text.
 
-A word is a run of characters other than blanks, parentheses, quotes and semicolons; `;` starts a comment;
-`"..."` is text with the escapes `\"`, `\\` and `\n`. Reading is iterative; nesting is limited to
-`MAX_DEPTH` because everything that follows recurses, and nobody writes conditions that deep.
+A word is a run of characters other than blanks, parentheses, quotes and semicolons, and `?` begins a new one
+(`(on?x ?y)` is found in files); `;` starts a comment; `"..."` is text with the escapes `\"`, `\\` and `\n`. Reading
+is iterative; nesting is limited to `MAX_DEPTH` because everything that follows recurses, and nobody writes conditions
+that deep.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from knowledge_base.errors import ParseError, Place
 MAX_DEPTH = 100
 
 _TOKEN = re.compile(
-    r"""(?P<skip>\s+|;[^\n]*)|(?P<open>\()|(?P<close>\))|(?P<text>"(?:[^"\\]|\\.)*")|(?P<word>[^\s()";]+)""",
+    r"""(?P<skip>\s+|;[^\n]*)|(?P<open>\()|(?P<close>\))|(?P<text>"(?:[^"\\]|\\.)*")|(?P<word>[^\s()";][^\s()";?]*)""",
     re.DOTALL,
 )
+_HALF = re.compile("[\udc80-\udcff]")  # what a file's other bytes are read as
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 
 
@@ -65,7 +67,7 @@ def read(text: str, source: str | None = None) -> list[Node]:
         source: the name of the file it comes from, for messages.
 
     Raises:
-        ParseError: a parenthesis or quote without its partner, or nesting beyond `MAX_DEPTH`.
+        ParseError: a parenthesis or quote without its partner, nesting beyond `MAX_DEPTH`, or half a character.
     """
     stack = [_Open(Place(source, 1, 1))]
     for kind, word, place in _tokens(text, source):
@@ -101,6 +103,8 @@ def _tokens(text: str, source: str | None) -> Iterator[tuple[str, str, Place]]:
 
 
 def _word(kind: str, token: str, place: Place) -> Word:
+    if _HALF.search(token):
+        raise ParseError("this is not UTF-8 text", place=place)
     if kind == "word":
         return Word(token, place)
     plain = _ESCAPE.sub(lambda m: "\n" if m[1] == "n" else m[1], token[1:-1])

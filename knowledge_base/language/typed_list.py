@@ -18,12 +18,14 @@ class TypedName(NamedTuple):
     place: Place
 
 
-def parse_typed_list(nodes: Sequence[Node]) -> list[TypedName]:
+def parse_typed_list(nodes: Sequence[Node], *, perhaps_none: bool = False) -> list[TypedName]:
     """The names of a typed list with their types, in order.
 
     Raises:
-        ParseError: a `-` without names before it or a type after it, or a group where a name is expected.
+        ParseError: a `-` without a type after it, or without names before it unless there are `perhaps_none`; a
+            group where a name is expected.
     """
+    nodes = _unglued(nodes)
     found: list[TypedName] = []
     untyped: list[Word] = []
     position = 0
@@ -35,7 +37,7 @@ def parse_typed_list(nodes: Sequence[Node]) -> list[TypedName]:
             untyped.append(node)
             position += 1
             continue
-        if not untyped:
+        if not untyped and not perhaps_none:
             raise ParseError("'-' without a name before it", place=node.place)
         if position + 1 == len(nodes):
             raise ParseError("'-' without a type after it", place=node.place)
@@ -49,10 +51,12 @@ def parse_typed_list(nodes: Sequence[Node]) -> list[TypedName]:
 def parse_names(nodes: Sequence[Node]) -> list[TypedName]:
     """A typed list of things or types, whose names must be told from variables, numbers and keywords.
 
+    There may be none of a type: files that were generated have that.
+
     Raises:
         ParseError: as `parse_typed_list`, or such a name.
     """
-    names = parse_typed_list(nodes)
+    names = parse_typed_list(nodes, perhaps_none=True)
     for name, _types, place in names:
         if name[:1] in ("?", ":") or name == "" or name in TRUTH_VALUES or is_number(name):
             raise ParseError(f"'{name}' cannot be a name; a name begins with a letter", place=place)
@@ -70,20 +74,34 @@ def parse_variables(node: Node) -> tuple[TypedVariable, ...]:
     return typed_variables(node.items)
 
 
-def typed_variables(nodes: Sequence[Node]) -> tuple[TypedVariable, ...]:
+def typed_variables(nodes: Sequence[Node], *, distinct: bool = True) -> tuple[TypedVariable, ...]:
     """The variables of a typed list that is not in parentheses of its own, as in `(on ?a ?b - item)`.
 
     Raises:
-        ParseError: a name without `?`, or the same name twice.
+        ParseError: a name without `?`, or the same name twice where they have to be `distinct`.
     """
-    variables: dict[str, TypedVariable] = {}
+    seen: set[str] = set()
+    found: list[TypedVariable] = []
     for name, types, place in parse_typed_list(nodes):
         if not name.startswith("?") or name == "?":
             raise ParseError(f"a variable begins with '?': ?{name.lstrip('?') or 'x'}", place=place)
-        if name in variables:
+        if distinct and name in seen:
             raise ParseError(f"the variable '{name}' is declared twice", place=place)
-        variables[name] = TypedVariable(name[1:], types, place=place)
-    return tuple(variables.values())
+        seen.add(name)
+        found.append(TypedVariable(name[1:], types, place=place))
+    return tuple(found)
+
+
+def _unglued(nodes: Sequence[Node]) -> list[Node]:
+    """The list with `-cup`, as some files have it, in two words."""
+    return [part for node in nodes for part in _parted(node)]
+
+
+def _parted(node: Node) -> tuple[Node, ...]:
+    if isinstance(node, Group) or node.quoted or not node.text.startswith("-") or is_number(node.text):
+        return (node,)
+    after = Place(node.place.source, node.place.line, (node.place.column or 0) + 1)
+    return (Word("-", node.place), *([Word(node.text[1:], after)] if node.text != "-" else []))
 
 
 def _types(node: Node) -> tuple[str, ...]:
