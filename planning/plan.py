@@ -38,6 +38,9 @@ class PlanFound:
         seconds: how long that took in real time; differs from run to run.
         simulated_seconds: how long it takes in simulated time; depends on the problem only.
         reproducible: whether no limit of real time had a part in it, so that the same problem gives it again.
+        cost: what its actions cost together; their number, if nobody says what each costs.
+        from_cache: whether it was found for the same problem before.
+        failures: what happened to other engines that were asked as well.
     """
 
     plan: Plan
@@ -45,22 +48,27 @@ class PlanFound:
     seconds: float
     simulated_seconds: float
     reproducible: bool = True
+    cost: float = 0.0
+    from_cache: bool = False
+    failures: tuple[EngineFailed, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class ProvenUnsolvable:
-    """There is no plan; `reason` says what is known about why."""
+    """There is no plan; `reason` says what is known about why. For `failures` see `PlanFound`."""
 
     engine: str
     reason: str
+    failures: tuple[EngineFailed, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class TimedOut:
-    """The engine was stopped after `seconds` of real time; nothing is known."""
+    """The engine was stopped after `seconds` of real time; nothing is known. For `failures` see `PlanFound`."""
 
     engine: str
     seconds: float
+    failures: tuple[EngineFailed, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
