@@ -146,7 +146,7 @@ def test_cancelling_ends_an_engine_that_cannot_end_its_search_and_the_next_call_
         await hanging.warm_up()
         process = hanging._process
         task = asyncio.create_task(hanging.solve(PROBLEM, 600))
-        while not process._turn.locked():
+        while not process._turn.locked():  # noqa: ASYNC110  that happens in a thread
             await asyncio.sleep(0)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):

@@ -97,7 +97,7 @@ def test_stopping_takes_effect_at_once_and_leaves_no_process():
         await racing.warm_up()
         alive = [one._process._pid for one in racing._planners.values()]
         solving = asyncio.create_task(racing.solve(PROBLEM, 600))
-        while not all(one._process._turn.locked() for one in racing._planners.values()):
+        while not all(one._process._turn.locked() for one in racing._planners.values()):  # noqa: ASYNC110
             await asyncio.sleep(0)
         solving.cancel()
         with pytest.raises(asyncio.CancelledError):
