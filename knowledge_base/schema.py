@@ -11,6 +11,9 @@ from knowledge_base.exchange.domain_text import DeclarationText, DomainText, par
 from knowledge_base.language.expression import KEYWORDS, TypedVariable
 from knowledge_base.language.typed_list import TypedName
 
+Declared = tuple[str, Place | None]
+"""A declaration as written, and where."""
+
 ROOT_TYPE = "object"
 VALUE_TYPES = ("number", "text", "boolean")
 """Types of arguments that are values and not things; they have no subtypes and cannot be quantified over."""
@@ -103,7 +106,7 @@ class Schema:
         Raises:
             SchemaError: two declarations contradict each other; both places are named.
         """
-        types = _typed_names(domain.types, "type")
+        types = _typed_names((*domain.types, *domain.implied_types()), "type")
         constants = _typed_names(domain.constants, "constant")
         return cls(
             types={name: declared.types[0] for name, declared in types.items()},
@@ -125,7 +128,9 @@ class Schema:
         ):
             for name, declared in mine.items():
                 if theirs.get(name, declared) != declared:
-                    raise _twice(kind, name, self.places.get(name), other.places.get(name))
+                    mine_at = f"{name} - {declared}", self.places.get(name)
+                    theirs_at = f"{name} - {theirs[name]}", other.places.get(name)
+                    raise _twice(kind, name, mine_at, theirs_at)
         both = (*self.predicates.values(), *other.predicates.values())
         functions = (*self.functions.values(), *other.functions.values())
         return Schema(
@@ -163,7 +168,11 @@ class Schema:
             raise UnknownNameError(f"there is no type '{name}'", place=place, found=name, valid=self.types)
 
     def is_type(self, name: str, arity: int) -> bool:
-        """Whether an atom of that name and number of arguments tests a type."""
+        """Whether an atom of that name and number of arguments tests a type.
+
+        Where a predicate of one argument has a type's name, the atom is the predicate's, as in PDDL, which keeps
+        the two apart.
+        """
         return arity == 1 and name in self.types and name not in self.predicates
 
     def predicate(self, name: str, place: Place | None = None) -> Signature:
@@ -212,12 +221,6 @@ class Schema:
             if name in self.types:
                 raise SchemaError(f"'{name}' is a type of values, not of things", place=self.places.get(name))
         for name, signature in self.predicates.items():
-            if signature.arity == 1 and name in self.types:
-                raise SchemaError(
-                    f"the predicate '{name}' has the name of a type{_at(self.places.get(name))}, "
-                    "which already is a predicate of one argument",
-                    place=signature.place,
-                )
             if name in self.functions:
                 raise SchemaError(
                     f"the function '{name}' has the name of a predicate{_at(signature.place)}",
@@ -243,8 +246,9 @@ def _at(place: Place | None) -> str:
     return f" (at {place})" if place else ""
 
 
-def _twice(kind: str, name: str, first: Place | None, second: Place | None) -> SchemaError:
-    return SchemaError(f"the {kind} '{name}' is declared differently before{_at(first)}", place=second)
+def _twice(kind: str, name: str, first: Declared, second: Declared) -> SchemaError:
+    said = f"the {kind} '{name}' is declared differently before: {first[0]}{_at(first[1])}, and here {second[0]}"
+    return SchemaError(said, place=second[1])
 
 
 def _typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
@@ -255,7 +259,8 @@ def _typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
         declared = TypedName(name, types or (ROOT_TYPE,), place)
         first = found.setdefault(name, declared)
         if first.types != declared.types:
-            raise _twice(kind, name, first.place, place)
+            before = f"{name} - {first.types[0]}", first.place
+            raise _twice(kind, name, before, (f"{name} - {declared.types[0]}", place))
     return found
 
 
@@ -268,5 +273,5 @@ def _united(signatures: Iterable[Signature], kind: str) -> dict[str, Signature]:
     for signature in signatures:
         first = found.setdefault(signature.name, signature)
         if not first.means(signature):
-            raise _twice(kind, signature.name, first.place, signature.place)
+            raise _twice(kind, signature.name, (str(first), first.place), (str(signature), signature.place))
     return found

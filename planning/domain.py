@@ -18,6 +18,7 @@ from knowledge_base.language.expression import (
     Atom,
     Comparison,
     Constant,
+    Exists,
     Expression,
     Or,
     TypedVariable,
@@ -111,7 +112,7 @@ class PlanningDomain:
         actions = {a.name: _checked(a, schema) for a in read.actions}
         axioms = tuple(_checked_axiom(a, schema) for a in read.axioms)
         _refuse_changed(actions.values(), axioms)
-        return cls(read.name, schema, actions, axioms, read.notes)
+        return cls(read.name, schema, actions, axioms, tuple(read.remarks()))
 
     def applicable(self, step: PlanStep, world: World) -> bool:
         """Whether the arguments are of the parameters' types and the precondition holds."""
@@ -128,7 +129,7 @@ class PlanningDomain:
     def precondition(self, step: PlanStep) -> Expression:
         """The step's precondition as one conjunction with its arguments in it, their types first."""
         action, bindings = self.action(step), self.bindings(step)
-        types = [_type_test(p, bindings[p.name]) for p in action.parameters]
+        types = [_type_test(p, bindings[p.name], self.schema) for p in action.parameters]
         grounded = substitute(action.precondition, bindings)
         return And((*types, *(grounded.parts if isinstance(grounded, And) else (grounded,))))
 
@@ -155,8 +156,12 @@ class PlanningDomain:
         return {p.name: arg for p, arg in zip(parameters, step.args, strict=True)}
 
 
-def _type_test(parameter: TypedVariable, arg: str) -> Expression:
-    tests = tuple(Atom(one, (Constant(arg),)) for one in parameter.types or (ROOT_TYPE,))
+def _type_test(parameter: TypedVariable, arg: str, schema: Schema) -> Expression:
+    types = parameter.types or (ROOT_TYPE,)
+    if not all(schema.is_type(one, 1) for one in types):  # a predicate has the name
+        it = Variable(parameter.name)
+        return Exists((parameter,), Comparison("=", it, Constant(arg)))
+    tests = tuple(Atom(one, (Constant(arg),)) for one in types)
     return tests[0] if len(tests) == 1 else Or(tests)
 
 

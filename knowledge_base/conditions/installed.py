@@ -145,7 +145,7 @@ class Installed:
             yield "said", fluent.predicate, fluent.args, BOTH
 
     def _place(self, e: Expression, params: Mapping[str, Value]) -> Place:
-        shape, key = lifted(e, params)
+        shape, key = lifted(e, params, self._schema)
         relation = self._relations.get(shape)
         if relation is None:
             relation = self._relations[shape] = Relation(shape, self._schema)

@@ -30,6 +30,7 @@ from knowledge_base.language.expression import (
     substitute,
     variables_in_order,
 )
+from knowledge_base.schema import Schema
 
 Args = tuple[Value, ...]
 
@@ -49,23 +50,27 @@ class Shape:
     answers: tuple[str, ...]
 
 
-def lifted(e: Expression, params: Mapping[str, Value]) -> tuple[Shape, Args]:
+def lifted(e: Expression, params: Mapping[str, Value], schema: Schema) -> tuple[Shape, Args]:
     """The shape of `e` with `params` filled in, and the values of the shape's parameters.
 
     The variables of an outermost `exists` become answers, so that its witness is known.
     """
     lifting = _Lifting()
-    body = lifting.expression(_opened(substitute(e, params)))
+    body = lifting.expression(_opened(substitute(e, params), schema))
     names = tuple(lifting.names.values())
     answers = dict.fromkeys(name for name in variables_in_order(body) if name not in names)
     return Shape(body, names, tuple(answers)), tuple(value for _, value in lifting.names)
 
 
-def _opened(e: Expression) -> Expression:
+def _opened(e: Expression, schema: Schema) -> Expression:
     """`(exists (?c - cup) ...)` as `(and (cup ?c) ...)`, as long as no name then means two things."""
     ranges: list[Expression] = []
     seen: set[str] = set(free_variables(e))
-    while isinstance(e, Exists) and seen.isdisjoint(names := {v.name for v in e.variables}):
+    while (
+        isinstance(e, Exists)
+        and seen.isdisjoint(names := {v.name for v in e.variables})
+        and all(schema.is_type(t, 1) for v in e.variables for t in v.types)
+    ):
         ranges += map(_range, e.variables)
         seen |= names
         e = e.body

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,7 +50,7 @@ class AxiomText:
 class DomainText:
     """All of a domain file, in the order of the file; names are in lower case.
 
-    `notes` says with its place what deserves a look though it changes nothing.
+    `notes` says with its place what deserves a look in the file though it changes nothing.
     """
 
     name: str
@@ -61,6 +62,31 @@ class DomainText:
     actions: tuple[ActionText, ...]
     axioms: tuple[AxiomText, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def implied_types(self) -> tuple[TypedName, ...]:
+        """Types that are named only as what others are below: they are types of their own.
+
+        One that is written much like a declared type is not among them: that is a typing error.
+        """
+        declared = {"object", *(name for name, _, _ in self.types)}
+        used: dict[str, Place] = {}
+        for parent, place in ((p, place) for _, parents, place in self.types for p in parents):
+            if parent not in declared:
+                used.setdefault(parent, place)
+        return tuple(TypedName(name, (), place) for name, place in used.items() if not _misspelt(name, declared))
+
+    def remarks(self) -> Iterator[str]:
+        """The notes of the files, and what deserves a look in all that they declare together."""
+        yield from self.notes
+        for name, _, place in self.implied_types():
+            yield f"{place}: the type '{name}' is not declared and taken to be one of its own"
+        types = {name: place for name, _, place in self.types}
+        for predicate in self.predicates:
+            if predicate.name in types and len(predicate.parameters) == 1:
+                yield (
+                    f"{predicate.place}: the predicate '{predicate.name}' has the name of a type"
+                    f" (at {types[predicate.name]}); ({predicate.name} ?x) asks for the predicate"
+                )
 
 
 def read_domain(text_or_path: str | Path, source: str | None = None) -> DomainText:
@@ -99,6 +125,10 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
         axioms=tuple(_axiom(group) for keyword, group in definition.sections if keyword == ":derived"),
         notes=tuple(definition.notes()),
     )
+
+
+def _misspelt(name: str, valid: Collection[str]) -> bool:
+    return bool(difflib.get_close_matches(name, valid, n=1, cutoff=0.8))
 
 
 def _declarations(nodes: Sequence[Node], result: str | None = None) -> list[DeclarationText]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeGuard
 
-from knowledge_base.errors import ParseError, SchemaError, UnknownNameError
+from knowledge_base.errors import ParseError, Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.beyond import TIMED_INITIAL, refuse_forms, refused
 from knowledge_base.exchange.files import text_and_source
 from knowledge_base.exchange.sections import Definition, read_definition, word
@@ -87,25 +87,46 @@ def read_problem(
         text_or_path: a file, or text that begins with `(` or a comment.
         schema: the schema of its domain.
         source: the name of the text in messages.
-        domain: the name of that domain, if the problem must be for it.
+        domain: the name of that domain. A problem that says it is for another one is read all the same if it
+            fits, with a note: files in the wild are renamed.
 
     Raises:
-        InputError: the file cannot be read, or is for another domain.
+        InputError: the file cannot be read.
         ParseError: the form is wrong.
         UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
-        UnknownNameError: an undeclared type, predicate, function or object.
+        UnknownNameError: an undeclared type, predicate, function or object; it is for another domain.
         SchemaError: a wrong number of arguments, a wrong type, an object declared in two ways.
     """
     text, source = text_and_source(text_or_path, source)
     definition = read_definition(text, source, "problem", _SECTIONS)
-    named = _domain(definition, domain)
+    named = _domain(definition)
+    if domain is None or named.folded() == domain:
+        return _problem(definition, named, schema)
+    said = f"the problem is for the domain '{named.folded()}', not for '{domain}'"
+    try:
+        problem = _problem(definition, named, schema)
+    except (UnknownNameError, SchemaError) as error:
+        raise UnknownNameError(
+            f"{said}, and does not fit it: {error.message}", place=named.place, found=named.folded(), valid=(domain,)
+        ) from error
+    return replace(problem, notes=(*problem.notes, f"{named.place}: {said}, but fits it"))
+
+
+def _domain(definition: Definition) -> Word:
+    nodes = definition.nodes(":domain")
+    if len(nodes) != 1:
+        raise ParseError("a problem says what it is for: (:domain NAME)", place=definition.place)
+    return word(nodes[0], "the domain's name")
+
+
+def _problem(definition: Definition, named: Word, schema: Schema) -> ProblemText:
     objects = _objects(parse_names(definition.nodes(":objects")), schema)
     init = _Init(schema, {**schema.constants, **objects})
     for node in definition.nodes(":init"):
         init.read(node)
     return ProblemText(
         name=definition.name,
-        domain=named,
+        domain=named.folded(),
         objects=objects,
         init=tuple(init.facts),
         values=init.values,
@@ -114,19 +135,6 @@ def read_problem(
         metric=_metric(definition, schema, init.objects),
         notes=tuple(definition.notes()),
     )
-
-
-def _domain(definition: Definition, expected: str | None) -> str:
-    nodes = definition.nodes(":domain")
-    if len(nodes) != 1:
-        raise ParseError("a problem says what it is for: (:domain NAME)", place=definition.place)
-    named = word(nodes[0], "the domain's name")
-    if expected is not None and named.folded() != expected:
-        raise UnknownNameError(
-            f"the problem is for the domain '{named.folded()}', not for '{expected}'",
-            place=named.place, found=named.folded(), valid=(expected,),
-        )  # fmt: skip
-    return named.folded()
 
 
 def _objects(names: Sequence[TypedName], schema: Schema) -> dict[str, str]:
@@ -204,7 +212,7 @@ class _Init:
         check(e, self.schema, objects=self.objects)
         match e:
             case Atom(predicate) if self.schema.is_type(predicate, len(e.args)):
-                raise SchemaError(f"'{predicate}' is a type; say it in :objects", place=e.place)
+                self.confirm(predicate, _values(e.args)[0], e.place)
             case Atom(predicate, args):
                 self.facts[Fact(predicate, _values(args))] = None
             case Not(Atom()):
@@ -213,6 +221,12 @@ class _Init:
                 self.values[Fact(function, _values(args))] = value
             case _:
                 raise ParseError("':init' has facts and (= (FUNCTION ...) NUMBER)", place=e.place)
+
+
+    def confirm(self, type_name: str, thing: Value, place: Place | None) -> None:
+        """`(truck t1)` says nothing new where t1 is one, and cannot make it one."""
+        if not self.schema.is_a(self.objects.get(str(thing), ""), type_name):
+            raise SchemaError(f"'{type_name}' is a type; say it in :objects", place=place)
 
 
 def _refuse_timed(node: Node) -> None:

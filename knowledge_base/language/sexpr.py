@@ -19,6 +19,7 @@ _TOKEN = re.compile(
     r"""(?P<skip>\s+|;[^\n]*)|(?P<open>\()|(?P<close>\))|(?P<text>"(?:[^"\\]|\\.)*")|(?P<word>[^\s()";]+)""",
     re.DOTALL,
 )
+_HALF = re.compile("[\udc80-\udcff]")  # what a file's other bytes are read as
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 
 
@@ -65,7 +66,7 @@ def read(text: str, source: str | None = None) -> list[Node]:
         source: the name of the file it comes from, for messages.
 
     Raises:
-        ParseError: a parenthesis or quote without its partner, or nesting beyond `MAX_DEPTH`.
+        ParseError: a parenthesis or quote without its partner, nesting beyond `MAX_DEPTH`, or half a character.
     """
     stack = [_Open(Place(source, 1, 1))]
     for kind, word, place in _tokens(text, source):
@@ -101,6 +102,8 @@ def _tokens(text: str, source: str | None) -> Iterator[tuple[str, str, Place]]:
 
 
 def _word(kind: str, token: str, place: Place) -> Word:
+    if _HALF.search(token):
+        raise ParseError("this is not UTF-8 text", place=place)
     if kind == "word":
         return Word(token, place)
     plain = _ESCAPE.sub(lambda m: "\n" if m[1] == "n" else m[1], token[1:-1])

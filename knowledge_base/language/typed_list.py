@@ -24,6 +24,7 @@ def parse_typed_list(nodes: Sequence[Node]) -> list[TypedName]:
     Raises:
         ParseError: a `-` without names before it or a type after it, or a group where a name is expected.
     """
+    nodes = _unglued(nodes)
     found: list[TypedName] = []
     untyped: list[Word] = []
     position = 0
@@ -84,6 +85,18 @@ def typed_variables(nodes: Sequence[Node]) -> tuple[TypedVariable, ...]:
             raise ParseError(f"the variable '{name}' is declared twice", place=place)
         variables[name] = TypedVariable(name[1:], types, place=place)
     return tuple(variables.values())
+
+
+def _unglued(nodes: Sequence[Node]) -> list[Node]:
+    """The list with `-cup`, as some files have it, in two words."""
+    return [part for node in nodes for part in _parted(node)]
+
+
+def _parted(node: Node) -> tuple[Node, ...]:
+    if isinstance(node, Group) or node.quoted or not node.text.startswith("-") or is_number(node.text):
+        return (node,)
+    after = Place(node.place.source, node.place.line, (node.place.column or 0) + 1)
+    return (Word("-", node.place), *([Word(node.text[1:], after)] if node.text != "-" else []))
 
 
 def _types(node: Node) -> tuple[str, ...]:

@@ -101,13 +101,11 @@ DOMAINS = [
     ("(:durative-action a :duration () :effect (over all (p)))", ParseError, "1:61", "says when", None),
     ("(:derived p)", ParseError, "1:20", r"written \(:derived \(NAME", None),
     ("(:types a) (:types b)", ParseError, "1:31", "the first is at d:1:20", None),
-    ("(:types a - b)", SchemaError, "1:28", "unknown parent 'b'", None),
     ("(:types cup - itm item)", SchemaError, "1:28", "unknown parent", "item"),
     ("(:types a - b b - a)", SchemaError, "1:28", "circle: a - b - a", None),
     ("(:types b c - object a - b a - c)", SchemaError, "1:", "declared differently before", None),
     ("(:types a - (either b c) b c)", SchemaError, "1:28", "only one type", None),
-    ("(:types cup) (:predicates (cup ?x))", SchemaError, "1:46", r"name of a type \(at d:1:28\)", None),
-    ("(:predicates (p ?x) (p ?x ?y))", SchemaError, "1:40", r"differently before \(at d:1:33\)", None),
+    ("(:predicates (p ?x) (p ?x ?y))", SchemaError, "1:40", r"differently before: \(p .*\) \(at d:1:33\)", None),
     ("(:types c) (:predicates (p ?x - cc))", SchemaError, "1:47", "unknown type 'cc'", "c"),
     ("(:types number)", SchemaError, "1:28", "type of values", None),
     ("(:types object - a a)", SchemaError, "1:28", "all things", None),
@@ -143,7 +141,8 @@ PROBLEMS = [
     ("(:init (quiett))", UnknownNameError, "no predicate", "quiet"),
     ("(:init (on cup1 home))", UnknownNameError, "no object 'cup1'", None),
     ("(:objects a b - cup) (:init (on a b))", SchemaError, "'b' is of type cup", None),
-    ("(:objects a - cup) (:init (cup a))", SchemaError, "say it in :objects", None),
+    ("(:objects a - cup) (:init (can a))", SchemaError, "say it in :objects", None),
+    ("(:objects a - object) (:init (cup a))", SchemaError, "say it in :objects", None),
     ("(:init (= (time) (+ 1 1)))", ParseError, "':init' has facts", None),
     ("(:init (or (quiet)))", ParseError, "':init' has facts", None),
     ("(:init (and (oneof (quiet) (and))))", UnsupportedConstructError, "'oneof'.*contingent", None),
@@ -192,7 +191,7 @@ def test_files_that_cannot_be_read(tmp_path) -> None:
     (tmp_path / "domain.pddl").write_bytes(b"(define\n\xff")
     with pytest.raises(InputError, match=r"did you mean 'domain.pddl'"):
         read_domain(tmp_path / "domian.pddl")
-    with pytest.raises(ParseError, match=r"domain.pddl:2: the file is not UTF-8"):
+    with pytest.raises(ParseError, match=r"domain.pddl:2:1: this is not UTF-8"):
         read_domain(str(tmp_path / "domain.pddl"))
     with pytest.raises(InputError, match="cannot read"):
         read_domain(tmp_path)

@@ -96,7 +96,6 @@ def test_a_failed_engine_has_a_status_of_its_own(run, monkeypatch):
         ("(hand-free)", "(hand-fre)", "did you mean 'hand-free'"),
         ("- cup)", "- cop)", "did you mean 'cup'"),
         ("(lies-at cup1 table)", "(lies-at cup1 tabel)", "did you mean 'table'"),
-        ("(:domain clean-up-table)", "(:domain clean-up-tables)", "is for the domain 'clean-up-tables'"),
         ("(:domain clean-up-table)\n  (:objects", "(:domain ferry)\n  (:objects c - car", "for the domain 'ferry'"),
         ("(:goal (forall (?i - item) (tidy ?i)))", "", "has no goal"),
     ],

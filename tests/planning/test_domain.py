@@ -100,3 +100,12 @@ def test_an_unknown_action_names_the_nearest(clean_up, table):
 def test_a_wrong_number_of_arguments_is_told(clean_up, table):
     with pytest.raises(InputError, match="takes 2 arguments"):
         clean_up.effects(PlanStep("pick-up", ("cup1",)), table(cups=1))
+
+
+def test_a_type_whose_name_a_predicate_has_is_still_asked_of_arguments(world_of):
+    domain = PlanningDomain.parse("""(define (domain d) (:types truck van) (:predicates (truck ?x) (red ?x))
+      (:action paint :parameters (?t - truck) :effect (red ?t)))""")
+    world = world_of(domain.schema, {"t": "truck", "v": "van"}, [fact("truck", "v")])
+    paint_t, paint_v = PlanStep("paint", ("t",)), PlanStep("paint", ("v",))
+    assert (domain.applicable(paint_t, world), domain.applicable(paint_v, world)) == (True, False)
+    assert (domain.why_not(paint_t, world).truth, domain.why_not(paint_v, world).truth) == (True, False)
