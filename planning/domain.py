@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.action_text import ActionText
-from knowledge_base.exchange.domain_text import AxiomText, parse_domain
-from knowledge_base.exchange.files import read_text
+from knowledge_base.exchange.domain_text import AxiomText, DomainText, parse_domain, read_domain
 from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
 from knowledge_base.language.effect import Add, Delete
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
@@ -27,6 +26,7 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.schema import ROOT_TYPE, Schema
+from planning.fragments import merged_text, searched, text_of
 from planning.relevance import effect_leaves
 
 if TYPE_CHECKING:
@@ -92,13 +92,35 @@ class PlanningDomain:
     notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @classmethod
-    def from_pddl(cls, path: str | Path) -> PlanningDomain:
-        """The domain of a PDDL file.
+    def from_pddl(cls, path: str | Path, *more: str | Path) -> PlanningDomain:
+        """The domain of a PDDL file, or of several that each have a part of it.
 
         Raises:
-            InputError: the file cannot be read or contains a mistake; it says where.
+            InputError: a file cannot be read or contains a mistake; it says where.
         """
-        return cls.parse(read_text(Path(path)), str(path))
+        return cls.from_fragments([Path(one) for one in (path, *more)])
+
+    @classmethod
+    def from_fragments(cls, fragments: Iterable[PlanningDomain | DomainText | Path | str]) -> PlanningDomain:
+        """The domain that fragments make together, with the name of the first.
+
+        A fragment may use what another declares, wherever it stands. The same declared twice is fine.
+
+        Args:
+            fragments: PDDL files (a `Path`, or a name), PDDL texts, or domains; at least one.
+
+        Raises:
+            InputError: a fragment cannot be read or contains a mistake, or two contradict each other; it says
+                where.
+        """
+        pieces = list(fragments)
+        if not pieces:
+            raise InputError("a planning domain has at least one fragment")
+        if len(pieces) == 1 and isinstance(pieces[0], PlanningDomain):
+            return pieces[0]
+        texts = [_text(piece) for piece in pieces]
+        with searched(texts):
+            return cls.from_text(merged_text(texts))
 
     @classmethod
     def parse(cls, text: str, source: str | None = None) -> PlanningDomain:
@@ -107,12 +129,20 @@ class PlanningDomain:
         Raises:
             InputError: it contains a mistake; it says where.
         """
-        read = parse_domain(text, source)
+        return cls.from_text(parse_domain(text, source))
+
+    @classmethod
+    def from_text(cls, read: DomainText) -> PlanningDomain:
+        """The domain that a file, or several together, declare.
+
+        Raises:
+            InputError: it contains a mistake; it says where.
+        """
         schema = Schema.from_text(read)
         actions = {a.name: _checked(a, schema) for a in read.actions}
         axioms = tuple(_checked_axiom(a, schema) for a in read.axioms)
         _refuse_changed(actions.values(), axioms)
-        return cls(read.name, schema, actions, axioms, tuple(read.remarks()))
+        return cls(read.name, schema, actions, axioms, tuple(dict.fromkeys(read.remarks())))
 
     def applicable(self, step: PlanStep, world: World) -> bool:
         """Whether the arguments are of the parameters' types and the precondition holds."""
@@ -154,6 +184,12 @@ class PlanningDomain:
                 f"'{step.action}' takes {len(parameters)} arguments, {step} has {len(step.args)}"
             )
         return {p.name: arg for p, arg in zip(parameters, step.args, strict=True)}
+
+
+def _text(fragment: PlanningDomain | DomainText | Path | str) -> DomainText:
+    if isinstance(fragment, PlanningDomain):
+        return text_of(fragment)
+    return fragment if isinstance(fragment, DomainText) else read_domain(fragment)
 
 
 def _type_test(parameter: TypedVariable, arg: str, schema: Schema) -> Expression:

@@ -18,11 +18,13 @@ from dsc.skills import Component, signatures
 from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
 from dsc.validation import raise_findings, validate_library
+from knowledge_base.compatibility import require_extension
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.component import PlanningComponent
 from planning.domain import PlanningDomain
+from planning.fragments import shipped_by
 from planning.implementations import check_implementations
 from planning.planner import Planner, PlannerProcess
 from planning.problem import check_goal
@@ -35,7 +37,8 @@ class Executive:
     """A robot program that can be run.
 
     Args:
-        domain: the planning domain, or the PDDL file it is in; its schema is the knowledge base's.
+        domain: the planning domain, or the PDDL file it is in, which the components may add to; the knowledge
+            base's schema declares all that these do.
         plots: the plots; those with `implements` carry out the domain's planning actions.
         components: the skills.
         knowledge: the world model; an empty one of the domain's schema if left out.
@@ -43,7 +46,8 @@ class Executive:
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
-        InputError: the domain file is wrong, or two plots have one name.
+        InputError: a domain file is wrong, two fragments contradict each other, or two plots have one name.
+        SchemaMismatchError: the given world model does not know what the domain is about.
     """
 
     def __init__(
@@ -54,10 +58,11 @@ class Executive:
         knowledge: KnowledgeBase | None = None,
         planner: Planner | None = None,
     ) -> None:
-        self.domain = domain if isinstance(domain, PlanningDomain) else PlanningDomain.from_pddl(domain)
         self.components = tuple(components)
+        self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
         _refuse_namesakes(self.components)
         self.knowledge = knowledge if knowledge is not None else KnowledgeBase(self.domain.schema)
+        require_extension(self.domain.schema, self.knowledge.schema)
         self.library = Library(plots)
         if ACHIEVE not in self.library:
             self.library.add(achieve_plot())

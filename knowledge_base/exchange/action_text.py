@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from knowledge_base.errors import ParseError, Place, SchemaError
@@ -12,6 +12,7 @@ from knowledge_base.exchange.sections import word
 from knowledge_base.language.effect import NO_EFFECT, Effect
 from knowledge_base.language.expression import TRUE, Expression, TypedVariable
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_variables
+from knowledge_base.language.printer import to_text, variables_text
 from knowledge_base.language.sexpr import Group, Node, Word
 from knowledge_base.language.timed import Duration, Timed
 
@@ -20,6 +21,10 @@ _PARTS = {
     ACTION: (":parameters", ":precondition", ":effect"),
     DURATIVE_ACTION: (":parameters", ":duration", ":condition", ":effect"),
 }
+_COMPARED = (
+    *("duration", "precondition", "condition over all", "condition at the end"),
+    *("effect at the start", "effect"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +39,7 @@ class ActionText:
     parameters: tuple[TypedVariable, ...]
     precondition: Expression
     effect: Effect
-    place: Place = field(compare=False)
+    place: Place | None = field(compare=False)
     duration: Duration | None = None
     timed: Timed | None = None
 
@@ -45,20 +50,44 @@ def read_actions(sections: Iterable[tuple[str, Group]]) -> tuple[ActionText, ...
     Raises:
         ParseError: the form of one is wrong.
         UnsupportedConstructError: one uses a construct that nothing here can plan with.
-        SchemaError: two actions have one name.
+        SchemaError: two different actions have one name.
     """
-    actions: dict[str, ActionText] = {}
-    for keyword, group in sections:
-        if keyword not in _PARTS:
-            continue
-        action = _action(keyword, group)
-        if action.name in actions:
-            first = actions[action.name].place
+    return united(_action(keyword, group) for keyword, group in sections if keyword in _PARTS)
+
+
+def united(actions: Iterable[ActionText]) -> tuple[ActionText, ...]:
+    """The actions, each once.
+
+    Raises:
+        SchemaError: two actions of one name differ; it has both places and says in what.
+    """
+    found: dict[str, ActionText] = {}
+    for action in actions:
+        first = found.setdefault(action.name, action)
+        if first != action:
             raise SchemaError(
-                f"the action '{action.name}' is defined a second time; first at {first}", place=action.place
+                f"the action '{action.name}' is defined differently before (at {first.place}), with "
+                + _difference(first, action),
+                place=action.place,
             )
-        actions[action.name] = action
-    return tuple(actions.values())
+    return tuple(found.values())
+
+
+def _difference(first: ActionText, second: ActionText) -> str:
+    """The first part in which two actions differ, in both versions."""
+    for part, before, here in zip(("parameters", *_COMPARED), _written(first), _written(second), strict=True):
+        if before != here:
+            return f"the {part} {before} instead of {here}"
+    return "other words"
+
+
+def _written(action: ActionText) -> Iterator[str]:
+    yield variables_text(action.parameters)
+    duration, timed = action.duration, action.timed
+    yield "none" if duration is None else f"from {to_text(duration.least)} to {to_text(duration.most)}"
+    if timed is None:
+        timed = Timed(start=action.precondition, end_effect=action.effect)
+    yield from map(to_text, (timed.start, timed.over_all, timed.end, timed.start_effect, timed.end_effect))
 
 
 def _action(keyword: str, group: Group) -> ActionText:

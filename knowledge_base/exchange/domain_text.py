@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from knowledge_base.errors import ParseError, Place
@@ -35,7 +35,7 @@ class DeclarationText:
 
     name: str
     parameters: tuple[TypedVariable, ...]
-    place: Place
+    place: Place | None = field(compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,8 @@ class AxiomText:
 class DomainText:
     """All of a domain file, in the order of the file; names are in lower case.
 
-    `notes` says with its place what deserves a look in the file though it changes nothing.
+    `notes` says with its place what deserves a look in the file though it changes nothing; `source` is what the
+    file is called in messages.
     """
 
     name: str
@@ -62,6 +63,7 @@ class DomainText:
     actions: tuple[ActionText, ...]
     axioms: tuple[AxiomText, ...] = ()
     notes: tuple[str, ...] = ()
+    source: str | None = field(default=None, compare=False)
 
     def implied_types(self) -> tuple[TypedName, ...]:
         """Types that are named only as what others are below: they are types of their own.
@@ -100,7 +102,7 @@ def read_domain(text_or_path: str | Path, source: str | None = None) -> DomainTe
         InputError: the file cannot be read.
         ParseError: the form is wrong.
         UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
-        SchemaError: two actions have one name.
+        SchemaError: two different actions have one name.
     """
     return parse_domain(*text_and_source(text_or_path, source))
 
@@ -111,7 +113,7 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
     Raises:
         ParseError: the form is wrong.
         UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
-        SchemaError: two actions have one name.
+        SchemaError: two different actions have one name.
     """
     definition = read_definition(text, source, "domain", _SECTIONS)
     return DomainText(
@@ -124,6 +126,7 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
         actions=read_actions(definition.sections),
         axioms=tuple(_axiom(group) for keyword, group in definition.sections if keyword == ":derived"),
         notes=tuple(definition.notes()),
+        source=source,
     )
 
 

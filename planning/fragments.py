@@ -1,0 +1,98 @@
+"""Domains from fragments (S4.6): every module ships its piece of PDDL, and the pieces make one domain.
+
+Pieces are put together as they are written, before any name is resolved: one may use what another declares,
+in whatever order they come. The same said twice is said once; what contradicts is refused with both places.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from knowledge_base.errors import InputError, Place
+from knowledge_base.exchange.action_text import ActionText, united
+from knowledge_base.exchange.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.language.typed_list import TypedName
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from dsc.skills import Component
+    from knowledge_base.schema import Schema, Signature
+    from planning.domain import PlanningDomain
+
+
+def shipped_by(components: Iterable[Component]) -> list[DomainText]:
+    """The fragments that components bring with them, those of one class once.
+
+    Raises:
+        InputError: a file cannot be read, or is no domain.
+    """
+    kinds = dict.fromkeys(type(component) for component in components)
+    return [_read(kind.domain, kind.__name__) for kind in kinds if kind.domain is not None]
+
+
+def merged_text(texts: Sequence[DomainText]) -> DomainText:
+    """All that the fragments say, under the name of the first.
+
+    Raises:
+        SchemaError: two actions of one name differ. (Of declarations, the schema made from it finds that.)
+    """
+    first = texts[0]
+    return DomainText(
+        name=first.name,
+        requirements=tuple(dict.fromkeys(r for text in texts for r in text.requirements)),
+        types=tuple(name for text in texts for name in text.types),
+        constants=tuple(name for text in texts for name in text.constants),
+        predicates=tuple(declared for text in texts for declared in text.predicates),
+        functions=tuple(declared for text in texts for declared in text.functions),
+        actions=united(action for text in texts for action in text.actions),
+        axioms=tuple(dict.fromkeys(axiom for text in texts for axiom in text.axioms)),
+        notes=tuple(note for text in texts for note in text.notes),
+    )
+
+
+def text_of(domain: PlanningDomain) -> DomainText:
+    """A domain as one file would declare it; the domain made from that is equal."""
+    schema = domain.schema
+    return DomainText(
+        name=domain.name,
+        requirements=(),
+        types=tuple(_typed(schema, name, parent) for name, parent in schema.types.items() if parent),
+        constants=tuple(_typed(schema, name, kind) for name, kind in schema.constants.items()),
+        predicates=_declarations(schema.predicates.values()),
+        functions=_declarations(schema.functions.values()),
+        actions=tuple(
+            ActionText(a.name, a.parameters, a.precondition, a.effect, a.place, a.duration, a.timed)
+            for a in domain.actions.values()
+        ),
+        axioms=tuple(
+            AxiomText(DeclarationText(a.predicate, a.parameters, a.place), a.condition) for a in domain.axioms
+        ),
+        notes=domain.notes,
+    )
+
+
+@contextmanager
+def searched(texts: Sequence[DomainText]) -> Iterator[None]:
+    """Names that are found in none of several fragments: say which those are."""
+    sources = dict.fromkeys(text.source or text.name for text in texts)
+    try:
+        yield
+    except InputError as error:
+        if error.found is not None and len(sources) > 1:
+            error.message += f" in {', '.join(sources)}"
+        raise
+
+
+def _declarations(signatures: Iterable[Signature]) -> tuple[DeclarationText, ...]:
+    return tuple(DeclarationText(s.name, s.parameters, s.place) for s in signatures)
+
+
+def _typed(schema: Schema, name: str, kind: str) -> TypedName:
+    return TypedName(name, (kind,), schema.places.get(name, Place()))
+
+
+def _read(shipped: Path | str, owner: str) -> DomainText:
+    return read_domain(shipped) if isinstance(shipped, Path) else parse_domain(shipped, f"{owner}.domain")
