@@ -70,8 +70,7 @@ class _Reach:
 
     @staticmethod
     def of(task: Task, world: World) -> _Reach:
-        reached, _ = reachable(task)
-        numbering = task.numbering
+        reached, numbering = reachable(task).facts, task.numbering
         named = [one for one in reached if isinstance(numbering.named(one), Fact)]
         fluents = frozenset(numbering.fact(one) for one in named if one in numbering.fluents)
         return _Reach(frozenset(map(numbering.fact, named)) - fluents, fluents, world)

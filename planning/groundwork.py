@@ -9,7 +9,6 @@ actions that are out of reach there fall away later (`planning.reduction`), as t
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
@@ -21,36 +20,15 @@ from planning.costs import Costs
 from planning.grounding import Reached, Rule, Variant, joined_atoms, variants
 from planning.numbering import Numbering
 from planning.plan import PlanStep
-from planning.quantities import Assignment
 from planning.relevance import Relevant, effect_conditions, effect_parts
+from planning.ways import Way, Ways
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from knowledge_base.language.evaluation import World
     from knowledge_base.schema import Schema
     from planning.domain import PlanningAction
-
-
-@dataclass(frozen=True, slots=True)
-class Way:
-    """A variant in numbers (see `Numbering`).
-
-    Attributes:
-        step: the step; `None` for bookkeeping.
-        needs: literals and bounds that must hold before.
-        adds: literals that hold afterwards and fluents that it changes.
-        deletes: literals that hold no longer.
-        assignments: how it changes them.
-        cost: `None` if what it does to the metric is no cost.
-    """
-
-    step: PlanStep | None
-    needs: tuple[int, ...]
-    adds: tuple[int, ...]
-    deletes: tuple[int, ...]
-    assignments: tuple[Assignment, ...] = ()
-    cost: float | None = 1.0
 
 
 class Consulted:
@@ -110,6 +88,10 @@ class Consulted:
 class Groundwork:
     """Ground actions over all facts that were reached so far.
 
+    Attributes:
+        numbering: of all that they are about.
+        ways: all ways to take a step in one of the worlds so far; in an order that does not depend on them.
+
     Args:
         relevant: what of the domain matters.
         metric: what plans shall have little of.
@@ -129,23 +111,23 @@ class Groundwork:
         self._met: set[Fact] = set()
         self._queue: deque[Fact] = deque()
         self._done: set[PlanStep] = set()
-        self._ways: list[Way] = []
+        self.ways = Ways([])
+        self._found_so_far = 0
 
     def serves(self, world: World) -> bool:
         """Whether everything that was worked out is right for this world, too."""
         same = not self._over_all or list(things_of(world)) == list(self._world.things)
         return same and self._world.agrees(world)
 
-    def ways(self, world: World) -> Sequence[Way]:
-        """All ways to take a step that this world, or an earlier one, can lead to; in an order of their own.
+    def extend(self, world: World) -> None:
+        """Find the ways that are possible only in this world.
 
         Raises:
             UnsupportedActionError: see `planning.grounding.variants`.
         """
         found = list(self._found(world, more=self._world.follow(world)))
         if found:
-            self._ways = sorted([*self._ways, *found], key=self._key)
-        return self._ways
+            self.ways = Ways(sorted([*self.ways.all, *found], key=self._key))
 
     def _found(self, world: World, *, more: bool) -> Iterator[Way]:
         first = not self._rules
@@ -190,14 +172,15 @@ class Groundwork:
 
     def _way(self, variant: Variant) -> Way:
         cost = 1.0 if self._costs is None else self._costs.cost(variant.assignments)
-        return numbered(variant, self.numbering, cost)
+        self._found_so_far += 1
+        return numbered(variant, self.numbering, cost, self._found_so_far)
 
     def _key(self, way: Way) -> tuple[int, tuple[str, ...]]:
         """Independent of which world the way was found for; ways of one step are found together."""
         return (self._order[way.step.action], way.step.args) if way.step else (len(self._order), ())
 
 
-def numbered(variant: Variant, numbering: Numbering, cost: float | None) -> Way:
+def numbered(variant: Variant, numbering: Numbering, cost: float | None, number: int = -1) -> Way:
     """The variant in numbers."""
     made = [numbering.of(effect) for effect in variant.effects]
     touched = [numbering.fluent(one.fluent) for one in variant.assignments]
@@ -208,6 +191,7 @@ def numbered(variant: Variant, numbering: Numbering, cost: float | None) -> Way:
         tuple([number ^ 1 for number in made]),
         variant.assignments,
         cost,
+        number,
     )
 
 

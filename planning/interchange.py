@@ -13,47 +13,65 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from planning.plan import PlanStep
 from planning.quantities import Bound, fluents
+from planning.ways import Way, Ways
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from planning.groundwork import Way
     from planning.numbering import Numbering
+    from planning.plan import PlanStep
     from planning.reduction import Task
 
-_Mentions = dict[str, dict[int, None]]
+_Key = tuple[str, tuple[str, ...]] | None
 
 
-def spared(task: Task) -> list[Way]:
-    """The ways that are left when all objects are left out that others can stand in for."""
-    settled = set(_settled(task))
-    mentions = _mentions(task, settled)
-    by_step: dict[PlanStep | None, list[Way]] = {}
-    for way in task.ways:
-        by_step.setdefault(way.step, []).append(way)
-    stand_ins = _stand_ins(task, settled)
-    left_out = [
-        [task.ways[i] for i in numbers]
-        for name, numbers in mentions.items()
-        if any(
-            all(_covered(task.ways[i], name, other, task.numbering, by_step) for i in numbers) for other in stand_ins
-        )
-    ]
-    gone = {id(way) for ways in left_out for way in ways}
-    return [way for way in task.ways if id(way) not in gone]
+def spared(task: Task) -> Ways | None:
+    """The ways that are left without the objects that others can stand in for; `None` if there are no such objects."""
+    ways = task.ways.all
+    mentions = _mentions(task)
+    if not mentions:
+        return None
+    by_step: dict[_Key, list[Way]] = {}
+    for way in ways:
+        by_step.setdefault(_key(way.step), []).append(way)
+    named = dict.fromkeys([arg for way in ways if way.step for arg in way.step.args])
+    stand_ins = [name for name in named if name not in mentions]
+    gone: set[int] = set()
+    for name, listed in mentions.items():
+        if any(_Exchange(name, other, task.numbering, by_step).covers(ways[i] for i in listed) for other in stand_ins):
+            gone.update(listed)
+    return Ways([way for i, way in enumerate(ways) if i not in gone]) if gone else None
+
+
+def _mentions(task: Task) -> Mapping[str, Iterable[int]]:
+    """Object that need not stay -> positions of the ways that mention it, in their step or in literals."""
+    ways, settled = task.ways.all, set(_settled(task))
+    about: dict[int, list[str]] = {}
+    for one in set[int]().union(*[part for way in ways for part in (way.needs, way.adds, way.deletes)]):
+        about[one] = [str(thing) for thing in _things(task.numbering.named(one)) if thing not in settled]
+    telling = {one for one, names in about.items() if names}
+    found: dict[str, dict[int, None]] = {}
+    for i, way in enumerate(ways):
+        for name in way.step.args if way.step else ():
+            if name not in settled:
+                found.setdefault(name, {})[i] = None
+        for part in (way.needs, way.adds, way.deletes):
+            if not telling.isdisjoint(part):
+                for name in [name for one in part for name in about[one]]:
+                    found.setdefault(name, {})[i] = None
+    return found
 
 
 def _settled(task: Task) -> Iterator[Value]:
     """The objects that must stay."""
     for number in (*task.init, *task.goal):
         yield from _things(task.numbering.named(number))
-    for way in task.ways:
+    for way in task.ways.all if task.numbering.fluents else ():
         for one in way.assignments:
             for fluent in (one.fluent, *fluents(one.amount)):
                 yield from fluent.args
-        for need in way.needs if task.numbering.supports else ():  # there are no bounds without
+        for need in way.needs:
             if isinstance(bound := task.numbering.named(need), Bound):
                 yield from _things(bound)
 
@@ -63,49 +81,37 @@ def _things(one: Fact | Bound) -> Iterator[Value]:
         yield from fact.args
 
 
-def _stand_ins(task: Task, settled: set[Value]) -> list[str]:
-    """The objects that stay, as far as ways are about them; in an order that depends on the task alone."""
-    named = dict.fromkeys(arg for way in task.ways if way.step for arg in way.step.args)
-    return [name for name in named if name in settled]
+class _Exchange:
+    """`other` in the place of `name`."""
+
+    def __init__(self, name: str, other: str, numbering: Numbering, by_step: Mapping[_Key, Sequence[Way]]) -> None:
+        self._name, self._other = name, other
+        self._images = numbering.images(name, other)
+        self._by_step = by_step
+
+    def covers(self, ways: Iterable[Way]) -> bool:
+        """Whether for each of the ways, all that mention `name`, there is one about `other` that is as good."""
+        return all(map(self._covers, ways))
+
+    def _covers(self, way: Way) -> bool:
+        images = self._images
+        needs = tuple([images[one] for one in way.needs])
+        adds = tuple([images[one] for one in way.adds])
+        deletes = tuple([images[one] for one in way.deletes])
+        return any(
+            (needs == real.needs or set(needs).issuperset(real.needs))
+            and (adds == real.adds or set(adds) <= {*real.adds, *real.needs})
+            and (deletes == real.deletes or set(deletes).issuperset(real.deletes))
+            and set(real.assignments) == set(way.assignments)
+            and (real.cost or 0) <= (way.cost or 0)
+            for real in self._by_step.get(self._key(way), ())
+        ) or set(adds) <= set(needs)
+
+    def _key(self, way: Way) -> _Key:
+        if way.step is None:
+            return None
+        return way.step.action, tuple([self._other if arg == self._name else arg for arg in way.step.args])
 
 
-def _mentions(task: Task, settled: set[Value]) -> _Mentions:
-    """Open object -> the numbers of the ways that mention it."""
-    about: dict[int, list[str]] = {}
-    found: _Mentions = {}
-    for i, way in enumerate(task.ways):
-        for arg in way.step.args if way.step else ():
-            if arg not in settled:
-                found.setdefault(arg, {})[i] = None
-        for number in (*way.needs, *way.adds, *way.deletes):
-            named = about.get(number)
-            if named is None:
-                things = _things(task.numbering.named(number))
-                named = about[number] = [str(thing) for thing in things if thing not in settled]
-            for name in named:
-                found.setdefault(name, {})[i] = None
-    return found
-
-
-def _covered(
-    way: Way, name: str, other: str, numbering: Numbering, by_step: Mapping[PlanStep | None, Sequence[Way]]
-) -> bool:
-    """Whether a way with `other` in the place of `name` is as good."""
-    rename = numbering.renaming(name, other)
-    needs = set(map(rename, way.needs))
-    adds = set(map(rename, way.adds))
-    if adds <= needs:
-        return True
-    deletes = set(map(rename, way.deletes))
-    return any(
-        needs.issuperset(real.needs)
-        and adds <= {*real.adds, *real.needs}
-        and deletes.issuperset(real.deletes)
-        and set(real.assignments) == set(way.assignments)
-        and (real.cost or 0) <= (way.cost or 0)
-        for real in by_step.get(_renamed(way.step, name, other), ())
-    )
-
-
-def _renamed(step: PlanStep | None, name: str, other: str) -> PlanStep | None:
-    return step and PlanStep(step.action, tuple([other if arg == name else arg for arg in step.args]))
+def _key(step: PlanStep | None) -> _Key:
+    return None if step is None else (step.action, step.args)  # hashed much faster than the step

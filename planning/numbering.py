@@ -20,6 +20,18 @@ NOT = "not "
 """Before a predicate: the fact that carries a negative literal (positive normal form). No declared name has a blank."""
 
 
+class _Images(dict[int, int]):
+    """Made when they are asked for."""
+
+    def __init__(self, rename: Callable[[int], int]) -> None:
+        super().__init__()
+        self._rename = rename
+
+    def __missing__(self, number: int) -> int:
+        image = self[number] = self._rename(number)
+        return image
+
+
 class Numbering:
     """Grows; a number once given stays.
 
@@ -30,10 +42,11 @@ class Numbering:
     def __init__(self) -> None:
         self._numbers: dict[Fact | Bound, int] = {}
         self._named: list[Fact | Bound] = []
+        self._facts: dict[int, Fact] = {}
+        self._images: dict[tuple[str, str], _Images] = {}
         self._wants: dict[int, dict[int, None]] = {}
         self._supports: dict[int, dict[int, None]] = {}
         self.fluents: set[int] = set()
-        self._renamed: dict[tuple[str, str], dict[int, int]] = {}
 
     @property
     def wants(self) -> Mapping[int, Mapping[int, None]]:
@@ -64,45 +77,37 @@ class Numbering:
 
     def fact(self, number: int) -> Fact:
         """The literal in positive normal form."""
-        fact = self._named[number >> 1]
-        if not isinstance(fact, Fact):
-            raise TypeError(f"{fact} is no fact")
-        return as_fact(Literal(fact, not number & 1))
+        known = self._facts.get(number)
+        if known is None:
+            fact = self._named[number >> 1]
+            if not isinstance(fact, Fact):
+                raise TypeError(f"{fact} is no fact")
+            known = self._facts[number] = as_fact(Literal(fact, not number & 1))
+        return known
 
     def present(self, world: World) -> set[int]:
         """The numbers of all literals and bounds that hold in `world`; fluents have no truth."""
-        functions = world.schema.functions
-        values = {
-            one: world.value(one.predicate, one.args)
-            for one in self._named
-            if isinstance(one, Fact) and one.predicate in functions
-        }
+        values = {one: world.value(one.predicate, one.args) for one in map(self.fact, sorted(self.fluents))}
         held: set[int] = set()
         for i, one in enumerate(self._named):
             if isinstance(one, Bound):
                 held.update((2 * i,) if one.holds(values) else ())
-            elif one not in values:
+            else:
                 held.add(2 * i + (not world.holds(one.predicate, one.args)))
         return held
 
-    def renaming(self, name: str, other: str) -> Callable[[int], int]:
-        """A function from numbers to the numbers of the same about `other` in the place of `name`."""
-        known = self._renamed.setdefault((name, other), {})
+    def images(self, name: str, other: str) -> Mapping[int, int]:
+        """Literal -> the same literal about `other` in the place of `name`; for every literal."""
+        if (name, other) not in self._images:
+            self._images[name, other] = _Images(lambda number: self._renamed(number, name, other))
+        return self._images[name, other]
 
-        def rename(number: int) -> int:
-            image = known.get(number)
-            if image is None:
-                image = known[number] = self._image(number, name, other)
-            return image
-
-        return rename
-
-    def _image(self, number: int, name: str, other: str) -> int:
-        one = self._named[number >> 1]
-        if isinstance(one, Bound) or name not in one.args:
+    def _renamed(self, number: int, name: str, other: str) -> int:
+        fact = self._named[number >> 1]
+        if isinstance(fact, Bound) or name not in fact.args:
             return number
-        args: tuple[Value, ...] = tuple([other if value == name else value for value in one.args])
-        return self._number(Fact(one.predicate, args)) + (number & 1)
+        args: tuple[Value, ...] = tuple([other if value == name else value for value in fact.args])
+        return self._number(Fact(fact.predicate, args)) + (number & 1)
 
     def _number(self, one: Fact | Bound) -> int:
         number = self._numbers.get(one)

@@ -16,21 +16,21 @@ from knowledge_base.language.check import check
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import Expression, Term
 from knowledge_base.language.printer import to_text
+from planning.assembly import Assembly
 from planning.conditions import Every, Grounder, Leaf, Literal, Residual, Some
 from planning.costs import ignored, metric_of
 from planning.derived import derivation
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.grounding import Variant
-from planning.groundwork import Groundwork, Way, numbered, things_of
+from planning.groundwork import Groundwork, numbered, things_of
 from planning.interchange import spared
-from planning.quantities import Bound, fluents
+from planning.quantities import Bound
 from planning.reduction import Task, pruned, reachable
 from planning.relevance import Relevant, relevant
-from planning.strips import GroundAction, Problem
+from planning.strips import Problem
+from planning.ways import Ways
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.language.evaluation import World
     from planning.domain import PlanningDomain
@@ -71,15 +71,15 @@ class Posing:
 
     Attributes:
         relevant: what of the domain matters.
-        grounder: evaluates conditions as far as the relevant actions do not change them.
         wanted: what is left of the goal; `False` if it can never hold.
-        task: the ground problem; `None` if it can never hold.
+        task: the ground problem; `None` if the goal can never hold.
+        assembly: makes a `Problem` of the task.
     """
 
     relevant: Relevant
-    grounder: Grounder
     wanted: Residual
-    task: Task | None
+    task: Task | None = None
+    assembly: Assembly | None = None
 
 
 class Poser:
@@ -91,7 +91,7 @@ class Poser:
     def __init__(self, domain: PlanningDomain) -> None:
         self._derivation = derivation(domain)
         self._domain = self._derivation.domain
-        self._kept: dict[tuple[tuple[str, ...], frozenset[str], Term | None], Groundwork] = {}
+        self._kept: dict[tuple[tuple[str, ...], frozenset[str], Term | None], tuple[Groundwork, Assembly]] = {}
         self._lock = threading.Lock()
 
     def pose(self, world: World, goal: Expression, metric: Metric | None = None) -> Problem:
@@ -103,14 +103,14 @@ class Poser:
         amount = metric_of(metric, world.schema)
         with self._lock:
             posing = self.posing(world, goal, amount)
-            if posing.task is None:
+            if posing.task is None or posing.assembly is None:
                 return self._nothing(to_text(goal))
-            reached, possible = reachable(posing.task)
-            missing = [said(posing.task.numbering, one, goal) for one in posing.task.goal if one not in reached]
+            reach, numbering = reachable(posing.task), posing.task.numbering
+            missing = [said(numbering, one, goal) for one in posing.task.goal if one not in reach.facts]
             if missing:
                 return self._nothing(*dict.fromkeys(missing))
-            possible, notes = _priced(possible, amount)
-            return self._sliced(pruned(posing.task, possible), world, notes)
+            task, notes = _priced(pruned(posing.task, reach), amount)
+            return self._sliced(task, posing.assembly, world, notes)
 
     def posing(self, world: World, goal: Expression, metric: Term | None = None) -> Posing:
         """The problem of reaching a checked goal, with everything evaluated that cannot change.
@@ -132,92 +132,53 @@ class Poser:
         except UnsupportedActionError as error:
             raise UnsupportedGoalError(error.message, place=error.place) from None
         if wanted is False:
-            return Posing(matters, grounder, wanted, None)
-        numbering, ways = self._groundwork(matters, metric, world)
-        ways, goal_numbers = _with_conjunctive_goal(ways, wanted, numbering)
+            return Posing(matters, wanted)
+        groundwork, assembly = self._prepared(matters, metric, world)
+        numbering = groundwork.numbering
+        ways, goal_numbers = _with_conjunctive_goal(groundwork.ways, wanted, numbering)
         init = (numbering.present(world) - {numbering.of(_ACTING.negated)}) | {numbering.of(_ACTING)}
         task = Task(numbering, init, goal_numbers, ways)
-        return Posing(matters, grounder, wanted, task)
+        return Posing(matters, wanted, task, assembly)
 
-    def _groundwork(self, matters: Relevant, metric: Term | None, world: World) -> tuple[Numbering, Sequence[Way]]:
+    def _prepared(self, matters: Relevant, metric: Term | None, world: World) -> tuple[Groundwork, Assembly]:
         """The ground actions that may matter, those of an earlier problem if they serve."""
         key = (tuple(action.name for action in matters.actions), matters.changing, metric)
         known = self._kept.pop(key, None)  # taken out, so that an error on the way leaves nothing half done
-        if known is None or not known.serves(world):
-            known = Groundwork(matters, metric, world)
-        ways = known.ways(world)
+        if known is None or not known[0].serves(world):
+            groundwork = Groundwork(matters, metric, world)
+            known = groundwork, Assembly(groundwork.numbering)
+        known[0].extend(world)
         while len(self._kept) >= _MOST_KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[key] = known
-        return known.numbering, ways
+        return known
 
-    def _sliced(self, task: Task, world: World, notes: tuple[str, ...]) -> Problem:
-        whole = self._problem(task, world, notes)
+    def _sliced(self, task: Task, assembly: Assembly, world: World, notes: tuple[str, ...]) -> Problem:
+        name = self._domain.name
+        whole = assembly.problem(name, task, world, notes)
         left = spared(task)
-        if len(left) == len(task.ways):
+        if left is None:
             return whole
         slice_ = replace(task, ways=left)
-        reached, possible = reachable(slice_)
-        if not reached.issuperset(task.goal):
+        reach = reachable(slice_)
+        if not reach.facts.issuperset(task.goal):
             return whole
-        return replace(self._problem(pruned(slice_, possible), world, notes), whole=whole)
-
-    def _problem(self, task: Task, world: World, notes: tuple[str, ...]) -> Problem:
-        init, _ = _split(task.numbering, task.init)
-        goal, bounds = _split(task.numbering, task.goal)
-        actions = tuple(_ground_action(way, task.numbering) for way in task.ways)
-        mentioned = dict.fromkeys(arg for action in actions if action.step for arg in action.step.args)
-        mentioned.update(dict.fromkeys(str(value) for fact in (*init, *goal) for value in fact.args))
-        types = {one: world.type_of(one) for one in mentioned}
-        objects = {one: kind for one, kind in types.items() if kind is not None}
-        numbers = {one: world.value(one.predicate, one.args) for one in _fluents(actions, bounds)}
-        return Problem(self._domain.name, objects, init, goal, actions, (), None, numbers, bounds, notes)
+        return replace(assembly.problem(name, pruned(slice_, reach), world, notes), whole=whole)
 
     def _nothing(self, *unreachable: str) -> Problem:
         """A problem that needs no engine: the goal holds, or cannot be reached."""
         return Problem(self._domain.name, {}, (), (), (), unreachable)
 
 
-def _priced(possible: list[Way], metric: Term | None) -> tuple[list[Way], tuple[str, ...]]:
-    """The ways with their costs, or all with the same cost and a note why."""
-    if all(way.cost is not None for way in possible):
-        return possible, ()
-    return [replace(way, cost=1.0) for way in possible], () if metric is None else (ignored(metric),)
+def _priced(task: Task, metric: Term | None) -> tuple[Task, tuple[str, ...]]:
+    """The task with costs; all the same, and a note why, if the metric is no cost of actions."""
+    if metric is None or all(way.cost is not None for way in task.ways.all):
+        return task, ()
+    ways = Ways([way._replace(cost=None if way.step is None else 1.0) for way in task.ways.all])
+    return replace(task, ways=ways), (ignored(metric),)
 
 
-def _split(numbering: Numbering, numbers: Iterable[int]) -> tuple[tuple[Fact, ...], tuple[Bound, ...]]:
-    """Facts in positive normal form, and bounds."""
-    facts: list[Fact] = []
-    bounds: list[Bound] = []
-    for number in numbers:
-        one = numbering.named(number)
-        if isinstance(one, Bound):
-            bounds.append(one)
-        else:
-            facts.append(numbering.fact(number))
-    return tuple(facts), tuple(bounds)
-
-
-def _ground_action(way: Way, numbering: Numbering) -> GroundAction:
-    needs, bounds = _split(numbering, way.needs)
-    adds = tuple([numbering.fact(one) for one in way.adds if one not in numbering.fluents])
-    deletes = tuple(map(numbering.fact, way.deletes))
-    return GroundAction(way.step, needs, adds, deletes, 0.0 if way.cost is None else way.cost, bounds, way.assignments)
-
-
-def _fluents(actions: Iterable[GroundAction], goal: Iterable[Bound]) -> dict[Fact, None]:
-    """All numeric fluents that matter."""
-    found = dict.fromkeys(fluent for bound in goal for fluent in bound.fluents())
-    for action in actions:
-        found.update((fluent, None) for bound in action.bounds for fluent in bound.fluents())
-        for one in action.assignments:
-            found.update(dict.fromkeys((one.fluent, *fluents(one.amount))))
-    return found
-
-
-def _with_conjunctive_goal(
-    ways: Sequence[Way], goal: Residual, numbering: Numbering
-) -> tuple[Sequence[Way], tuple[int, ...]]:
+def _with_conjunctive_goal(ways: Ways, goal: Residual, numbering: Numbering) -> tuple[Ways, tuple[int, ...]]:
     """The goal as literals and bounds; a disjunction in it becomes a fact that bookkeeping actions can add.
 
     They can be taken only after the last real action: a disjunct that held once might be undone later.
@@ -229,8 +190,8 @@ def _with_conjunctive_goal(
     finish = Variant(None, (_ACTING,), (_ACTING.negated, _FINISHED))
     closing = [Variant(None, (*way.condition, _FINISHED), way.effects) for way in bookkeeping]
     acting = numbering.of(_ACTING)
-    real = [replace(way, needs=(*way.needs, acting)) for way in ways]
-    return [*real, *(numbered(variant, numbering, 0.0) for variant in (finish, *closing))], wanted
+    real = [way._replace(needs=(*way.needs, acting)) for way in ways.all]
+    return Ways([*real, *(numbered(variant, numbering, 0.0) for variant in (finish, *closing))]), wanted
 
 
 def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Leaf, ...]:

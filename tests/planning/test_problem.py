@@ -18,7 +18,7 @@ from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.errors import UnsupportedActionError
 from planning.plan import PlanStep
-from planning.problem import pose
+from planning.problem import Poser, pose
 from planning.strips import Problem
 from planning.validation import validate
 
@@ -285,3 +285,45 @@ def test_a_posed_problem_has_a_plan_exactly_if_there_is_one(actions, present, go
     plan = solution(pose(domain, world, goal))
     assert (plan is not None) == _solvable(domain, world, goal)
     assert plan is None or validate(plan, domain, world, goal).valid
+
+
+# ---- one problem after the other --------------------------------------------------------------------------
+
+_CHANGES = st.lists(st.tuples(st.sampled_from(_GROUND), st.booleans()), max_size=4)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.lists(_action, min_size=1, max_size=3), st.lists(st.tuples(_CHANGES, _goal), min_size=2, max_size=4))
+def test_a_poser_that_posed_before_poses_the_same_problem(actions, turns):
+    domain = _random_domain(actions)
+    world, poser = KnowledgeBase(domain.schema), Poser(domain)
+    for changes, goal_text in turns:
+        removed = tuple(one for one, there in changes if not there)
+        world.apply(Delta(removed=removed, added=tuple(one for one, there in changes if there)), author="test")
+        goal = parse_condition(goal_text)
+        assert poser.pose(world, goal) == pose(domain, world, goal)
+
+
+def test_a_poser_follows_things_that_come_and_go(clean_up, table):
+    poser = Poser(clean_up)
+    for world in (table(2), table(3, 2, ["two"]), table(1), table(3, 1, ["one"]), table(2, 2, ["two"])):
+        assert poser.pose(world, ALL_TIDY) == pose(clean_up, world, ALL_TIDY)
+
+
+def test_a_poser_follows_what_conditions_were_evaluated_on():
+    domain = PlanningDomain.parse("""(define (domain d) (:types lamp) (:predicates (on ?l - lamp) (near ?a ?b - lamp))
+      (:functions (limit))
+      (:action press :parameters (?l - lamp) :precondition
+        (and (< (limit) 5) (forall (?other - lamp) (imply (near ?l ?other) (on ?other)))) :effect (on ?l)))""")
+    world = lamps(domain, fact("near", "l1", "l2"), number=2)
+    poser, goal = Poser(domain), parse_condition("(on l1)")
+    turns = [
+        Delta(),
+        Delta(values={fact("limit"): 9}),
+        Delta(values={fact("limit"): 1}, removed=(fact("near", "l1", "l2"),)),
+        Delta(nodes={"l3": "lamp"}, added=(fact("near", "l1", "l3"),)),
+        Delta(removed_nodes=("l2",)),
+    ]
+    for change in turns:
+        world.apply(change, author="test")
+        assert poser.pose(world, goal) == pose(domain, world, goal)
