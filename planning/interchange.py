@@ -28,8 +28,13 @@ _Key = tuple[str, tuple[str, ...]] | None
 
 def spared(task: Task) -> Ways | None:
     """The ways that are left without the objects that others can stand in for; `None` if there are no such objects."""
+    settled = frozenset(_settled(task))
+    return task.ways.known(settled, lambda: _spared(task, settled))
+
+
+def _spared(task: Task, settled: frozenset[Value]) -> Ways | None:
     ways = task.ways.all
-    mentions = _mentions(task)
+    mentions = _mentions(task, settled)
     if not mentions:
         return None
     by_step: dict[_Key, list[Way]] = {}
@@ -44,9 +49,9 @@ def spared(task: Task) -> Ways | None:
     return Ways([way for i, way in enumerate(ways) if i not in gone]) if gone else None
 
 
-def _mentions(task: Task) -> Mapping[str, Iterable[int]]:
+def _mentions(task: Task, settled: frozenset[Value]) -> Mapping[str, Iterable[int]]:
     """Object that need not stay -> positions of the ways that mention it, in their step or in literals."""
-    ways, settled = task.ways.all, set(_settled(task))
+    ways = task.ways.all
     about: dict[int, list[str]] = {}
     for one in set[int]().union(*[part for way in ways for part in (way.needs, way.adds, way.deletes)]):
         about[one] = [str(thing) for thing in _things(task.numbering.named(one)) if thing not in settled]

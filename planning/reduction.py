@@ -78,18 +78,33 @@ def pruned(task: Task, reach: Reach) -> Task:
     Left out are ways that can never be taken or cannot contribute to the goal, literals that no kept way or goal
     asks for, and literals and bounds that hold now and can never cease to (they hold whenever asked for).
     """
-    wanted, kept = _contributing(task, reach)
-    settled = _settled(task, kept)
-    asked = wanted - settled
-    ways = [clean for way in kept if (clean := _restricted(way, asked, settled, task.numbering)).adds]
-    needed = dict.fromkeys([need for way in ways for need in way.needs])
-    needed.update(dict.fromkeys(task.goal))
-    init = tuple([one for one in needed if one in task.init and one not in settled])
-    return Task(task.numbering, init, tuple([one for one in task.goal if one not in settled]), Ways(ways))
+    # From one problem to the next mostly other facts hold, but the same is possible, and the same can cease to hold.
+    key = (bytes(reach.taken), task.goal)
+    contribution = task.ways.known(key, lambda: _contributing(task, reach))
+    settled = contribution.lasting.intersection(task.init)
+    ways = task.ways.known((key, settled), lambda: Ways(_restricted(contribution, settled, task.numbering)))
+    goal = tuple([one for one in task.goal if one not in settled])
+    present = set(task.init)
+    init = tuple([one for one in dict.fromkeys((*ways.asked, *goal)) if one in present])
+    return Task(task.numbering, init, goal, ways)
 
 
-def _contributing(task: Task, reach: Reach) -> tuple[set[int], list[Way]]:
-    """What is asked for, and the ways that add something of it, or change a number that it depends on."""
+@dataclass(frozen=True, slots=True)
+class _Contribution:
+    """What contributes to a goal.
+
+    Attributes:
+        wanted: what the goal and the ways ask for.
+        ways: those that add something of it, or change a number that it depends on.
+        lasting: what of it can never cease to hold, if it does: no way deletes it or changes its numbers.
+    """
+
+    wanted: set[int]
+    ways: Sequence[Way]
+    lasting: frozenset[int]
+
+
+def _contributing(task: Task, reach: Reach) -> _Contribution:
     ways, adders, wants = task.ways.all, task.ways.adders, task.numbering.wants
     open_, inputs = bytearray(reach.taken), _inputs(ways, task.numbering)
     wanted, agenda = set(task.goal), list(task.goal)
@@ -107,7 +122,11 @@ def _contributing(task: Task, reach: Reach) -> tuple[set[int], list[Way]]:
                     if need not in wanted:
                         wanted.add(need)
                         agenda.append(need)
-    return wanted, [ways[i] for i in sorted(found)]
+    kept = [ways[i] for i in sorted(found)]
+    made = {one for way in kept for one in way.deletes}
+    made.update(one for way in kept for one in way.adds if one in task.numbering.fluents)
+    lasting = frozenset(one for one in wanted if one not in made and made.isdisjoint(wants.get(one, ())))
+    return _Contribution(wanted, kept, lasting)
 
 
 def _inputs(ways: Iterable[Way], numbering: Numbering) -> Mapping[int, Iterable[int]]:
@@ -119,18 +138,14 @@ def _inputs(ways: Iterable[Way], numbering: Numbering) -> Mapping[int, Iterable[
     return found
 
 
-def _settled(task: Task, ways: Sequence[Way]) -> set[int]:
-    """What holds and can never cease to: no way deletes it or changes a number that it depends on."""
-    made: set[int] = set()
-    for way in ways:
-        made.update(way.deletes)
-    if task.numbering.fluents:
-        made.update(one for way in ways for one in way.adds)
-    wants = task.numbering.wants
-    return {one for one in task.init if one not in made and made.isdisjoint(wants.get(one, ()))}
+def _restricted(contribution: _Contribution, settled: frozenset[int], numbering: Numbering) -> list[Way]:
+    """The ways without what nobody asks for."""
+    asked = contribution.wanted - settled
+    clean = [_clean(way, asked, settled, numbering) for way in contribution.ways]
+    return [way for way in clean if way.adds]
 
 
-def _restricted(way: Way, asked: set[int], settled: set[int], numbering: Numbering) -> Way:
+def _clean(way: Way, asked: set[int], settled: frozenset[int], numbering: Numbering) -> Way:
     needs = tuple([one for one in way.needs if one not in settled])
     return Way(
         way.step,

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from planning.plan import PlanStep
 from planning.quantities import Assignment
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Hashable, Mapping, Sequence
+
+_T = TypeVar("_T")
+_MOST_KNOWN = 16
 
 
 class Way(NamedTuple):
@@ -39,11 +42,26 @@ class Ways:
 
     def __init__(self, ways: Sequence[Way]) -> None:
         self.all = ways
+        self._known: dict[Hashable, Any] = {}
+
+    def known(self, key: Hashable, work_out: Callable[[], _T]) -> _T:
+        """What follows from these ways and `key`; worked out unless that was done lately."""
+        if key not in self._known:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = work_out()
+        found: _T = self._known[key]
+        return found
 
     @cached_property
     def counts(self) -> Sequence[int]:
         """How much each way needs."""
         return [len(way.needs) for way in self.all]
+
+    @cached_property
+    def asked(self) -> Sequence[int]:
+        """All that they need, in the order of the ways."""
+        return tuple(dict.fromkeys([one for way in self.all for one in way.needs]))
 
     @cached_property
     def users(self) -> Mapping[int, Sequence[int]]:
