@@ -42,6 +42,7 @@ class Engine:
         program: what has to be on the path besides.
         optimal: whether its plans are the cheapest there are.
         anytime: whether it goes on to look for better plans.
+        proves: whether it ends when there is no plan.
         deterministic: whether the same problem gets the same plan on every run.
         races: whether it is chosen by itself, or only by name.
         most_actions: with more ground actions than this it is no use beside an engine that has no such bound.
@@ -57,6 +58,7 @@ class Engine:
     program: str = ""
     optimal: bool = False
     anytime: bool = False
+    proves: bool = True
     deterministic: bool = True
     races: bool = True
     most_actions: int | None = None
@@ -99,7 +101,7 @@ ENGINES = (
     ),
     Engine(
         "aries", "up", "up_aries.solver:Aries", "up-aries", "MIT",
-        features=frozenset({"durations"}), extra="durations", most_actions=300,
+        features=frozenset({"durations"}), extra="durations", proves=False, most_actions=300,
     ),
     Engine(
         "fast-downward-opt", "fast_downward", "optimal", "up-fast-downward", "GPL-3.0",
