@@ -62,7 +62,7 @@ bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this en
 	$(BENCH)/bin/python benchmarks/engine.py $(if $(WRITE),--write)
 
 bench-planning: $(VENV)/.engines   ## tables of 5 to 50 items: each engine alone, the race, and the parts (QUICK=1, WRITE=1 writes the docs)
-	$(BIN)/python benchmarks/planning.py $(if $(QUICK),--quick) $(if $(WRITE),--write)
+	$(BIN)/python benchmarks/planners.py $(if $(QUICK),--quick) $(if $(WRITE),--write)
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import time
 from collections import OrderedDict
+from contextlib import aclosing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from planning.plan import PlanFound, PlanningOutcome, ProvenUnsolvable
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
+    from collections.abc import AsyncGenerator, Hashable
 
-    from planning.planner import Planner
+    from planning.planner import PlannerProcess
+    from planning.race import PlannerRace
     from planning.strips import Problem
 
 LARGEST = 64
@@ -31,25 +33,36 @@ class CachingPlanner:
         largest: number of problems; the one that was not asked for longest is forgotten first.
     """
 
-    def __init__(self, planner: Planner, largest: int = LARGEST) -> None:
+    def __init__(self, planner: PlannerProcess | PlannerRace, largest: int = LARGEST) -> None:
         self._planner = planner
         self._largest = largest
         self._known: OrderedDict[Hashable, PlanFound | ProvenUnsolvable] = OrderedDict()
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
         """The plan, `from_cache` if it was known, and then after no time."""
+        async with aclosing(self.plans(problem, seconds)) as plans:
+            return await anext(plans)
+
+    async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+        """As the planner's, the best that was found remembered; what is known is the only one."""
         started, key = time.monotonic(), _key(problem)
         known = self._known.get(key)
         if known is not None:
             self._known.move_to_end(key)
-            return _recalled(known, time.monotonic() - started)
-        outcome = await self._planner.solve(problem, seconds)
-        self._remember(key, outcome)
-        return outcome
+            yield _recalled(known, time.monotonic() - started)
+            return
+        async with aclosing(self._planner.plans(problem, seconds)) as plans:
+            async for outcome in plans:
+                self._remember(key, outcome)
+                yield outcome
 
-    def improve(self, problem: Problem, better: PlanFound) -> None:
-        """Remember a better plan for a problem, which the planner found after the first."""
-        self._remember(_key(problem), better)
+    async def close(self) -> None:
+        """End the planner's processes."""
+        self.kill()
+
+    def kill(self) -> None:
+        """As `close`, without a loop."""
+        self._planner.kill()
 
     def _remember(self, key: Hashable, outcome: PlanningOutcome) -> None:
         if isinstance(outcome, PlanFound | ProvenUnsolvable):
