@@ -68,6 +68,19 @@ def descendants(pid):
     return found
 
 
+def session(pid):
+    """All processes of the session that this one leads or led, also those whose parents are gone."""
+    found = set()
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, leader = stat.read_text().rpartition(")")[2].split()[:4]
+        except OSError:
+            continue
+        if int(leader) == pid and state not in "ZX":
+            found.add(int(stat.parent.name))
+    return found
+
+
 def gone(pids, seconds=20.0):
     """Whether none of these processes lives; waits for it, since the dead are buried by others."""
     limit = time.monotonic() + seconds

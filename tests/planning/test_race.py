@@ -6,7 +6,11 @@ import asyncio
 from contextlib import aclosing
 
 import pytest
-from fake_engines import HANGING, LONGER, PROBLEM, READY, SOLVED, answering, descendants, gone, planner
+from fake_engines import DETOUR, HANGING, LONGER, PROBLEM, READY, SOLVED, answering, descendants, gone, planner, session
+from fake_engines import FIRST as A
+from fake_engines import SECOND as B
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from planning.engines.registry import ENGINES, able, chosen, engine
 from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
@@ -167,3 +171,42 @@ def test_features_are_needs_and_costs_a_wish():
     assert [one.name for one in able({"numeric"}) if one.races] == ["enhsp"]
     assert [one.name for one in able({"costs"}) if one.races][:3] == ["fast-downward", "enhsp", "pyperplan"]
     assert able({"numeric", "durations"}) == []
+
+
+BEHAVIOURS = {
+    "hang": "time.sleep(600)",
+    "crash": "os._exit(3)",
+    "babble": "print('bla' * 100_000, end='', flush=True)",
+    "rubbish": "print('no plan of mine', flush=True)",
+    "wrong plan": "print('{\"actions\": [1, 0]}', flush=True)",
+    "no numbers": "print('{\"actions\": [\"first\"]}', flush=True)",
+    "fail": "print('{\"failed\": \"tired\"}', flush=True)",
+    "end": "print('{\"ended\": 0}', flush=True)",
+    "fork": "os.fork()",
+    "plan": f"print({SOLVED!r}, flush=True)",
+    "longer plan": f"print({LONGER!r}, flush=True)",
+}
+BEHAVING = st.lists(st.sampled_from(sorted(BEHAVIOURS)), max_size=4)
+
+
+@settings(derandomize=True, deadline=None, max_examples=25)
+@given(BEHAVING, BEHAVING)
+def test_however_two_engines_behave_there_is_an_outcome_a_plan_is_valid_and_nothing_is_left(one, other):
+    def script(doing):
+        return READY + "sys.stdin.readline()\n" + "\n".join(BEHAVIOURS[what] for what in doing)
+
+    async def run():
+        racing = race(script(one), script(other))
+        await racing.warm_up()
+        workers = [planner._process._pid for planner in racing._planners.values()]
+        found = await racing.solve(PROBLEM, 0.3)
+        await racing.close()
+        return found, workers
+
+    found, workers = asyncio.run(run())
+    if isinstance(found, PlanFound):
+        assert found.plan.steps in {(A.step, B.step), (A.step, DETOUR.step, B.step)}
+    else:
+        assert isinstance(found, EngineFailed | TimedOut)
+        assert FIRST.name in found.engine or SECOND.name in found.engine
+    assert all(gone(session(pid)) for pid in workers)
