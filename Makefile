@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all check conformance soak kill-kb bench-startup bench-broken bench-engine bench-planning pictures clean
+.PHONY: help demo test test-engines test-all check conformance soak kill-kb bench-startup bench-broken bench-engine bench-planning pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -32,7 +32,12 @@ test: $(VENV)/.test check   ## static checks, then all tests, on all cores
 
 $(VENV)/.engines: $(VENV)/.test   # planning engines that no one is forced to have; ENHSP needs Java besides
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,check,fast,numeric,durations]'
+	@command -v java >/dev/null || $(if $(filter 0,$(shell id -u)),,sudo) apt-get install --yes --quiet default-jre-headless
 	@touch $@
+
+test-engines: $(VENV)/.engines   ## every planning engine for real
+	$(BIN)/dsc doctor
+	$(BIN)/python -m pytest -rs tests/planning/test_real_engines.py
 
 test-all: $(VENV)/.engines check   ## as test, with every planning engine
 	$(BIN)/dsc doctor
