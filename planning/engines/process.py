@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _LONGEST_ANSWER = 1 << 26  # bytes; a worker that babbles must not fill our memory
 _GRACE = 1.0  # seconds for a worker to say that its search, which was killed, has ended
+_MOST_PROCESSES = 1 << 31  # what a process's number is smaller than
 _LONGEST_WAIT = 3600.0  # seconds; a selector takes no infinity
 
 
@@ -143,9 +144,9 @@ class EngineProcess:
     def _follow(self, group: object) -> None:
         """Remember which processes are the search's; only those of the worker's session can be."""
         with contextlib.suppress(ProcessLookupError):  # it has ended, and all of them with it
-            if not isinstance(group, int) or group <= 0 or os.getsid(group) != self._pid:
+            if not isinstance(group, int) or not 0 < group < _MOST_PROCESSES or os.getsid(group) != self._pid:
                 self.kill()
-                raise EngineStoppedError(f"no process group of its own: {group!r}")
+                raise EngineStoppedError(f"no process group of its own: {str(group)[:80]}")
             self._searches.add(group)
 
     def _in_time(self, deadline: Deadline) -> dict[str, Any]:
@@ -155,7 +156,7 @@ class EngineProcess:
         except OutOfTimeError:
             self._abandon()
             raise
-        except (OSError, ValueError) as error:  # a broken pipe, or no JSON
+        except (OSError, ValueError, RecursionError) as error:  # a broken pipe, or no JSON
             self.kill()
             raise EngineStoppedError(str(error)) from error
 
@@ -169,7 +170,7 @@ class EngineProcess:
         try:
             while "ended" not in self._next(grace):
                 pass
-        except (OSError, ValueError, OutOfTimeError):
+        except (OSError, ValueError, RecursionError, OutOfTimeError):
             self.kill()
         self._searches.clear()
 

@@ -197,7 +197,7 @@ def test_a_worker_that_does_not_say_that_its_search_has_ended_is_ended_itself(sc
     assert not process.alive
 
 
-@pytest.mark.parametrize("group", ["0", "1", "-1", "true", "os.getppid()", "'all'"])
+@pytest.mark.parametrize("group", ["0", "1", "-1", "true", "os.getppid()", "'all'", "10 ** 30"])
 def test_a_worker_cannot_make_us_kill_others(scripted, group):
     words = "True" if group == "true" else group
     process = scripted(READY + f"sys.stdin.readline(); print(json.dumps({{'searching': {words}}}), flush=True); time.sleep(600)")
@@ -212,6 +212,14 @@ def test_a_worker_that_babbles_is_ended(scripted, monkeypatch):
     process = scripted(READY + "while True: print('bla' * 1000, end='', flush=True)")
     process.start(60)
     with pytest.raises(EngineStoppedError, match="over 100000 bytes without an end"):
+        process.ask(PROBLEM.to_json(), Deadline(60), print)
+    assert not process.alive
+
+
+def test_an_answer_too_deep_to_be_read_is_no_answer(scripted):
+    process = scripted(READY + "print('[' * 100_000, flush=True); time.sleep(600)")
+    process.start(60)
+    with pytest.raises(EngineStoppedError):
         process.ask(PROBLEM.to_json(), Deadline(60), print)
     assert not process.alive
 
