@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check conformance sweep-pddl soak kill-kb bench-startup bench-broken bench-engine pictures clean
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb bench-startup bench-broken bench-engine bench-planning pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -29,6 +29,19 @@ demo: $(VENV)/.run   ## clear a table: designed where foreseen, planned where no
 
 test: $(VENV)/.test check   ## static checks, then all tests, on all cores
 	$(BIN)/python -m pytest -n auto
+
+$(VENV)/.engines: $(VENV)/.test   # planning engines that no one is forced to have; ENHSP needs Java besides
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,check,fast,numeric,durations]'
+	@command -v java >/dev/null || $(if $(filter 0,$(shell id -u)),,sudo) apt-get install --yes --quiet default-jre-headless
+	@touch $@
+
+test-engines: $(VENV)/.engines   ## every planning engine for real
+	$(BIN)/dsc doctor
+	$(BIN)/python -m pytest -rs tests/planning/test_real_engines.py
+
+test-all: $(VENV)/.engines check   ## as test, with every planning engine
+	$(BIN)/dsc doctor
+	$(BIN)/python -m pytest -n auto -rs
 
 check: $(VENV)/.test   ## ruff, mypy strict, import contracts
 	$(BIN)/ruff check .
@@ -55,6 +68,9 @@ bench-broken: $(VENV)/.run   ## how long the error in a broken plot takes, media
 
 bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this engine, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/engine.py $(if $(WRITE),--write)
+
+bench-planning: $(VENV)/.engines   ## tables of 5 to 50 items: each engine alone, the race, and the parts (QUICK=1, WRITE=1 writes the docs)
+	$(BIN)/python benchmarks/planners.py $(if $(QUICK),--quick) $(if $(WRITE),--write)
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg

@@ -11,7 +11,7 @@ import typer
 
 from dsc.cli import app as plot_app
 from knowledge_base.cli import app as kb_app
-from planning.cli import plan_command
+from planning.cli import doctor_command, plan_command
 
 if TYPE_CHECKING:
     from domains.clean_up_table.deployment import CleanUpTable
@@ -28,6 +28,7 @@ app = typer.Typer(
 app.add_typer(plot_app, name="plot")
 app.add_typer(kb_app, name="kb")
 app.command("plan")(plan_command)
+app.command("doctor")(doctor_command)
 
 WORLDS = ("clean-up-table",)
 

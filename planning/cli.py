@@ -1,4 +1,4 @@
-"""`dsc plan`: ask for a plan on the command line."""
+"""`dsc plan` and `dsc doctor`: ask for a plan on the command line, and see what there is to plan with."""
 
 from __future__ import annotations
 
@@ -11,96 +11,249 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from planning.plan import PlanningOutcome
+    from collections.abc import Mapping
+
+    from knowledge_base.exchange.pddl import ProblemText
+    from knowledge_base.store import KnowledgeBase
+    from planning.domain import PlanningDomain
+    from planning.order import PartialOrder
+    from planning.plan import Plan, PlanningOutcome
+    from planning.planner import PlannerProcess
+    from planning.race import PlannerRace
     from planning.strips import Problem
 
 FOUND, UNSOLVABLE, TIMED_OUT, FAILED = 0, 1, 3, 4
 """Exit statuses; 2 is bad input, for every command."""
 
+PLOT_NAME = "plan"
+PIPE_WIDTH = 120
+"""Columns of a table that is not printed on a terminal."""
+
 
 def plan_command(
-    domain: Annotated[Path, typer.Argument(help="PDDL file with the planning domain.", show_default=False)],
-    problem: Annotated[Path, typer.Argument(help="PDDL file with the problem.", show_default=False)],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DOMAIN... PROBLEM", help="PDDL: the domain, in one file or several, and the problem.",
+            show_default=False,
+        ),
+    ],
+    engine: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which engine plans.  [default: those that suit it race]")
+    ] = None,
     seconds: Annotated[float, typer.Option(min=0.0, help="Stop the planner after this long.")] = 10.0,
+    parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can go side by side.")] = False,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete.")] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Say what each step is for, or why there is no plan.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-    explain: Annotated[bool, typer.Option("--explain", help="If there is no plan, say why.")] = False,
-) -> None:
+) -> None:  # fmt: skip
     """Find a plan and print its steps.
 
     Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
     """
-    from knowledge_base.errors import InputError, Place
-    from knowledge_base.exchange.pddl import read_problem
-    from knowledge_base.store import KnowledgeBase
-    from planning.domain import PlanningDomain
     from planning.explain import why_unsolvable
-    from planning.plan import ProvenUnsolvable
+    from planning.order import deordered
+    from planning.plan import PlanFound, ProvenUnsolvable
     from planning.problem import pose
 
-    planning_domain = PlanningDomain.from_pddl(domain)
-    read = read_problem(problem, planning_domain.schema, domain=planning_domain.name)
-    if not read.has_goal:
-        raise InputError("the problem has no goal: (:goal CONDITION)", place=Place(str(problem), 1))
-    world = KnowledgeBase(planning_domain.schema)
-    world.apply(read.delta(), author=str(problem))
-    outcome = _solve(pose(planning_domain, world, read.goal), seconds)
-    why: tuple[str, ...] = ()
-    if explain and isinstance(outcome, ProvenUnsolvable):
-        why = why_unsolvable(planning_domain, world, read.goal)
-    status, answer = _answer(outcome, why)
+    domain, read, world = _read(files)
+    problem = pose(domain, world, read.goal, read.metric)
+    outcome = _solve(problem, seconds, engine)
+    status, answer = _answer(outcome)
+    if isinstance(outcome, ProvenUnsolvable) and explain:
+        answer["why"] = list(why_unsolvable(domain, world, read.goal))
+    if isinstance(outcome, PlanFound):
+        order = deordered(outcome.plan, domain, world, read.goal)
+        answer |= _ordered(order) if parallel else {}
+        answer |= _purposes(order) if explain else {}
+        if plot is not None:
+            _write_plot(plot, outcome.plan, domain, order if parallel else None)
     typer.echo(json.dumps(answer) if as_json else _text(answer), err=status != FOUND and not as_json)
     raise typer.Exit(status)
 
 
-def _solve(problem: Problem, seconds: float) -> PlanningOutcome:
+def doctor_command(
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Show which planning engines there are, what each can do, and how to install what is missing."""
+    from planning.doctor import findings
+
+    found = findings()
+    if as_json:
+        typer.echo(json.dumps(found))
+        return
+    from rich.console import Console
+
+    console = Console(width=None if sys.stdout.isatty() else PIPE_WIDTH)
+    console.print(_engine_table(found["engines"]))
+    for one in found["engines"]:
+        if not one["ready"]:
+            console.print(f"  {one['name']}: {one['to_do']}", markup=False, highlight=False)
+    versions = {"Python": found["python"], "Java": found["java"], **found["packages"]}
+    said = ", ".join(f"{name} {version or '(none)'}" for name, version in versions.items())
+    console.print(f"\n{said}; {found['system']}", markup=False, highlight=False)
+
+
+def _read(files: list[Path]) -> tuple[PlanningDomain, ProblemText, KnowledgeBase]:
+    from knowledge_base.errors import InputError, Place
+    from knowledge_base.exchange.pddl import read_problem
+    from knowledge_base.store import KnowledgeBase
+    from planning.domain import PlanningDomain
+
+    if len(files) < 2:
+        raise InputError(f"dsc plan takes a domain and a problem, there is only '{files[0]}'")
+    *fragments, file = files
+    domain = PlanningDomain.from_fragments(fragments)
+    read = read_problem(file, domain.schema, domain=domain.name)
+    if not read.has_goal:
+        raise InputError("the problem has no goal: (:goal CONDITION)", place=Place(str(file), 1))
+    world = KnowledgeBase(domain.schema)
+    world.apply(read.delta(), author=str(file))
+    return domain, read, world
+
+
+def _solve(problem: Problem, seconds: float, engine: str | None) -> PlanningOutcome:
     import asyncio
 
-    from planning.planner import PlannerProcess
+    from planning.engines.registry import chosen
+
+    planner = _planner(problem, engine)
+    names = [engine] if engine else [one.name for one in chosen(problem)]
 
     async def solve() -> PlanningOutcome:
-        planner = PlannerProcess()
         try:
             return await planner.solve(problem, seconds)
         finally:
             await planner.close()
 
-    with _spinner(f"planning, {len(problem.actions)} ground actions"):
+    with _progress(f"planning with {' and '.join(names)}, {len(problem.actions)} ground actions"):
         return asyncio.run(solve())
 
 
-def _spinner(text: str) -> AbstractContextManager[object]:
+def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRace:
+    """The named engine, if it can do the problem and is installed; else a race."""
+    from knowledge_base.errors import InputError, UnknownNameError
+    from planning.engines.registry import ENGINES, able
+    from planning.planner import PlannerProcess
+    from planning.race import PlannerRace
+
+    if engine is None:
+        return PlannerRace()
+    suited = {one.name: one for one in able(problem.features)}
+    could = f"; for this problem there are {', '.join(suited)}" if suited else ""
+    known = [one.name for one in ENGINES]
+    if engine not in known:
+        raise UnknownNameError(f"there is no engine '{engine}'{could}", found=engine, valid=known)
+    if engine not in suited:
+        raise InputError(f"the engine '{engine}' cannot do {', '.join(sorted(problem.features))}{could}")
+    if lacks := suited[engine].lacks():
+        raise InputError(f"the engine '{engine}' is not installed: {lacks}")
+    return PlannerProcess(engine)
+
+
+def _progress(text: str) -> AbstractContextManager[object]:
     if not sys.stderr.isatty():
         return nullcontext()
     from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    return Console(stderr=True).status(text)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    progress = Progress(*columns, console=Console(stderr=True), transient=True)
+    progress.add_task(text, total=None)
+    return progress
 
 
-def _answer(outcome: PlanningOutcome, why: tuple[str, ...]) -> tuple[int, dict[str, Any]]:
+def _answer(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
     """Exit status and what is printed."""
     from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
 
     match outcome:
-        case PlanFound(plan, engine, seconds):
+        case PlanFound(plan=plan, engine=engine, seconds=seconds, cost=cost):
             found: dict[str, Any] = {"outcome": "plan", "steps": [str(step) for step in plan.steps]}
-            return FOUND, {**found, "engine": engine, "seconds": round(seconds, 3)}
-        case ProvenUnsolvable(engine, reason):
-            found = {"outcome": "unsolvable", "steps": [], "engine": engine, "reason": reason}
-            return UNSOLVABLE, {**found, **({"why": list(why)} if why else {})}
-        case TimedOut(engine, seconds):
+            return FOUND, {**found, "cost": cost, "engine": engine, "seconds": round(seconds, 3)}
+        case ProvenUnsolvable(engine=engine, reason=reason):
+            return UNSOLVABLE, {"outcome": "unsolvable", "steps": [], "engine": engine, "reason": reason}
+        case TimedOut(engine=engine, seconds=seconds):
             return TIMED_OUT, {"outcome": "timed_out", "steps": [], "engine": engine, "seconds": seconds}
-        case EngineFailed(engine, message):
+        case EngineFailed(engine=engine, message=message):
             return FAILED, {"outcome": "engine_failed", "steps": [], "engine": engine, "reason": message}
 
 
-def _text(answer: dict[str, Any]) -> str:
+def _ordered(order: PartialOrder) -> dict[str, Any]:
+    """The chains that can go side by side, and what each step waits for; steps are numbered from 1."""
+    from planning.chains import chains
+
+    linked = {(link.provider, link.user) for link in order.links}
+    found = chains(order.earlier, lambda one, other: (one, other) in linked)
+    waits = {number: list(earlier) for number, earlier in order.waits_for.items()}
+    return {"lanes": [list(chain) for chain in found], "waits_for": waits}
+
+
+def _purposes(order: PartialOrder) -> dict[str, Any]:
+    """For each step what it brings about and for whom; 0 is the goal."""
+    from knowledge_base.language.printer import to_text
+
+    purposes: dict[int, list[dict[str, Any]]] = {number: [] for number in range(1, len(order.steps) + 1)}
+    for link in order.links:
+        if link.provider:
+            user = link.user if link.user <= len(order.steps) else 0
+            purposes[link.provider].append({"fact": to_text(link.fact), "for": user})
+    return {"purposes": purposes}
+
+
+def _write_plot(file: Path, plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> None:
+    from dsc.text.plots import plot_to_yaml
+    from knowledge_base.errors import InputError
+    from planning.plot import plot_from_plan
+
+    text = plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write the plot to '{file}': {error.strerror}") from None
+
+
+def _text(answer: Mapping[str, Any]) -> str:
     match answer["outcome"]:
         case "plan":
-            numbered = [f"{number:3} {step}" for number, step in enumerate(answer["steps"], 1)]
-            return "\n".join(numbered) or "nothing to do: the goal already holds"
+            return _plan_text(answer) or "nothing to do: the goal already holds"
         case "unsolvable":
             return "\n".join([f"there is no plan ({answer['reason']})", *answer.get("why", ())])
         case "timed_out":
-            return f"no plan within {answer['seconds']:g} s"
+            return f"no plan within {answer['seconds']:g} s ({answer['engine']})"
         case _:
             return f"the planner {answer['engine']} failed: {answer['reason']}"
+
+
+def _plan_text(answer: Mapping[str, Any]) -> str:
+    """One step a line, by lanes if they are known, each with what it waits for and what it is for."""
+    lanes = answer.get("lanes") or [range(1, len(answer["steps"]) + 1)]
+    lines: list[str] = []
+    for number, lane in enumerate(lanes, 1):
+        lines += [f"lane {number}"] if "lanes" in answer else []
+        before = None
+        for step in lane:
+            others = [one for one in answer.get("waits_for", {}).get(step, ()) if one != before]
+            waiting = f"   waits for {', '.join(map(str, others))}" if others else ""
+            lines.append(f"{step:3} {answer['steps'][step - 1]}{waiting}")
+            before = step
+            for purpose in answer.get("purposes", {}).get(step, ()):
+                user = f"step {purpose['for']}" if purpose["for"] else "the goal"
+                lines.append(f"      {purpose['fact']} for {user}")
+    return "\n".join(lines)
+
+
+def _engine_table(engines: list[dict[str, Any]]) -> Any:
+    from rich.table import Table
+
+    table = Table(title="planning engines", title_justify="left")
+    for head in ("engine", "version", "can do", "plans", "by itself", "licence"):
+        table.add_column(head, overflow="fold")
+    for one in engines:
+        plans = "the cheapest" if one["optimal"] else "better and better" if one["anytime"] else "one"
+        version = one["version"] or "missing" if one["ready"] else "[yellow]missing[/]"
+        races = "races" if one["races"] else "by name only"
+        table.add_row(one["name"], version, ", ".join(one["can_do"]), plans, races, one["licence"])
+    return table

@@ -22,12 +22,14 @@ from knowledge_base.compatibility import require_extension
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
+from planning.cache import CachingPlanner
 from planning.component import PlanningComponent
 from planning.domain import PlanningDomain
 from planning.fragments import shipped_by
 from planning.implementations import check_implementations
 from planning.planner import Planner, PlannerProcess
 from planning.problem import check_goal
+from planning.race import PlannerRace
 
 Prepare = Callable[[Sequencer], None]
 """Called before a run starts, e.g. to post events or to keep the sequencer at hand."""
@@ -42,7 +44,8 @@ class Executive:
         plots: the plots; those with `implements` carry out the domain's planning actions.
         components: the skills.
         knowledge: the world model; an empty one of the domain's schema if left out.
-        planner: finds plans; pyperplan in a process of its own if left out.
+        planner: finds plans; if left out, pyperplan in simulated time, so that a run can be repeated, and in real
+            time the engines that suit a problem, in a race.
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
@@ -66,9 +69,7 @@ class Executive:
         self.library = Library(plots)
         if ACHIEVE not in self.library:
             self.library.add(achieve_plot())
-        self._own_planner: PlannerProcess | None = None
-        if planner is None:
-            planner = self._own_planner = PlannerProcess()
+        self._own_planners: dict[bool, CachingPlanner] = {}
         self._planner = planner
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
@@ -131,7 +132,7 @@ class Executive:
         components: list[Component] = list(self.components)
         sequencer = Sequencer(self.library, self.knowledge, components, clock, trace, open_ended=open_ended)
         planning = PlanningComponent(
-            self.domain, self.library, self.knowledge, self._planner, clock, trace,
+            self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
             working_for=sequencer.working_for,
         )  # fmt: skip
         sequencer.dispatcher.deploy(planning)
@@ -140,9 +141,17 @@ class Executive:
         return await sequencer.run(plot, arguments)
 
     def close(self) -> None:
-        """End the planner's process, if there is one of its own."""
-        if self._own_planner is not None:
-            self._own_planner.kill()
+        """End the planners' processes, if there are any of its own."""
+        for planner in self._own_planners.values():
+            planner.kill()
+
+    def _planner_for(self, clock: LoopClock) -> Planner:
+        if self._planner is not None:
+            return self._planner
+        if clock.simulated not in self._own_planners:
+            planner = PlannerProcess() if clock.simulated else PlannerRace()
+            self._own_planners[clock.simulated] = CachingPlanner(planner)
+        return self._own_planners[clock.simulated]
 
     def __enter__(self) -> Self:
         """Itself; `close` at the end."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from knowledge_base.errors import InputError
+
 
 @dataclass(frozen=True, slots=True)
 class PlanStep:
@@ -18,10 +20,34 @@ class PlanStep:
 
 
 @dataclass(frozen=True, slots=True)
+class Timing:
+    """When a step begins, in seconds from the beginning of the plan, and how long it takes."""
+
+    start: float
+    duration: float = 0.0
+
+    @property
+    def end(self) -> float:
+        """When it is over."""
+        return self.start + self.duration
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
-    """Steps to be taken in order; no steps when the goal already holds."""
+    """Steps to be taken in order; no steps when the goal already holds.
+
+    Attributes:
+        steps: the steps; with a schedule in the order of their starts.
+        schedule: when an engine that plans with durations has each of them begin; empty if nobody says.
+    """
 
     steps: tuple[PlanStep, ...] = ()
+    schedule: tuple[Timing, ...] = ()
+
+    def __post_init__(self) -> None:
+        starts = [timing.start for timing in self.schedule]
+        if starts and (len(starts) != len(self.steps) or starts != sorted(starts)):
+            raise InputError(f"a schedule has a time for each of the {len(self.steps)} steps, by start; found {starts}")
 
     def __str__(self) -> str:
         """One step a line, as planners write plans."""
@@ -38,6 +64,9 @@ class PlanFound:
         seconds: how long that took in real time; differs from run to run.
         simulated_seconds: how long it takes in simulated time; depends on the problem only.
         reproducible: whether no limit of real time had a part in it, so that the same problem gives it again.
+        cost: what its actions cost together; their number, if nobody says what each costs.
+        from_cache: whether it was found for the same problem before.
+        failures: what happened to other engines that were asked as well.
     """
 
     plan: Plan
@@ -45,22 +74,27 @@ class PlanFound:
     seconds: float
     simulated_seconds: float
     reproducible: bool = True
+    cost: float = 0.0
+    from_cache: bool = False
+    failures: tuple[EngineFailed, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class ProvenUnsolvable:
-    """There is no plan; `reason` says what is known about why."""
+    """There is no plan; `reason` says what is known about why. For `failures` see `PlanFound`."""
 
     engine: str
     reason: str
+    failures: tuple[EngineFailed, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class TimedOut:
-    """The engine was stopped after `seconds` of real time; nothing is known."""
+    """The engine was stopped after `seconds` of real time; nothing is known. For `failures` see `PlanFound`."""
 
     engine: str
     seconds: float
+    failures: tuple[EngineFailed, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Asking for a plan without ever waiting longer than allowed: the engine in a process that can be killed.
+"""Asking an engine for a plan without ever waiting longer than allowed.
 
 The event loop may run in simulated time, so nothing here uses its timers: a thread waits for the engine in
 real time and wakes the loop, while `clock_hold` keeps the simulated clock where it is.
@@ -10,20 +10,22 @@ import asyncio
 import contextlib
 import threading
 import time
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, aclosing, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol
 
-from planning.engines.process import COMMAND, EngineProcess, EngineStoppedError, OutOfTimeError
+from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import AsyncGenerator, Callable, Sequence
 
     from planning.strips import Problem
 
 ENGINE = "pyperplan"
-_T = TypeVar("_T")
+"""The embedded engine: always there, and always the same plan for the same problem."""
+
+START_UP_SECONDS = 60.0
 
 
 class Planner(Protocol):
@@ -35,28 +37,33 @@ class Planner(Protocol):
 
 
 class PlannerProcess:
-    """The embedded engine, warm in a process of its own.
+    """One engine, warm in a process of its own.
 
-    One problem at a time: a second `solve` waits for the first. Cancelling a `solve`, like its deadline,
-    kills the process; the next `solve` starts a new one.
+    One problem at a time: a second one waits for the first. Whoever stops listening ends the search, with
+    everything that it started; the process stays warm.
     """
 
     def __init__(
         self,
+        engine: str = ENGINE,
         *,
         clock_hold: Callable[[], AbstractContextManager[object]] = nullcontext,
-        command: Sequence[str] = COMMAND,
-        start_up_seconds: float = 60.0,
+        command: Sequence[str] | None = None,
+        start_up_seconds: float = START_UP_SECONDS,
+        megabytes: int | None = None,
     ) -> None:
         """Nothing is started yet.
 
         Args:
+            engine: its name in `planning.engines.registry`.
             clock_hold: entered while the engine works, e.g. to hold a simulated clock.
-            command: how to start the worker process.
+            command: how to start the worker process, if not as is usual for the engine.
             start_up_seconds: bound on starting it, which does not count as planning time.
+            megabytes: how much memory each process of a search may take; the worker's own default if left out.
         """
+        self.engine = engine
         self._clock_hold = clock_hold
-        self._command = tuple(command)
+        self._command = worker(engine, megabytes) if command is None else tuple(command)
         self._start_up_seconds = start_up_seconds
         self._process: EngineProcess | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -67,13 +74,23 @@ class PlannerProcess:
 
         A problem that was sliced is tried as a whole if the slice has no plan, or none in half the time.
         """
-        if problem.unreachable:
-            return ProvenUnsolvable(ENGINE, "unreachable: " + ", ".join(problem.unreachable))
-        if not problem.goal:
-            return PlanFound(Plan(), ENGINE, 0.0, problem.simulated_seconds)
+        async with aclosing(self.plans(problem, seconds)) as plans:
+            return await anext(plans)
+
+    async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+        """As `solve`, and then each cheaper plan that an anytime engine finds in the rest of the time.
+
+        Closing it ends the search: `async with contextlib.aclosing(...)`.
+        """
+        known = self._without_search(problem)
+        if known is not None:
+            yield known
+            return
         async with self._turn():
             with self._clock_hold():
-                return await self._solve(problem, seconds)
+                async with aclosing(self._sliced(problem, seconds)) as outcomes:
+                    async for outcome in outcomes:
+                        yield outcome
 
     async def warm_up(self) -> None:
         """Start the process now, so that the first problem does not wait; what goes wrong shows then."""
@@ -98,79 +115,147 @@ class PlannerProcess:
             self._loop, self._lock = loop, asyncio.Lock()
         return self._lock
 
-    async def _solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        if problem.whole is None:
-            return await self._attempt(problem, seconds)
-        started = time.monotonic()
-        outcome = await self._attempt(problem, seconds / 2)
-        if isinstance(outcome, PlanFound | EngineFailed):
-            return outcome
-        cut_short = isinstance(outcome, TimedOut)
-        spent = min(time.monotonic() - started, seconds / 2)  # a new start is not planning time
-        outcome = await self._attempt(problem.whole, seconds - spent)
-        if isinstance(outcome, PlanFound):
-            return replace(outcome, reproducible=not cut_short)
-        return TimedOut(ENGINE, seconds) if isinstance(outcome, TimedOut) else outcome
+    def _without_search(self, problem: Problem) -> PlanningOutcome | None:
+        if problem.unreachable:
+            return ProvenUnsolvable(self.engine, "unreachable: " + ", ".join(problem.unreachable))
+        if not problem.goal and not problem.bounds:
+            return PlanFound(Plan(), self.engine, 0.0, problem.simulated_seconds)
+        return None
 
-    async def _attempt(self, problem: Problem, seconds: float) -> PlanningOutcome:
+    async def _sliced(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+        whole = problem.whole
+        if whole is None:
+            async for outcome in self._attempt(problem, seconds):
+                yield outcome
+            return
+        started, cut_short = time.monotonic(), False
+        async with aclosing(self._attempt(problem, seconds / 2)) as outcomes:
+            async for outcome in outcomes:
+                if not isinstance(outcome, PlanFound | EngineFailed):
+                    cut_short = isinstance(outcome, TimedOut)
+                    break
+                yield outcome
+            else:
+                return
+        spent = min(time.monotonic() - started, seconds / 2)  # a new start is not planning time
+        async for outcome in self._attempt(whole, seconds - spent):
+            if isinstance(outcome, PlanFound):
+                yield replace(outcome, reproducible=not cut_short)
+            else:
+                yield TimedOut(self.engine, seconds) if isinstance(outcome, TimedOut) else outcome
+
+    async def _attempt(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+        """The first outcome and each cheaper plan; anything but a plan is the last."""
+        best: PlanFound | None = None
         try:
             process = await self._ready()
         except OutOfTimeError:
-            return EngineFailed(ENGINE, f"it did not start within {self._start_up_seconds:g} s")
+            yield EngineFailed(self.engine, f"it did not start within {self._start_up_seconds:g} s")
+            return
         except (OSError, EngineStoppedError) as error:
-            return EngineFailed(ENGINE, f"it did not start: {error}")
-        request, started = problem.to_json(), time.monotonic()
+            yield EngineFailed(self.engine, f"it did not start: {error}")
+            return
+        started = time.monotonic()
         try:
-            answer = await self._in_thread(lambda: process.ask(request, seconds))
-        except OutOfTimeError:
-            return TimedOut(ENGINE, seconds)
-        except EngineStoppedError as error:
-            return EngineFailed(ENGINE, str(error))
-        return _judged(answer, problem, time.monotonic() - started)
+            async with aclosing(_answers(process, problem.to_json(), seconds)) as answers:
+                async for answer in answers:
+                    outcome = self._judged(answer, problem, time.monotonic() - started)
+                    if best is None or (isinstance(outcome, PlanFound) and outcome.cost < best.cost):
+                        yield outcome
+                    if not isinstance(outcome, PlanFound):
+                        return
+                    best = outcome if best is None or outcome.cost < best.cost else best
+        except (OutOfTimeError, EngineStoppedError) as error:
+            if best is None:
+                out_of_time = isinstance(error, OutOfTimeError)
+                yield TimedOut(self.engine, seconds) if out_of_time else EngineFailed(self.engine, str(error))
 
     async def _ready(self) -> EngineProcess:
-        if self._process is None or not self._process.alive:
+        """The process, when it can be asked; who stops waiting for that does not stop its start."""
+        known = self._process
+        if known is not None:
+            with contextlib.suppress(OutOfTimeError, EngineStoppedError):
+                await self._started(known)
+            if known.alive:  # only now: the search before this one may just have been its end
+                return known
             self.kill()
-            process = self._process = EngineProcess(self._command)
-            await self._in_thread(lambda: process.ask(None, self._start_up_seconds))
-        return self._process
+        self._process = process = EngineProcess(self._command)
+        await self._started(process)
+        return process
 
-    async def _in_thread(self, work: Callable[[], _T]) -> _T:
-        """The result of blocking `work`; a cancellation kills the process, which ends the work."""
+    async def _started(self, process: EngineProcess) -> None:
         loop = asyncio.get_running_loop()
-        finished: asyncio.Future[_T] = loop.create_future()
+        started: asyncio.Future[None] = loop.create_future()
 
-        def settle(settling: Callable[[], None]) -> None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
-                loop.call_soon_threadsafe(lambda: None if finished.done() else settling())
-
-        def run() -> None:
+        def start() -> None:
+            failure: Exception | None = None
             try:
-                result = work()
+                process.start(self._start_up_seconds)
             except Exception as error:  # noqa: BLE001  carried over to the one who waits
                 failure = error
-                settle(lambda: finished.set_exception(failure))
-            else:
-                settle(lambda: finished.set_result(result))
+            _call(loop, lambda: _settle(started, failure))
 
-        threading.Thread(target=run, daemon=True).start()
+        threading.Thread(target=start, daemon=True).start()
+        await started
+
+    def _judged(self, answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:
+        """What the engine's answer is worth: a plan counts only if it solves the problem."""
+        if "failed" in answer:
+            return EngineFailed(self.engine, str(answer["failed"]))
+        chosen = answer.get("actions", "no actions")
+        if chosen is None:
+            return ProvenUnsolvable(self.engine, "the search was exhausted")
+        if not isinstance(chosen, list) or not all(type(index) is int for index in chosen):
+            return EngineFailed(self.engine, f"no answer: {str(answer)[:80]}")
+        plan = problem.plan(chosen)
+        if isinstance(plan, str):
+            return EngineFailed(self.engine, f"its plan is no solution: {plan}")
+        return PlanFound(plan, self.engine, seconds, problem.simulated_seconds, cost=problem.cost(chosen))
+
+
+async def _answers(
+    process: EngineProcess, request: dict[str, Any], seconds: float
+) -> AsyncGenerator[dict[str, Any], None]:
+    """What the process answers, as it comes; closing this ends the search.
+
+    Raises:
+        OutOfTimeError, EngineStoppedError: as `EngineProcess.ask`.
+    """
+    loop, deadline = asyncio.get_running_loop(), Deadline(seconds)
+    heard: asyncio.Queue[dict[str, Any] | Exception | None] = asyncio.Queue()
+
+    def tell(what: dict[str, Any] | Exception | None) -> None:
+        _call(loop, lambda: heard.put_nowait(what))
+
+    def ask() -> None:
         try:
-            return await finished
-        except asyncio.CancelledError:
-            self.kill()
-            raise
+            process.ask(request, deadline, tell)
+        except Exception as error:  # noqa: BLE001  carried over to the one who waits
+            tell(error)
+        else:
+            tell(None)
+
+    threading.Thread(target=ask, daemon=True).start()
+    try:
+        while (answer := await heard.get()) is not None:
+            if isinstance(answer, Exception):
+                raise answer
+            yield answer
+    finally:
+        deadline.shorten(0)
+        process.wake()
 
 
-def _judged(answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:
-    """What the engine's answer is worth: a plan counts only if it solves the problem."""
-    if "failed" in answer:
-        return EngineFailed(ENGINE, str(answer["failed"]))
-    chosen = answer.get("actions", "no actions")
-    if chosen is None:
-        return ProvenUnsolvable(ENGINE, "the search was exhausted")
-    if not isinstance(chosen, list) or not all(isinstance(index, int) for index in chosen):
-        return EngineFailed(ENGINE, f"no answer: {str(answer)[:80]}")
-    plan = problem.plan(chosen)
-    if isinstance(plan, str):
-        return EngineFailed(ENGINE, f"its plan is no solution: {plan}")
-    return PlanFound(plan, ENGINE, seconds, problem.simulated_seconds)
+def _call(loop: asyncio.AbstractEventLoop, what: Callable[[], object]) -> None:
+    """In the loop; if it is closed, nobody waits any more."""
+    with contextlib.suppress(RuntimeError):
+        loop.call_soon_threadsafe(what)
+
+
+def _settle(waiting: asyncio.Future[None], failure: Exception | None) -> None:
+    if waiting.done():
+        return
+    if failure is None:
+        waiting.set_result(None)
+    else:
+        waiting.set_exception(failure)

@@ -5,94 +5,220 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import selectors
+import signal
 import subprocess
 import sys
 import threading
+import time
 import weakref
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
-COMMAND = (sys.executable, "-P", "-m", "planning.engines.worker")
 _LONGEST_ANSWER = 1 << 26  # bytes; a worker that babbles must not fill our memory
+_GRACE = 1.0  # seconds for a worker to say that its search, which was killed, has ended
+_MOST_PROCESSES = 1 << 31  # what a process's number is smaller than
+_LONGEST_WAIT = 3600.0  # seconds; a selector takes no infinity
+
+
+def worker(engine: str, megabytes: int | None = None) -> tuple[str, ...]:
+    """How to start the worker for an engine, with a bound on the memory of each search if it is given."""
+    limit = () if megabytes is None else (str(megabytes),)
+    return (sys.executable, "-P", "-m", "planning.engines.worker", engine, *limit)
 
 
 class OutOfTimeError(Exception):
-    """The process was killed because its time was up."""
+    """The search was ended because its time was up."""
 
 
 class EngineStoppedError(Exception):
-    """The process ended, or said something that is no answer; it is of no use any more."""
+    """The search or its process ended, or said something that is no answer."""
+
+
+class Deadline:
+    """Until when something may take, in real time; can be moved nearer from any thread."""
+
+    def __init__(self, seconds: float) -> None:
+        """So many seconds from now."""
+        self._at = time.monotonic() + seconds
+
+    @property
+    def left(self) -> float:
+        """Seconds; not above zero when it is over."""
+        return self._at - time.monotonic()
+
+    def shorten(self, seconds: float) -> None:
+        """At most so many seconds from now."""
+        self._at = min(self._at, time.monotonic() + seconds)
 
 
 class EngineProcess:
     """One running worker (see `planning.engines.worker` for what is said); dies with its owner.
 
-    When the object is forgotten, or the interpreter exits, the process is killed; should the owner itself be
-    killed, the worker sees the end of its input.
+    It leads a session of its own, each search a process group of its own, so that nothing that an engine starts
+    is left behind. When the object is forgotten, or the interpreter exits, all of them are killed; should the
+    owner itself be killed, the worker sees the end of its input.
     """
 
-    def __init__(self, command: Sequence[str] = COMMAND) -> None:
+    def __init__(self, command: Sequence[str]) -> None:
         """Start the process without waiting for it.
 
         Raises:
             OSError: the command cannot be started.
         """
-        self._popen = subprocess.Popen(  # noqa: S603  the command is ours or a test's
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=_environment(),
-        )
-        self._out_of_time = False
-        self.kill = weakref.finalize(self, _end, self._popen)
-        """End it now and take it off the process table; calling it again does nothing."""
+        its_input, self._to = os.pipe()
+        self._from, its_output = os.pipe()
+        self._woken, self._wake = os.pipe()
+        weakref.finalize(self, _close, (self._to, self._from, self._woken, self._wake))
+        try:
+            popen = subprocess.Popen(  # noqa: S603  the command is ours or a test's
+                command,
+                stdin=its_input,
+                stdout=its_output,
+                stderr=subprocess.DEVNULL,
+                env=_environment(),
+                start_new_session=True,
+            )
+        finally:
+            _close((its_input, its_output))
+        for fd in (self._to, self._wake):
+            os.set_blocking(fd, False)
+        self._pid = popen.pid
+        self._turn = threading.Lock()
+        self._ready = False
+        self._unsent = memoryview(b"")
+        self._heard = bytearray()
+        self._searches: set[int] = set()
+        self._end = weakref.finalize(self, _end, popen, self._searches)
 
     @property
     def alive(self) -> bool:
         """Whether it can still be asked."""
-        return self.kill.alive and not self._out_of_time and self._popen.poll() is None
+        return self._end.alive and _runs(self._pid)
 
-    def ask(self, request: Mapping[str, Any] | None, seconds: float) -> dict[str, Any]:
-        """The answer to one request (`None`: just listen), within `seconds` of real time.
+    def kill(self) -> None:
+        """End it and all that it started, now; calling it again does nothing."""
+        self._end()
+        self.wake()
+
+    def wake(self) -> None:
+        """Let the thread that waits for an answer look at its deadline again."""
+        with contextlib.suppress(BlockingIOError):  # it is full: then it wakes anyway
+            os.write(self._wake, b"!")
+
+    def start(self, seconds: float) -> None:
+        """Wait until it is ready to be asked.
 
         Raises:
-            OutOfTimeError: the time was up; the process is gone.
-            EngineStoppedError: it ended by itself, was killed, or answered rubbish; the process is gone.
+            OutOfTimeError: it is not within `seconds`; the process is gone.
+            EngineStoppedError: it ended by itself, was killed, or said rubbish; the process is gone.
         """
-        timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), self._expire)
-        timer.daemon = True
-        timer.start()
+        with self._turn:
+            if not self._ready and "ready" not in self._in_time(Deadline(seconds)):
+                self.kill()
+                raise EngineStoppedError("it did not say that it is ready")
+            self._ready = True
+
+    def ask(self, request: Mapping[str, Any], deadline: Deadline, hear: Callable[[dict[str, Any]], object]) -> None:
+        """Let it search; `hear` is called with each answer, in this thread. Returns when the search has ended.
+
+        Raises:
+            OutOfTimeError: the deadline has come; the search is gone, and the process, unless it takes that well.
+            EngineStoppedError: it ended or was killed before it gave an answer, or answered rubbish.
+        """
+        with self._turn:
+            self._unsent = memoryview(json.dumps(request).encode() + b"\n")
+            answered = False
+            while "ended" not in (said := self._in_time(deadline)):
+                if "searching" in said:
+                    self._follow(said["searching"])
+                else:
+                    answered = True
+                    hear(said)
+            self._searches.clear()
+            if not answered:
+                raise EngineStoppedError(f"the search {_ending(said['ended'])} without an answer")
+
+    def _follow(self, group: object) -> None:
+        """Remember which processes are the search's; only those of the worker's session can be."""
+        with contextlib.suppress(ProcessLookupError):  # it has ended, and all of them with it
+            if not isinstance(group, int) or not 0 < group < _MOST_PROCESSES or os.getsid(group) != self._pid:
+                self.kill()
+                raise EngineStoppedError(f"no process group of its own: {str(group)[:80]}")
+            self._searches.add(group)
+
+    def _in_time(self, deadline: Deadline) -> dict[str, Any]:
+        """The next thing it says; when that is too late or no answer, what is necessary is ended."""
         try:
-            return self._exchange(request)
-        except (OSError, ValueError) as error:  # a broken pipe or a closed one, or no JSON
+            return self._next(deadline)
+        except OutOfTimeError:
+            self._abandon()
+            raise
+        except (OSError, ValueError, RecursionError) as error:  # a broken pipe, or no JSON
             self.kill()
-            if self._out_of_time:
-                raise OutOfTimeError from error
             raise EngineStoppedError(str(error)) from error
-        finally:
-            timer.cancel()
 
-    def _exchange(self, request: Mapping[str, Any] | None) -> dict[str, Any]:
-        into, out = self._popen.stdin, self._popen.stdout
-        if into is None or out is None:
-            raise ValueError("the process has no pipes")
-        if request is not None:
-            into.write(json.dumps(request).encode() + b"\n")
-            into.flush()
-        line = out.readline(_LONGEST_ANSWER)
-        if not line:
-            raise ValueError(f"the process ended with status {self._popen.wait()}")
-        answer = json.loads(line)
-        if not isinstance(answer, dict):
+    def _abandon(self) -> None:
+        """End the search; the process as well unless it says soon that it is ready for the next."""
+        if not self._searches:
+            self.kill()
+            return
+        _kill_groups(self._searches)
+        grace = Deadline(_GRACE)
+        try:
+            while "ended" not in self._next(grace):
+                pass
+        except (OSError, ValueError, RecursionError, OutOfTimeError):
+            self.kill()
+        self._searches.clear()
+
+    def _next(self, deadline: Deadline) -> dict[str, Any]:
+        while b"\n" not in self._heard:
+            self._exchange(deadline)
+        line, _, rest = bytes(self._heard).partition(b"\n")
+        self._heard = bytearray(rest)
+        said = json.loads(line)
+        if not isinstance(said, dict):
             raise ValueError(f"no answer: {line[:80]!r}")
-        return answer
+        return said
 
-    def _expire(self) -> None:
-        self._out_of_time = True
-        self._popen.kill()  # the thread that waits for the answer sees its end
+    def _exchange(self, deadline: Deadline) -> None:
+        """Send and receive what can be at the moment."""
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._woken, selectors.EVENT_READ)
+            selector.register(self._from, selectors.EVENT_READ)
+            if self._unsent:
+                selector.register(self._to, selectors.EVENT_WRITE)
+            if deadline.left <= 0:
+                raise OutOfTimeError
+            able = {key.fd for key, _ in selector.select(min(deadline.left, _LONGEST_WAIT))}
+        if self._woken in able:
+            os.read(self._woken, 4096)
+        if self._to in able:
+            with contextlib.suppress(BrokenPipeError):  # its output says how it ended
+                self._unsent = self._unsent[os.write(self._to, self._unsent[:65536]) :]
+        if self._from in able:
+            self._receive()
+
+    def _receive(self) -> None:
+        chunk = os.read(self._from, 65536)
+        if not chunk:
+            raise ValueError(f"the process {_ending(self._status())}")
+        self._heard += chunk
+        if len(self._heard) > _LONGEST_ANSWER:
+            raise ValueError(f"no answer: over {_LONGEST_ANSWER} bytes without an end")
+
+    def _status(self) -> int | None:
+        """How the process ended; one that only closed its output is ended by that."""
+        return self._end()
+
+
+def _ending(status: object) -> str:
+    if isinstance(status, int) and status < 0:
+        return f"was killed by signal {-status}"
+    return "was killed" if status is None else f"ended with status {status}"
 
 
 def _environment() -> dict[str, str]:
@@ -100,10 +226,25 @@ def _environment() -> dict[str, str]:
     return {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
 
-def _end(popen: subprocess.Popen[bytes]) -> None:
-    popen.kill()
-    popen.wait()
-    for pipe in (popen.stdin, popen.stdout):
-        if pipe is not None:
-            with contextlib.suppress(OSError):  # unsent requests have nowhere to go
-                pipe.close()
+def _runs(pid: int) -> bool:
+    """Whether a child of ours has not ended yet; it stays on the process table, and its number taken."""
+    try:
+        return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
+    except ChildProcessError:
+        return False
+
+
+def _end(popen: subprocess.Popen[bytes], searches: set[int]) -> int:
+    _kill_groups([*searches, popen.pid])
+    return popen.wait()
+
+
+def _kill_groups(groups: Iterable[int]) -> None:
+    for group in groups:
+        with contextlib.suppress(OSError):  # nobody is left in it
+            os.killpg(group, signal.SIGKILL)
+
+
+def _close(fds: Iterable[int]) -> None:
+    for fd in fds:
+        os.close(fd)

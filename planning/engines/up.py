@@ -5,17 +5,24 @@ The import alone takes about a second, so only the worker process imports this m
 
 from __future__ import annotations
 
+import subprocess
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from unified_planning.engines import PlanGenerationResultStatus
+from unified_planning.engines import PlanGenerationResultStatus, pddl_planner
+from unified_planning.plans import TimeTriggeredPlan
 from up_pyperplan.engine import EngineImpl  # type: ignore[import-untyped]
 
 from planning.engines.translation import translated
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from unified_planning.engines.results import PlanGenerationResult
     from unified_planning.environment import Environment
     from unified_planning.model import InstantaneousAction
 
+    from planning.engines.registry import Engine
     from planning.strips import Problem
 
 
@@ -49,15 +56,53 @@ def _by_name(atom: Any) -> str:
     return str(atom.name)
 
 
-def solve(problem: Problem) -> list[int] | None:
-    """Indices into `problem.actions` that lead to the goal, or `None` if that is proven impossible.
+def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | None]]:
+    """The search with an engine made by the class `module:name`, for `planning.engines.worker`.
+
+    Raises:
+        ImportError: it is not installed.
+    """
+    module, _, name = engine.made_by.partition(":")
+    found = getattr(import_module(module), name)
+    make = Pyperplan if issubclass(found, EngineImpl) else found
+
+    def search(problem: Problem) -> Iterator[list[int] | None]:
+        costs = "costs" in engine.features & problem.features
+        yield _actions(make().solve(translated(problem, costs=costs)))
+
+    return search
+
+
+def _actions(result: PlanGenerationResult) -> list[int] | None:
+    """Indices into the problem's actions, or `None` if it is proven that there is no plan.
 
     Raises:
         RuntimeError: the engine ended without saying either.
     """
-    result = Pyperplan().solve(translated(problem))
+    if isinstance(result.plan, TimeTriggeredPlan):
+        timed = sorted(result.plan.timed_actions, key=_start)
+        return [int(action.action.name[1:]) for _, action, _ in timed]
     if result.plan is not None:
         return [int(step.action.name[1:]) for step in result.plan.actions]
     if result.status in _EXHAUSTED:
         return None
-    raise RuntimeError(f"the engine ended with status {result.status.name}")
+    said = " ".join(str(message.message) for message in result.log_messages or ()).split()
+    raise RuntimeError(f"it ended with status {result.status.name} {' '.join(said)[-200:]}".rstrip())
+
+
+def _start(timed: Any) -> Any:
+    return timed[0]
+
+
+def _run_in_our_group(
+    engine: Any, cmd: list[str], output_stream: object = None, timeout: float | None = None  # noqa: ARG001
+) -> tuple[bool, tuple[list[str], list[str]], int]:
+    """In the place of unified-planning's `run_command`, which would give the program a session of its own.
+
+    There it would outlive the search that it belongs to.
+    """
+    done = subprocess.run(cmd, capture_output=True, stdin=subprocess.DEVNULL, text=True, check=False)  # noqa: S603
+    return False, ([done.stdout], [done.stderr]), done.returncode
+
+
+pddl_planner.run_command = _run_in_our_group

@@ -1,72 +1,187 @@
-"""The planner process: `python -m planning.engines.worker`.
+"""The planner process: `python -m planning.engines.worker ENGINE [MEGABYTES]`.
 
-It speaks one JSON object a line. First it says `{"ready": true}`; then each line on standard input is a
-problem (`Problem.to_json`) and each line on standard output its answer: `{"actions": [3, 0, ...]}`,
-`{"actions": null}` when there is proven to be no plan, or `{"failed": "why"}`. It ends when its standard
-input does, even in the middle of a search: a planner never outlives who asked.
+It imports the engine once and then forks for each problem. So every search starts from the same state of the
+process (the same problem gets the same plan), can be ended without ending the worker, gives back its memory,
+and may crash as it likes.
+
+One JSON object a line. The worker begins with `{"ready": true}`. For each problem (`Problem.to_json`) on
+standard input it says `{"searching": G}`, G being the process group of the search and of all that it starts;
+then answers, `{"actions": [3, 0, ...]}` (each plan better than the one before), `{"actions": null}` when there
+is proven to be no plan, or `{"failed": "why"}`; and at last, always, `{"ended": STATUS}`. It ends when its
+standard input does, and the search with it: a planner never outlives who asked.
 """
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import json
 import os
-import queue
+import resource
+import select
 import signal
 import sys
 import threading
-from typing import IO, Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from planning.strips import Problem
+
+MEGABYTES = 2048
+"""Memory that a search may take, each of its processes by itself, if nobody says otherwise."""
 
 
 def main() -> None:
     """Serve until standard input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one who asked
-    answers = _claim_stdout()
-    requests: queue.SimpleQueue[str] = queue.SimpleQueue()
-    threading.Thread(target=_read, args=(requests,), daemon=True).start()
-    _say(answers, _import_engine())
-    while True:
-        _say(answers, _answer(requests.get()))
+    name, megabytes = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else MEGABYTES
+    out = _claim_stdout()
+    search = _loaded(name)
+    gc.freeze()  # what is there now is shared by all searches
+    _say(out, {"ready": True})
+    for line in sys.stdin.buffer:
+        _serve(line, search, out, megabytes)
 
 
-def _claim_stdout() -> IO[str]:
+def _claim_stdout() -> int:
     """Our answers' way out; whatever libraries print goes to standard error instead."""
-    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    out = os.dup(1)
     os.dup2(2, 1)
-    return answers
+    return out
 
 
-def _read(requests: queue.SimpleQueue[str]) -> None:
-    for line in sys.stdin:
-        requests.put(line)
-    os._exit(0)  # from this thread nothing gentler ends a search
+def _say(out: int, said: dict[str, Any]) -> None:
+    data = json.dumps(said).encode() + b"\n"
+    while data:
+        data = data[os.write(out, data) :]
 
 
-def _say(answers: IO[str], answer: dict[str, Any]) -> None:
-    answers.write(json.dumps(answer) + "\n")
-    answers.flush()
-
-
-def _import_engine() -> dict[str, Any]:
-    """Import ahead of the first problem; a failure is told again, as the answer to each problem."""
+def _loaded(name: str) -> Callable[[Problem], Iterator[list[int] | None]]:
+    """The engine's search; if it cannot be imported, one that says so to each problem."""
     try:
-        import planning.engines.up  # noqa: F401, PLC0415  warmed here so that no problem pays for it
+        import planning.strips  # noqa: F401, PLC0415  before the first fork, so that no search pays for it
+        from planning.engines.registry import engine  # noqa: PLC0415
+
+        one = engine(name)
+        driver = import_module(f"planning.engines.{one.driver}")
+        searching: Callable[[Problem], Iterator[list[int] | None]] = driver.searching(one)
     except Exception as error:  # noqa: BLE001  a broken installation is an answer, too
-        return {"ready": True, "failed": _described(error)}
-    return {"ready": True}
+        failure = error
+
+        def failing(problem: Problem) -> Iterator[list[int] | None]:  # noqa: ARG001
+            raise failure
+
+        return failing
+    return searching
 
 
-def _answer(line: str) -> dict[str, Any]:
+def _serve(
+    line: bytes, search: Callable[[Problem], Iterator[list[int] | None]], out: int, megabytes: int
+) -> None:
+    heard, said = os.pipe()
+    lifeline, held = os.pipe()
+    child = os.fork()
+    if child == 0:
+        for fd in (heard, held, out):
+            os.close(fd)
+        _search(line, search, said, lifeline, megabytes)
+    os.close(said)
+    os.close(lifeline)
+    _in_group(child)
+    _say(out, {"searching": child})
+    _relay(heard, out, child)
+    os.close(heard)
+    os.close(held)
+    _say(out, {"ended": _reaped(child)})
+
+
+def _in_group(child: int) -> None:
+    """Both sides do this, since either may be first."""
+    with contextlib.suppress(OSError):  # it has done so and gone already
+        os.setpgid(child, child)
+
+
+def _relay(heard: int, out: int, child: int) -> None:
+    """Hand on what the search says until it ends; end it when our own input does."""
+    poll = select.poll()
+    poll.register(heard, select.POLLIN)
+    poll.register(0, 0)  # nothing is asked meanwhile: only the hang-up is of interest
+    last = b"\n"
+    while True:
+        events = dict(poll.poll())
+        if 0 in events:
+            _kill_group(child)
+            os._exit(0)
+        chunk = os.read(heard, 65536)
+        if not chunk:
+            break
+        last = chunk
+        while chunk:
+            chunk = chunk[os.write(out, chunk) :]
+    if not last.endswith(b"\n"):
+        os.write(out, b"\n")
+
+
+def _reaped(child: int) -> int:
+    """Its exit status, negative for a signal; what it has left running is gone."""
+    os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)  # while it is a zombie, its group's number is taken
+    _kill_group(child)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def _kill_group(group: int) -> None:
+    with contextlib.suppress(OSError):
+        os.killpg(group, signal.SIGKILL)
+
+
+def _search(
+    line: bytes,
+    search: Callable[[Problem], Iterator[list[int] | None]],
+    said: int,
+    lifeline: int,
+    megabytes: int,
+) -> NoReturn:
+    """What the forked process does; it never returns to the loop that it was forked from."""
     try:
-        from planning.engines.up import solve  # noqa: PLC0415  see _import_engine
-        from planning.strips import Problem  # noqa: PLC0415
+        _in_group(0)
+        threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
+        _limit_memory(megabytes)
+        _answer(line, search, said)
+        os._exit(0)
+    finally:
+        os._exit(1)
 
-        return {"actions": solve(Problem.from_json(json.loads(line)))}
-    except Exception as error:  # noqa: BLE001  an engine may raise anything; the process must go on
-        return {"failed": _described(error)}
+
+def _end_with(lifeline: int) -> None:
+    """End this search with the worker, should that be killed before it could do so itself."""
+    os.read(lifeline, 1)
+    os.killpg(0, signal.SIGKILL)
 
 
-def _described(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+def _limit_memory(megabytes: int) -> None:
+    """Bound what each process of the search may write to.
+
+    RLIMIT_DATA, unlike RLIMIT_AS, counts no address space that is only reserved, of which Java takes many
+    gigabytes. It is kept by Linux (4.7 and later), not by macOS.
+    """
+    allowed = megabytes << 20
+    resource.setrlimit(resource.RLIMIT_DATA, (allowed, allowed))
+    os.environ["JAVA_TOOL_OPTIONS"] = f"-Xmx{max(16, megabytes * 3 // 4)}m"  # an honest error before the limit's
+
+
+def _answer(line: bytes, search: Callable[[Problem], Iterator[list[int] | None]], said: int) -> None:
+    from planning.strips import Problem  # noqa: PLC0415  see _loaded
+
+    try:
+        for actions in search(Problem.from_json(json.loads(line))):
+            _say(said, {"actions": actions})
+    except MemoryError:
+        _say(said, {"failed": "it ran out of memory"})
+    except Exception as error:  # noqa: BLE001  an engine may raise anything
+        _say(said, {"failed": f"{type(error).__name__}: {error}"})
 
 
 if __name__ == "__main__":

@@ -8,8 +8,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from dsc.text.plots import parse_plot
 from knowledge_base.errors import InputError
-from planning.cli import plan_command
+from planning.cli import doctor_command, plan_command
+from planning.engines.registry import ENGINES
 from planning.plan import EngineFailed
 
 PROBLEM = """(define (problem two-cups) (:domain clean-up-table)
@@ -25,11 +27,13 @@ PROBLEM = """(define (problem two-cups) (:domain clean-up-table)
 def run(domain_file, tmp_path):
     app = typer.Typer()
     app.command("plan")(plan_command)
+    app.command("doctor")(doctor_command)
     path = tmp_path / "problem.pddl"
 
-    def invoke(*options, problem=PROBLEM):
+    def invoke(*options, problem=PROBLEM, domains=(domain_file,)):
         path.write_text(problem)
-        return CliRunner().invoke(app, [str(domain_file), str(path), *options], catch_exceptions=False)
+        words = ["plan", *map(str, domains), str(path), *options]
+        return CliRunner().invoke(app, words, catch_exceptions=False)
 
     return invoke
 
@@ -47,8 +51,121 @@ def test_json_has_outcome_steps_engine_and_seconds(run):
     answer = json.loads(run("--json").stdout)
     assert answer["outcome"] == "plan"
     assert answer["steps"][-1] == "(throw-away cup2 sink)"
-    assert answer["engine"] == "pyperplan"
+    assert answer["engine"] in {"fast-downward", "pyperplan"}
+    assert answer["cost"] == 5
     assert answer["seconds"] >= 0
+
+
+def test_one_engine_can_be_named(run):
+    assert json.loads(run("--json", "--engine", "pyperplan").stdout)["engine"] == "pyperplan"
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("pyperlan", "there is no engine 'pyperlan'; for this problem there are fast-downward, pyperplan"),
+        ("pyperlan", "did you mean 'pyperplan'"),
+    ],
+)
+def test_an_unknown_engine_names_those_that_could(run, name, said):
+    with pytest.raises(InputError) as caught:
+        run("--engine", name)
+    assert said in str(caught.value)
+
+
+COUNTED = """(define (domain count) (:functions (n))
+  (:action more :precondition (< (n) 5) :effect (increase (n) 1)))"""
+TO_THREE = "(define (problem three) (:domain count) (:init (= (n) 0)) (:goal (>= (n) 3)))"
+
+
+def test_an_engine_that_cannot_do_the_problem_names_those_that_can(run, tmp_path):
+    domain = tmp_path / "count.pddl"
+    domain.write_text(COUNTED)
+    with pytest.raises(InputError, match="'pyperplan' cannot do numeric; for this problem there are enhsp"):
+        run("--engine", "pyperplan", problem=TO_THREE, domains=[domain])
+
+
+def test_an_engine_that_is_not_installed_says_how_to_get_it(run, monkeypatch):
+    monkeypatch.setattr("planning.engines.registry.Engine.version", None)
+    with pytest.raises(InputError, match=r"not installed: pip install 'dynamic-state-charts\[fast\]'"):
+        run("--engine", "fast-downward")
+
+
+def test_without_any_engine_the_command_says_what_could_be_installed(run, monkeypatch):
+    monkeypatch.setattr("planning.engines.registry.Engine.version", None)
+    result = run()
+    assert result.exit_code == 4
+    assert "fast-downward (pip install 'dynamic-state-charts[fast]')" in result.stderr
+
+
+def test_a_domain_may_come_in_fragments(run, tmp_path, domain_file):
+    more = tmp_path / "more.pddl"
+    more.write_text("(define (domain more) (:action wait :parameters () :effect (and)))")
+    assert run(domains=[domain_file, more]).exit_code == 0
+
+
+def test_a_problem_alone_is_not_enough(run):
+    with pytest.raises(InputError, match="takes a domain and a problem"):
+        run(domains=())
+
+
+def test_each_step_says_what_it_is_for(run):
+    lines = run("--explain").stdout.splitlines()
+    assert lines[0] == "  1 (pick-up cup1 table)"
+    assert lines[1].split() == ["(holding", "cup1)", "for", "step", "2"]
+    assert lines[-1].split() == ["(tidy", "cup2)", "for", "the", "goal"]
+
+
+TWO_LIGHTS = """(define (problem two) (:domain lights) (:objects a b - lamp) (:init (off a) (off b))
+  (:goal (and (on a) (on b))))"""
+
+
+def test_steps_that_need_not_wait_for_each_other_stand_in_lanes(run, tmp_path):
+    domain = tmp_path / "lights.pddl"
+    domain.write_text("""(define (domain lights) (:types lamp) (:predicates (on ?l - lamp) (off ?l - lamp))
+      (:action switch :parameters (?l - lamp) :precondition (off ?l) :effect (and (on ?l) (not (off ?l)))))""")
+    shown = run("--parallel", problem=TWO_LIGHTS, domains=[domain]).stdout.splitlines()
+    assert [line for line in shown if "lane" in line] == ["lane 1", "lane 2"]
+    answer = json.loads(run("--parallel", "--json", problem=TWO_LIGHTS, domains=[domain]).stdout)
+    assert answer["lanes"] == [[1], [2]]
+    assert answer["waits_for"] == {"1": [], "2": []}
+
+
+def test_the_plan_can_be_written_as_a_plot(run, tmp_path):
+    file = tmp_path / "plan.yaml"
+    assert run("--plot", str(file)).exit_code == 0
+    plot = parse_plot(file.read_text())
+    assert [state.about for name, state in plot.states.items() if name.startswith("step")][:2] == [
+        "(pick-up cup1 table)",
+        "(stack cup1 cup2 one none table)",
+    ]
+    with pytest.raises(InputError, match="cannot write the plot"):
+        run("--plot", str(tmp_path / "nowhere" / "plan.yaml"))
+
+
+def test_the_doctor_lists_every_engine_with_what_it_can_do_and_what_it_lacks(monkeypatch):
+    app = typer.Typer()
+    app.command()(doctor_command)
+    found = json.loads(CliRunner().invoke(app, ["--json"], catch_exceptions=False).stdout)
+    assert [one["name"] for one in found["engines"]] == [one.name for one in ENGINES]
+    assert found["packages"]["unified-planning"]
+    assert next(one for one in found["engines"] if one["name"] == "pyperplan")["ready"]
+    monkeypatch.setattr("shutil.which", lambda _: None)
+    shown = CliRunner().invoke(app, [], catch_exceptions=False)
+    assert shown.exit_code == 0
+    assert all(one.name in shown.stdout for one in ENGINES)
+    assert "put 'java' on the path" in shown.stdout
+    assert "Java (none)" in shown.stdout
+
+
+def test_the_doctor_fits_a_terminal_of_100_columns(monkeypatch):
+    monkeypatch.setattr("planning.cli.PIPE_WIDTH", 100)
+    app = typer.Typer()
+    app.command()(doctor_command)
+    lines = CliRunner().invoke(app, [], catch_exceptions=False).stdout.splitlines()
+    assert max(map(len, lines)) <= 100
+    for one in ENGINES:
+        assert any(one.name in line and one.licence in line for line in lines), one.name
 
 
 def test_nothing_to_do_is_a_plan(run):
@@ -83,7 +200,7 @@ def test_a_failed_engine_has_a_status_of_its_own(run, monkeypatch):
         async def close(self):
             pass
 
-    monkeypatch.setattr("planning.planner.PlannerProcess", Broken)
+    monkeypatch.setattr("planning.race.PlannerRace", Broken)
     result = run()
     assert result.exit_code == 4
     assert "it fell over" in result.stderr

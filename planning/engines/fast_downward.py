@@ -1,0 +1,137 @@
+"""Fast Downward without its translator: what it searches is written straight from the ground problem.
+
+The translator (a Python program that grounds PDDL, started anew for each problem) takes most of the time that
+Fast Downward needs, and our problem is ground already. The text is SAS+ as in Helmert 2006, *The Fast Downward
+Planning System*, format version 3 (https://www.fast-downward.org/latest/documentation/translator-output-format/),
+with one variable of two values for each fact.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import tempfile
+from fractions import Fraction
+from importlib.util import find_spec
+from math import lcm
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from knowledge_base.facts import Fact
+    from planning.engines.registry import Engine
+    from planning.strips import GroundAction, Problem
+
+# Lazy greedy search with h_FF alone: on the clean-up table preferred operators and landmarks are no faster up to 50
+# items and make up to twice as many trips. What follows only ever looks for a better plan.
+_FIRST = "lazy_greedy([h],cost_type=one)"
+_BETTER = ["lazy_greedy([h],reopen_closed=false)"] + [f"lazy_wastar([h],preferred=[h],w={w})" for w in (5, 3, 2, 1)]
+
+_SEARCHES = {
+    "first, then better": f"let(h,ff(),iterated([{','.join([_FIRST, *_BETTER])}],repeat_last=true))",
+    "optimal": "astar(lmcut())",
+}
+
+_PROVEN = (11, 12)
+"""Exit codes of a search that was exhausted; with safe heuristics, as these are, that is a proof."""
+
+_OUT_OF_MEMORY = (22, 24)
+_FINEST_COST = 1000  # costs are whole numbers there: ours are kept as fractions of at most so many parts
+
+
+def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | None]]:
+    """The search that the engine is made by, for `planning.engines.worker`.
+
+    Raises:
+        ModuleNotFoundError: Fast Downward is not installed.
+    """
+    program, options = str(_program()), _SEARCHES[engine.made_by]
+
+    def search(problem: Problem) -> Iterator[list[int] | None]:
+        yield from _plans(program, options, sas(problem))
+
+    return search
+
+
+def _program() -> Path:
+    package = find_spec("up_fast_downward")
+    if package is None or package.origin is None:
+        raise ModuleNotFoundError("Fast Downward is not installed: pip install 'dynamic-state-charts[fast]'")
+    return Path(package.origin).parent / "downward" / "builds" / "release" / "bin" / "downward"
+
+
+def _plans(program: str, options: str, text: str) -> Iterator[list[int] | None]:
+    """Plans as they are found; each is in a file of its own before the program says so."""
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as task:
+        task.write(text)
+        task.seek(0)
+        file = Path(folder) / "plan"
+        command = [program, "--search", options, "--internal-plan-file", str(file)]
+        running = subprocess.Popen(  # noqa: S603  the program is the package's own
+            command, stdin=task, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=_bare()
+        )
+        with running:
+            found = 0
+            for line in running.stdout or ():
+                if "Plan cost:" in line:
+                    found += 1
+                    yield _read(file if found == 1 and file.exists() else file.with_name(f"plan.{found}"))
+        if found:
+            return
+        if running.returncode in _PROVEN:
+            yield None
+            return
+        raise _failure(running.returncode)
+
+
+def _bare() -> dict[str, str]:
+    return {name: value for name, value in os.environ.items() if name in {"PATH", "TMPDIR"}}
+
+
+def _failure(status: int) -> Exception:
+    if status in _OUT_OF_MEMORY:
+        return MemoryError()
+    return RuntimeError(f"Fast Downward ended with status {status}")
+
+
+def _read(file: Path) -> list[int]:
+    """The numbers of the actions: a line is `(a17 )`, and `;` begins a comment."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return [int(line.strip("() ").removeprefix("a")) for line in lines if line.startswith("(")]
+
+
+def sas(problem: Problem) -> str:
+    """The problem in the translator's output format; actions are called `a0`, `a1`, ... as they are numbered."""
+    number: dict[Fact, int] = {}
+    for fact in (*problem.init, *problem.goal, *(f for action in problem.actions for f in action.facts())):
+        number.setdefault(fact, len(number))
+    costs = _whole([Fraction(action.cost).limit_denominator(_FINEST_COST) for action in problem.actions])
+    init = set(problem.init)
+    lines = ["begin_version", "3", "end_version", "begin_metric", "1", "end_metric", str(len(number))]
+    for n in range(len(number)):
+        lines += ["begin_variable", f"var{n}", "-1", "2", f"NegatedAtom f{n}()", f"Atom f{n}()", "end_variable"]
+    lines += ["0", "begin_state", *("1" if fact in init else "0" for fact in number), "end_state"]
+    lines += ["begin_goal", str(len(problem.goal)), *(f"{number[fact]} 1" for fact in problem.goal), "end_goal"]
+    lines.append(str(len(problem.actions)))
+    for n, (action, cost) in enumerate(zip(problem.actions, costs, strict=True)):
+        lines += _operator(f"a{n}", action, cost, number)
+    return "\n".join([*lines, "0", ""])
+
+
+def _operator(name: str, action: GroundAction, cost: int, number: dict[Fact, int]) -> list[str]:
+    changes = [*((fact, 1) for fact in action.adds), *((fact, 0) for fact in action.deletes)]
+    changed, needed = {fact for fact, _ in changes}, set(action.precondition)
+    prevail = [f"{number[fact]} 1" for fact in action.precondition if fact not in changed]
+    effects = [f"0 {number[fact]} {1 if fact in needed else -1} {after}" for fact, after in changes]
+    return [
+        "begin_operator", name, str(len(prevail)), *prevail, str(len(effects)), *effects, str(cost), "end_operator",
+    ]  # fmt: skip
+
+
+def _whole(costs: Iterable[Fraction]) -> list[int]:
+    """In the same proportions, as whole numbers."""
+    costs = list(costs)
+    unit = lcm(*(cost.denominator for cost in costs))
+    return [int(cost * unit) for cost in costs]

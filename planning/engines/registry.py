@@ -1,0 +1,146 @@
+"""The planning engines there are, what each can do, and which of them suit a problem.
+
+Nothing here imports an engine or unified-planning: whether one is installed is looked up in the metadata of
+the packages, so that asking costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
+
+from knowledge_base.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable
+
+    from planning.strips import Problem
+
+DISTRIBUTION = "dynamic-state-charts"
+
+WISHES = frozenset({"costs"})
+"""Features that an engine may ignore: its plan is valid all the same, only not the cheapest."""
+
+AT_ONCE = 2
+"""How many engines race at most (CONTRACTS.md, Planning): there are robots with two cores."""
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """A planning engine as it is used here.
+
+    Attributes:
+        name: what it is called on the command line and in outcomes.
+        driver: the module of `planning.engines` that runs it, inside the worker process.
+        made_by: what the driver makes it of: `module:class` of a unified-planning engine, or a configuration.
+        package: the distribution it comes in.
+        licence: the engine's own, which may be another than its package's.
+        features: what it can do beyond STRIPS, out of `planning.strips.FEATURES`.
+        extra: the extra of this project that installs it; empty for what is always there.
+        program: what has to be on the path besides.
+        optimal: whether its plans are the cheapest there are.
+        anytime: whether it goes on to look for better plans.
+        proves: whether it ends when there is no plan.
+        deterministic: whether the same problem gets the same plan on every run.
+        races: whether it is chosen by itself, or only by name.
+        most_actions: with more ground actions than this it is no use beside an engine that has no such bound.
+    """
+
+    name: str
+    driver: str
+    made_by: str
+    package: str
+    licence: str
+    features: frozenset[str] = frozenset()
+    extra: str = ""
+    program: str = ""
+    optimal: bool = False
+    anytime: bool = False
+    proves: bool = True
+    deterministic: bool = True
+    races: bool = True
+    most_actions: int | None = None
+
+    @property
+    def version(self) -> str | None:
+        """The installed version of its package; `None` if there is none."""
+        try:
+            return version(self.package)
+        except PackageNotFoundError:
+            return None
+
+    def lacks(self) -> str:
+        """What to do before it can be used; empty if it can be used now."""
+        steps = []
+        if self.version is None:
+            steps.append(f"pip install '{DISTRIBUTION}{f'[{self.extra}]' if self.extra else ''}'")
+        if self.program and shutil.which(self.program) is None:
+            steps.append(f"put '{self.program}' on the path")
+        return ", ".join(steps)
+
+    def can_do(self, features: Collection[str]) -> bool:
+        """Whether it can plan with these features; `WISHES` are not asked for."""
+        return self.features.issuperset(frozenset(features) - WISHES)
+
+
+# In the order of preference. Fast Downward gets its input ready made (see the driver), so that it is ahead of
+# pyperplan on the smallest problem, too; pyperplan greedily takes seconds from about 1,000 ground actions on.
+ENGINES = (
+    Engine(
+        "fast-downward", "fast_downward", "first, then better", "up-fast-downward", "GPL-3.0",
+        features=frozenset({"costs"}), extra="fast", anytime=True,
+    ),
+    Engine(
+        "pyperplan", "up", "up_pyperplan.engine:EngineImpl", "up-pyperplan", "GPL-3.0", most_actions=1500,
+    ),
+    Engine(
+        "enhsp", "up", "up_enhsp.enhsp_planner:ENHSPEngine", "up-enhsp", "GPL-3.0",
+        features=frozenset({"numeric", "costs"}), extra="numeric", program="java", most_actions=300,
+    ),
+    Engine(
+        "aries", "up", "up_aries.solver:Aries", "up-aries", "MIT",
+        features=frozenset({"durations"}), extra="durations", proves=False, most_actions=300,
+    ),
+    Engine(
+        "fast-downward-opt", "fast_downward", "optimal", "up-fast-downward", "GPL-3.0",
+        features=frozenset({"costs"}), extra="fast", optimal=True, races=False,
+    ),
+    Engine(
+        "enhsp-opt", "up", "up_enhsp.enhsp_planner:ENHSPOptEngine", "up-enhsp", "GPL-3.0",
+        features=frozenset({"numeric", "costs"}), extra="numeric", program="java", optimal=True, races=False,
+    ),
+)  # fmt: skip
+
+
+def engine(name: str) -> Engine:
+    """The engine of that name.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    for one in ENGINES:
+        if one.name == name:
+            return one
+    raise UnknownNameError(f"there is no engine '{name}'", found=name, valid=[one.name for one in ENGINES])
+
+
+def able(features: Collection[str], engines: Iterable[Engine] = ENGINES) -> list[Engine]:
+    """The engines that can plan with these features, those that also grant the wishes first."""
+    wishes = WISHES.intersection(features)
+    suited = [one for one in engines if one.can_do(features)]
+    return sorted(suited, key=lambda one: not wishes <= one.features)  # stable: else as preferred
+
+
+def installed(one: Engine) -> bool:
+    """Whether it can be used now."""
+    return not one.lacks()
+
+
+def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:
+    """The engines that shall race for a plan, at most `AT_ONCE`; none if none that can is installed."""
+    racing = [one for one in able(problem.features) if one.races and usable(one)]
+    size = len(problem.actions)
+    fitting = [one for one in racing if one.most_actions is None or size <= one.most_actions]
+    return (fitting or racing)[:AT_ONCE]

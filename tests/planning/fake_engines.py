@@ -1,0 +1,98 @@
+"""Workers that misbehave, as scripts for `python -c`; they speak as `planning.engines.worker` does."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+
+from knowledge_base.facts import Fact
+from planning.plan import PlanStep
+from planning.planner import PlannerProcess
+from planning.strips import GroundAction, Problem
+
+READY = "import json, sys, time, os, signal\nprint('{\"ready\": true}', flush=True)\n"
+HANGING = READY + "time.sleep(600)\n"
+
+START, MIDDLE, GOAL = Fact("start"), Fact("middle"), Fact("goal")
+FIRST = GroundAction(PlanStep("first", ("a",)), (START,), (MIDDLE,), (START,))
+SECOND = GroundAction(PlanStep("second", ("b",)), (MIDDLE,), (GOAL,), ())
+DETOUR = GroundAction(PlanStep("detour"), (MIDDLE,), (), ())
+PROBLEM = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND, DETOUR))
+SOLVED = '{"actions": [0, 1]}'
+LONGER = '{"actions": [0, 2, 1]}'
+
+
+def answering(*answers):
+    """A worker that gives these answers, in this order, to every problem."""
+    said = [*answers, '{"ended": 0}']
+    return READY + f"for line in sys.stdin: print(*{said!r}, sep='\\n', flush=True)\n"
+
+
+def planner(script, engine="fake", **options):
+    """A planner whose worker is the script."""
+    return PlannerProcess(engine, command=(sys.executable, "-c", script), **options)
+
+
+def lights_out(size):
+    """A puzzle in which h_FF is lost: each switch turns three lights; far too much for a second or two."""
+    on = [Fact("on", (f"l{i}",)) for i in range(size)]
+    off = [Fact("off", (f"l{i}",)) for i in range(size)]
+    actions = []
+    for i in range(size):
+        near = [i - 1, i, (i + 1) % size]
+        for mask in range(8):
+            now = [(on if mask >> k & 1 else off)[n] for k, n in enumerate(near)]
+            then = [(off if mask >> k & 1 else on)[n] for k, n in enumerate(near)]
+            actions.append(GroundAction(PlanStep("press", (f"l{i}",)), tuple(now), tuple(then), tuple(now)))
+    return Problem("lights", {}, (*on[::2], *off[1::2]), tuple(off), tuple(actions))
+
+
+def descendants(pid):
+    """All processes that it has started, and those that they have, by what Linux tells; zombies are dead."""
+    children = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            _, _, rest = stat.read_text().rpartition(")")
+        except OSError:
+            continue
+        state, parent = rest.split()[:2]
+        if state not in "ZX":
+            children.setdefault(int(parent), []).append(int(stat.parent.name))
+    found, agenda = set(), [pid]
+    while agenda:
+        for child in children.get(agenda.pop(), ()):
+            found.add(child)
+            agenda.append(child)
+    return found
+
+
+def session(pid):
+    """All processes of the session that this one leads or led, also those whose parents are gone."""
+    found = set()
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, leader = stat.read_text().rpartition(")")[2].split()[:4]
+        except OSError:
+            continue
+        if int(leader) == pid and state not in "ZX":
+            found.add(int(stat.parent.name))
+    return found
+
+
+def gone(pids, seconds=20.0):
+    """Whether none of these processes lives; waits for it, since the dead are buried by others."""
+    limit = time.monotonic() + seconds
+    while alive := {pid for pid in pids if _lives(pid)}:
+        if time.monotonic() > limit:
+            return False
+        os.sched_yield()
+    return not alive
+
+
+def _lives(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False

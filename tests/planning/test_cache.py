@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+from fake_engines import FIRST, GOAL, PROBLEM, SECOND, START
+
+from planning.cache import CachingPlanner
+from planning.plan import Plan, PlanFound, ProvenUnsolvable, TimedOut
+from planning.strips import Problem
+
+FOUND = PlanFound(Plan((FIRST.step, SECOND.step)), "fake", 1.5, 0.2, cost=2)
+
+
+class Counting:
+    """A planner that always says the same and counts how often it is asked."""
+
+    def __init__(self, *outcomes):
+        self.outcomes, self.asked = outcomes, 0
+
+    async def plans(self, problem, seconds):
+        self.asked += 1
+        for outcome in self.outcomes:
+            yield outcome
+
+
+def solve(planner, *problems):
+    async def run():
+        return [await planner.solve(one, 5) for one in problems]
+
+    return asyncio.run(run())
+
+
+def test_the_same_problem_is_asked_once_and_the_answer_says_so():
+    counting = Counting(FOUND)
+    first, second = solve(CachingPlanner(counting), PROBLEM, replace(PROBLEM, init=tuple(reversed(PROBLEM.init))))
+    assert counting.asked == 1
+    assert first == FOUND
+    assert second.from_cache
+    assert second.plan == FOUND.plan
+    assert second.simulated_seconds == FOUND.simulated_seconds  # so that a run does not depend on what was run before
+
+
+def test_what_differs_in_anything_is_another_problem():
+    counting = Counting(FOUND)
+    others = [
+        replace(PROBLEM, init=(START, GOAL)),
+        replace(PROBLEM, goal=(START,)),
+        replace(PROBLEM, actions=(FIRST, replace(SECOND, cost=2.0))),
+        Problem("e", {}, PROBLEM.init, PROBLEM.goal, PROBLEM.actions),
+    ]
+    solve(CachingPlanner(counting), PROBLEM, *others)
+    assert counting.asked == 1 + len(others)
+
+
+def test_a_proof_is_remembered_and_running_out_of_time_is_not():
+    for outcome, asked in [(ProvenUnsolvable("fake", "no"), 1), (TimedOut("fake", 5), 2)]:
+        counting = Counting(outcome)
+        solve(CachingPlanner(counting), PROBLEM, PROBLEM)
+        assert counting.asked == asked
+
+
+def test_what_was_not_asked_for_longest_is_forgotten():
+    counting = Counting(FOUND)
+    one, two, three = (replace(PROBLEM, domain=name) for name in "abc")
+    solve(CachingPlanner(counting, largest=2), one, two, one, three, one)
+    assert counting.asked == 3
+    solve(CachingPlanner(counting, largest=2), one, two, three, one)
+    assert counting.asked == 7
+
+
+def test_the_best_that_was_found_is_remembered():
+    async def run():
+        caching = CachingPlanner(Counting(FOUND, replace(FOUND, cost=1)))
+        costs = [found.cost async for found in caching.plans(PROBLEM, 5)]
+        again = [found.cost async for found in caching.plans(PROBLEM, 5)]
+        return costs, again
+
+    assert asyncio.run(run()) == ([2, 1], [1])

@@ -1,0 +1,151 @@
+"""Every engine of the registry for real; those that are not installed are skipped with what they lack."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from fake_engines import PROBLEM, descendants, gone, lights_out
+
+from knowledge_base.facts import Fact
+from knowledge_base.language.parser import parse_condition
+from planning.domain import PlanningDomain
+from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, worker
+from planning.engines.registry import ENGINES
+from planning.plan import PlanStep
+from planning.problem import pose
+from planning.strips import GroundAction, Problem
+
+NAMES = [
+    pytest.param(one.name, marks=pytest.mark.skipif(bool(one.lacks()), reason=f"{one.name}: {one.lacks()}"))
+    for one in ENGINES
+]
+BY_NAME = {one.name: one for one in ENGINES}
+
+START, DEAR, CHEAP, GOAL = (Fact(name) for name in ("start", "dear", "cheap", "goal"))
+# Two steps at 1 each are cheaper than one at 5.
+PRICED = Problem(
+    "priced", {}, (START,), (GOAL,),
+    (
+        GroundAction(PlanStep("leap"), (START,), (GOAL,), (), 5.0),
+        GroundAction(PlanStep("walk"), (START,), (CHEAP,), (), 0.5),
+        GroundAction(PlanStep("arrive"), (CHEAP,), (GOAL,), (), 0.5),
+    ),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def process_of():
+    started = {}
+
+    def start(name, **options):
+        if name not in started:
+            started[name] = EngineProcess(worker(name))
+            started[name].start(60)
+        return started[name]
+
+    yield start
+    for process in started.values():
+        process.kill()
+
+
+def answers(process, problem, seconds=60.0):
+    heard = []
+    try:
+        process.ask(problem.to_json(), Deadline(seconds), heard.append)
+    except OutOfTimeError:  # an engine that goes on to look for better plans
+        assert heard
+    return heard
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_plans_and_the_plan_is_valid(process_of, name, clean_up, table):
+    problem = pose(clean_up, table(2), parse_condition("(forall (?i - item) (tidy ?i))"))
+    seconds = 1.0 if BY_NAME[name].anytime else 60.0
+    for answer in answers(process_of(name), problem, seconds):
+        plan = problem.plan(answer["actions"])
+        assert not isinstance(plan, str), plan
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_gives_the_same_plan_again(process_of, name):
+    one = BY_NAME[name]
+    first, second = (answers(process_of(name), PROBLEM, 0.5 if one.anytime else 60.0)[0] for _ in range(2))
+    assert first == second or not one.deterministic
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_knows_when_there_is_no_plan(process_of, name):
+    if not BY_NAME[name].proves:
+        pytest.skip(f"{name} goes on for ever when there is no plan")
+    away = GroundAction(PlanStep("away"), (START,), (CHEAP,), (START,))
+    need = GroundAction(PlanStep("need"), (START, CHEAP), (GOAL,), ())
+    problem = Problem("d", {}, (START,), (GOAL,), (away, need))
+    assert answers(process_of(name), problem) == [{"actions": None}]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_engine_that_minds_costs_ends_with_the_cheaper_plan(process_of, name):
+    one = BY_NAME[name]
+    if "costs" not in one.features or not (one.optimal or one.anytime):
+        pytest.skip(f"{name} promises no cheap plan")
+    last = answers(process_of(name), PRICED, 1.0 if one.anytime else 60.0)[-1]
+    assert PRICED.cost(last["actions"]) == 1.0
+
+
+COUNTING = """(define (domain count) (:functions (n)) (:predicates (done))
+  (:action more :parameters () :precondition (< (n) 5) :effect (increase (n) 1))
+  (:action stop :parameters () :precondition (>= (n) 3) :effect (done)))"""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_engine_that_can_count_does(process_of, name, world_of):
+    if "numeric" not in BY_NAME[name].features:
+        pytest.skip(f"{name} does not say that it can")
+    domain = PlanningDomain.parse(COUNTING)
+    problem = pose(domain, world_of(domain.schema, {}, values={Fact("n"): 0}), parse_condition("(done)"))
+    assert "numeric" in problem.features
+    plan = problem.plan(answers(process_of(name), problem)[0]["actions"])
+    assert [step.action for step in plan.steps] == ["more"] * 3 + ["stop"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_search_that_is_ended_leaves_nothing_behind(process_of, name):
+    process, family = process_of(name), set()
+    deadline = Deadline(60)
+
+    def watch():
+        """Note what the search has started, for a while; then end it."""
+        limit = Deadline(1.5)
+        while limit.left > 0:
+            family.update(descendants(process._pid))
+        deadline.shorten(0)
+        process.wake()
+
+    watching = threading.Thread(target=watch)
+    watching.start()
+    with pytest.raises(OutOfTimeError):
+        process.ask(lights_out(60).to_json(), deadline, print)
+    watching.join()
+    assert family
+    assert gone(family)
+    assert process.alive
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_kill_in_the_middle_of_a_search_leaves_nothing_behind(name):
+    process, family = EngineProcess(worker(name)), set()
+    process.start(60)
+
+    def watch():
+        limit = Deadline(1.5)
+        while limit.left > 0:
+            family.update(descendants(process._pid))
+        process.kill()
+
+    watching = threading.Thread(target=watch)
+    watching.start()
+    with pytest.raises(Exception, match=r"killed|Bad file|ended"):
+        process.ask(lights_out(60).to_json(), Deadline(60), print)
+    watching.join()
+    assert gone({*family, process._pid})
