@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given, settings
 from order_strategies import Planned, planned
 
-from knowledge_base.errors import InputError
-from knowledge_base.facts import Delta, fact
 from knowledge_base.language.evaluation import holds
-from knowledge_base.language.parser import parse_condition
 from knowledge_base.overlay import Overlay
-from planning.domain import PlanningDomain
-from planning.order import PartialOrder, causal_links, deordered, reduced, standing
+from planning.order import PartialOrder, deordered, standing
 from planning.plan import Plan, PlanStep
 from planning.validation import validate
 
