@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from knowledge_base.errors import SchemaMismatchError as SchemaMismatchError
     from knowledge_base.errors import StoreError as StoreError
     from knowledge_base.errors import UnknownNameError as UnknownNameError
+    from knowledge_base.errors import UnsupportedConstructError as UnsupportedConstructError
     from knowledge_base.facts import Change as Change
     from knowledge_base.facts import Delta as Delta
     from knowledge_base.facts import Fact as Fact
@@ -62,6 +63,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "StoreError": "errors",
         "Transaction": "transaction",
         "UnknownNameError": "errors",
+        "UnsupportedConstructError": "errors",
         "Value": "facts",
         "View": "view",
         "Watch": "conditions.watch",

@@ -116,6 +116,20 @@ class ParseError(InputError):
     """The text does not have the form of the language it claims to be in."""
 
 
+class UnsupportedConstructError(ParseError):
+    """A part of PDDL, or of a relative of it, that is known but that nothing here can plan with.
+
+    Attributes:
+        construct: its keyword, e.g. `:process`.
+        engines: the family of planning engines that could.
+    """
+
+    def __init__(self, construct: str, meaning: str, engines: str, *, place: Place | None) -> None:
+        super().__init__(f"'{construct}' ({meaning}) is not supported; what can do it: {engines}", place=place)
+        self.construct = construct
+        self.engines = engines
+
+
 class UnknownNameError(InputError):
     """A type, predicate, function, object, variable or plot that nobody declared."""
 

@@ -2,40 +2,83 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from knowledge_base.errors import InputError, Place, UnknownNameError
-from knowledge_base.exchange.domain_text import ActionText, parse_domain
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
+from knowledge_base.exchange.action_text import ActionText
+from knowledge_base.exchange.domain_text import AxiomText, parse_domain
 from knowledge_base.exchange.files import read_text
-from knowledge_base.language.check import check, check_effect, check_parameters
+from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
+from knowledge_base.language.effect import Add, Delete
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
-from knowledge_base.language.expression import And, Atom, Constant, Expression, Or, TypedVariable, substitute
+from knowledge_base.language.expression import (
+    And,
+    Atom,
+    Comparison,
+    Constant,
+    Expression,
+    Or,
+    TypedVariable,
+    Variable,
+    substitute,
+)
+from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.schema import ROOT_TYPE, Schema
+from planning.relevance import effect_leaves
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from knowledge_base.facts import Delta
     from knowledge_base.language.effect import Effect
     from planning.plan import PlanStep
 
+__all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain", "Timed"]
+
 
 @dataclass(frozen=True, slots=True)
 class PlanningAction:
-    """What the planner may do, in general; with arguments it becomes a `PlanStep`."""
+    """What the planner may do, in general; with arguments it becomes a `PlanStep`.
+
+    Attributes:
+        name, parameters: as declared.
+        precondition: what must hold before; of a durative action, what it needs when it is done alone.
+        effect: what has changed afterwards; of a durative action, when it was done alone.
+        place: where it is defined.
+        duration: how long it takes, in seconds; `None` for an action without duration.
+        timed: what a durative action needs and does at its start, all the time, and at its end.
+    """
 
     name: str
     parameters: tuple[TypedVariable, ...]
     precondition: Expression
     effect: Effect
     place: Place | None = field(default=None, compare=False, repr=False)
+    duration: Duration | None = None
+    timed: Timed | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Axiom:
+    """A derived predicate (PDDL 2.2): it holds of these parameters wherever the condition does.
+
+    Several axioms for one predicate are alternatives.
+    """
+
+    predicate: str
+    parameters: tuple[TypedVariable, ...]
+    condition: Expression
+    place: Place | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
 class PlanningDomain:
     """Planning actions over a schema.
+
+    `axioms` says what derived predicates follow from; `notes`, with their places, what deserves a look in the
+    files though it changes nothing.
 
     The verbs take a step and the world it would be taken in. They raise `UnknownNameError` for a step whose
     action the domain does not have, and `InputError` for a wrong number of arguments.
@@ -44,6 +87,8 @@ class PlanningDomain:
     name: str
     schema: Schema
     actions: Mapping[str, PlanningAction]
+    axioms: tuple[Axiom, ...] = ()
+    notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @classmethod
     def from_pddl(cls, path: str | Path) -> PlanningDomain:
@@ -63,7 +108,10 @@ class PlanningDomain:
         """
         read = parse_domain(text, source)
         schema = Schema.from_text(read)
-        return cls(read.name, schema, {a.name: _checked(a, schema) for a in read.actions})
+        actions = {a.name: _checked(a, schema) for a in read.actions}
+        axioms = tuple(_checked_axiom(a, schema) for a in read.axioms)
+        _refuse_changed(actions.values(), axioms)
+        return cls(read.name, schema, actions, axioms, read.notes)
 
     def applicable(self, step: PlanStep, world: World) -> bool:
         """Whether the arguments are of the parameters' types and the precondition holds."""
@@ -118,6 +166,39 @@ def _checked(action: ActionText, schema: Schema) -> PlanningAction:
             schema.require_type(one, parameter.place)  # a parameter is a thing: a plan names it
     variables = check_parameters(action.parameters, schema)
     # A name that is no constant is a mistake here: the problem's objects are not known to the domain.
-    check(action.precondition, schema, variables, objects=schema.constants)
-    check_effect(action.effect, schema, variables, objects=schema.constants)
-    return PlanningAction(action.name, action.parameters, action.precondition, action.effect, action.place)
+    timed = action.timed or Timed(start=action.precondition, end_effect=action.effect)
+    for condition in (timed.start, timed.over_all, timed.end):
+        check(condition, schema, variables, objects=schema.constants)
+    for effect in (timed.start_effect, timed.end_effect):
+        check_effect(effect, schema, variables, objects=schema.constants)
+    if action.duration is not None:
+        bounds = Comparison("<=", action.duration.least, action.duration.most)
+        check(bounds, schema, variables, objects=schema.constants)
+    return PlanningAction(
+        action.name, action.parameters, action.precondition, action.effect, action.place, action.duration, action.timed
+    )
+
+
+def _checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
+    head = axiom.head
+    signature = schema.predicate(head.name, head.place)
+    check_arity(signature, len(head.parameters), head.place)
+    declared = zip(head.parameters, signature.parameters, strict=True)
+    parameters = tuple(own if own.types else replace(own, types=theirs.types) for own, theirs in declared)
+    variables = check_parameters(parameters, schema)
+    check(Atom(head.name, tuple(Variable(p.name) for p in parameters), place=head.place), schema, variables)
+    check(axiom.condition, schema, variables, objects=schema.constants)
+    return Axiom(head.name, parameters, axiom.condition, head.place)
+
+
+def _refuse_changed(actions: Iterable[PlanningAction], axioms: tuple[Axiom, ...]) -> None:
+    """A derived predicate follows from others; no action may say otherwise."""
+    derived = {axiom.predicate: axiom for axiom in axioms}
+    for action in actions:
+        for leaf in effect_leaves(action.effect):
+            if isinstance(leaf, Add | Delete) and leaf.atom.predicate in derived:
+                name = leaf.atom.predicate
+                raise SchemaError(
+                    f"the action '{action.name}' changes '{name}', which is derived (at {derived[name].place})",
+                    place=leaf.atom.place,
+                )

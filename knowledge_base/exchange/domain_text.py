@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
-from knowledge_base.errors import ParseError, Place, SchemaError
+from knowledge_base.errors import ParseError, Place
+from knowledge_base.exchange.action_text import ACTION, DURATIVE_ACTION, ActionText, read_actions
+from knowledge_base.exchange.beyond import OBJECT_FLUENTS, refuse_forms, refused
 from knowledge_base.exchange.files import text_and_source
-from knowledge_base.exchange.sections import Definition, read_definition, word
-from knowledge_base.language.effect import NO_EFFECT, Effect
-from knowledge_base.language.expression import TRUE, Expression, TypedVariable
-from knowledge_base.language.parser import parse_condition, parse_effect, parse_variables
+from knowledge_base.exchange.sections import read_definition, word
+from knowledge_base.language.expression import Expression, TypedVariable
+from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.sexpr import Group, Node, Word
 from knowledge_base.language.typed_list import TypedName, parse_names, typed_variables
 
-_SECTIONS = {
-    ":requirements": None,
-    ":types": None,
-    ":constants": None,
-    ":predicates": None,
-    ":functions": None,
-    ":action": None,
-    ":durative-action": "actions have no duration here",
-    ":derived": "declare a predicate and say when it changes",
-    ":constraints": "conditions on whole plans are not judged",
-}
-_ACTION_PARTS = (":parameters", ":precondition", ":effect")
+_SECTIONS = (
+    ":requirements",
+    ":types",
+    ":constants",
+    ":predicates",
+    ":functions",
+    ACTION,
+    DURATIVE_ACTION,
+    ":derived",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,19 +38,19 @@ class DeclarationText:
 
 
 @dataclass(frozen=True, slots=True)
-class ActionText:
-    """A planning action as written; what is left out is `()`, true, or no effect."""
+class AxiomText:
+    """One `:derived` section: `head` holds wherever the condition does (PDDL 2.2)."""
 
-    name: str
-    parameters: tuple[TypedVariable, ...]
-    precondition: Expression
-    effect: Effect
-    place: Place = field(compare=False)
+    head: DeclarationText
+    condition: Expression
 
 
 @dataclass(frozen=True, slots=True)
 class DomainText:
-    """All of a domain file, in the order of the file; names are in lower case."""
+    """All of a domain file, in the order of the file; names are in lower case.
+
+    `notes` says with its place what deserves a look though it changes nothing.
+    """
 
     name: str
     requirements: tuple[str, ...]
@@ -60,6 +59,8 @@ class DomainText:
     predicates: tuple[DeclarationText, ...]
     functions: tuple[DeclarationText, ...]
     actions: tuple[ActionText, ...]
+    axioms: tuple[AxiomText, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def read_domain(text_or_path: str | Path, source: str | None = None) -> DomainText:
@@ -71,7 +72,8 @@ def read_domain(text_or_path: str | Path, source: str | None = None) -> DomainTe
 
     Raises:
         InputError: the file cannot be read.
-        ParseError: the form is wrong, or a part of PDDL is used that is not supported.
+        ParseError: the form is wrong.
+        UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
         SchemaError: two actions have one name.
     """
     return parse_domain(*text_and_source(text_or_path, source))
@@ -81,7 +83,8 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
     """Read a PDDL domain from its text; `source` names it in messages.
 
     Raises:
-        ParseError: the form is wrong, or a part of PDDL is used that is not supported.
+        ParseError: the form is wrong.
+        UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
         SchemaError: two actions have one name.
     """
     definition = read_definition(text, source, "domain", _SECTIONS)
@@ -92,7 +95,9 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
         constants=tuple(parse_names(definition.nodes(":constants"))),
         predicates=tuple(_declarations(definition.nodes(":predicates"))),
         functions=tuple(_declarations(definition.nodes(":functions"), result="number")),
-        actions=_actions(definition),
+        actions=read_actions(definition.sections),
+        axioms=tuple(_axiom(group) for keyword, group in definition.sections if keyword == ":derived"),
+        notes=tuple(definition.notes()),
     )
 
 
@@ -127,53 +132,12 @@ def _after_result_type(nodes: Sequence[Node], position: int, result: str | None)
         raise ParseError("'-' without a type after it", place=here.place)
     kind = word(nodes[position + 1], "a type")
     if kind.folded() != result:
-        raise ParseError("only functions to numbers are supported", place=kind.place, found=kind.text, valid=(result,))
+        raise refused(OBJECT_FLUENTS, f"- {kind.text}", kind.place)
     return position + 2
 
 
-def _actions(definition: Definition) -> tuple[ActionText, ...]:
-    actions: dict[str, ActionText] = {}
-    for keyword, group in definition.sections:
-        if keyword != ":action":
-            continue
-        action = _action(group)
-        if action.name in actions:
-            first = actions[action.name].place
-            raise SchemaError(
-                f"the action '{action.name}' is defined a second time; first at {first}", place=action.place
-            )
-        actions[action.name] = action
-    return tuple(actions.values())
-
-
-def _action(group: Group) -> ActionText:
-    if len(group.items) < 2:
-        raise ParseError("an action has a name: (:action NAME ...)", place=group.place)
-    name = word(group.items[1], "the action's name")
-    if name.text.startswith(":"):
-        raise ParseError("an action has a name: (:action NAME ...)", place=name.place)
-    parts = _action_parts(group.items[2:], name)
-    return ActionText(
-        name=name.folded(),
-        parameters=parse_variables(parts[":parameters"]) if ":parameters" in parts else (),
-        precondition=parse_condition(parts[":precondition"]) if ":precondition" in parts else TRUE,
-        effect=parse_effect(parts[":effect"]) if ":effect" in parts else NO_EFFECT,
-        place=name.place,
-    )
-
-
-def _action_parts(nodes: Sequence[Node], name: Word) -> dict[str, Node]:
-    parts: dict[str, Node] = {}
-    for position in range(0, len(nodes), 2):
-        key = word(nodes[position], f"a keyword of the action '{name.text}'")
-        keyword = key.folded()
-        if keyword not in _ACTION_PARTS:
-            raise ParseError(
-                f"an action has no part '{key.text}'", place=key.place, found=key.text, valid=_ACTION_PARTS
-            )
-        if keyword in parts:
-            raise ParseError(f"a second '{keyword}' of the action '{name.text}'", place=key.place)
-        if position + 1 == len(nodes):
-            raise ParseError(f"'{keyword}' is followed by nothing", place=key.place)
-        parts[keyword] = nodes[position + 1]
-    return parts
+def _axiom(group: Group) -> AxiomText:
+    if len(group.items) != 3 or not isinstance(group.items[1], Group):
+        raise ParseError("a derived predicate is written (:derived (NAME ?x - TYPE) CONDITION)", place=group.place)
+    refuse_forms(group.items[2])
+    return AxiomText(_declaration(group.items[1]), parse_condition(group.items[2]))

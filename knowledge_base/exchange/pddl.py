@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from knowledge_base.exchange.domain_text import ActionText, DomainText, parse_domain, read_domain
-from knowledge_base.exchange.problem_text import ProblemText, read_problem
+from knowledge_base.exchange.action_text import ActionText
+from knowledge_base.exchange.domain_text import DomainText, parse_domain, read_domain
+from knowledge_base.exchange.problem_text import Metric, ProblemText, read_problem
 
-__all__ = ["ActionText", "DomainText", "ProblemText", "parse_domain", "read_domain", "read_problem"]
+__all__ = ["ActionText", "DomainText", "Metric", "ProblemText", "parse_domain", "read_domain", "read_problem"]

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeGuard
+from typing import Literal, TypeGuard
 
 from knowledge_base.errors import ParseError, SchemaError, UnknownNameError
+from knowledge_base.exchange.beyond import TIMED_INITIAL, refuse_forms, refused
 from knowledge_base.exchange.files import text_and_source
 from knowledge_base.exchange.sections import Definition, read_definition, word
 from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.check import check
 from knowledge_base.language.expression import (
     TRUE,
+    Arithmetic,
     Atom,
     Call,
     Comparison,
@@ -21,22 +23,26 @@ from knowledge_base.language.expression import (
     Expression,
     Not,
     Term,
+    is_number,
 )
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.sexpr import Node
+from knowledge_base.language.parser import parse_condition, parse_term
+from knowledge_base.language.sexpr import Group, Node, Word
 from knowledge_base.language.typed_list import TypedName, parse_names
-from knowledge_base.schema import ROOT_TYPE, Schema
+from knowledge_base.schema import ROOT_TYPE, Schema, Signature
 
-_SECTIONS = {
-    ":domain": None,
-    ":requirements": None,
-    ":objects": None,
-    ":init": None,
-    ":goal": None,
-    ":metric": None,
-    ":constraints": "conditions on whole plans are not judged",
-    ":length": "it is not part of PDDL any more",
-}
+_SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
+TOTAL_TIME = Call("total-time")
+"""In a metric: how long the whole plan takes. No domain declares it."""
+_TOTAL_TIME_DECLARED = Schema(functions={TOTAL_TIME.function: Signature(TOTAL_TIME.function)})
+_DIRECTIONS = ("minimize", "maximize")
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """What makes a plan better than another: the value of `term` at its end; `TOTAL_TIME` may occur in it."""
+
+    direction: Literal["minimize", "maximize"]
+    term: Term
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +57,8 @@ class ProblemText:
         values: numeric fluents' values at first.
         goal: the condition wanted; true when the file has none.
         has_goal: whether the file says what is wanted.
+        metric: what the best plan is, if the file says so.
+        notes: what deserves a look though it changes nothing, each with its place.
     """
 
     name: str
@@ -60,6 +68,8 @@ class ProblemText:
     values: Mapping[Fact, float]
     goal: Expression
     has_goal: bool
+    metric: Metric | None = None
+    notes: tuple[str, ...] = ()
 
     def delta(self) -> Delta:
         """The change from an empty world to the problem's first state."""
@@ -71,7 +81,7 @@ def read_problem(
 ) -> ProblemText:
     """Read a PDDL problem: a `Path` or a file's name, or the text itself.
 
-    `:metric` and negative facts in `:init` are accepted and say nothing new.
+    Negative facts in `:init` are accepted and say nothing new; so is `:length`, which no planner heeds.
 
     Args:
         text_or_path: a file, or text that begins with `(` or a comment.
@@ -81,13 +91,13 @@ def read_problem(
 
     Raises:
         InputError: the file cannot be read, or is for another domain.
-        ParseError: the form is wrong, or a part of PDDL is used that is not supported.
+        ParseError: the form is wrong.
+        UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
         UnknownNameError: an undeclared type, predicate, function or object.
         SchemaError: a wrong number of arguments, a wrong type, an object declared in two ways.
     """
     text, source = text_and_source(text_or_path, source)
     definition = read_definition(text, source, "problem", _SECTIONS)
-    definition.requirements()
     named = _domain(definition, domain)
     objects = _objects(parse_names(definition.nodes(":objects")), schema)
     init = _Init(schema, {**schema.constants, **objects})
@@ -101,6 +111,8 @@ def read_problem(
         values=init.values,
         goal=_goal(definition, schema, init.objects),
         has_goal=bool(definition.nodes(":goal")),
+        metric=_metric(definition, schema, init.objects),
+        notes=tuple(definition.notes()),
     )
 
 
@@ -137,9 +149,39 @@ def _goal(definition: Definition, schema: Schema, objects: Mapping[str, str]) ->
         return TRUE
     if len(nodes) > 1:
         raise ParseError("a problem has one goal; join several with (and ...)", place=nodes[1].place)
+    refuse_forms(nodes[0])
     goal = parse_condition(nodes[0])
     check(goal, schema, objects=objects)
     return goal
+
+
+def _metric(definition: Definition, schema: Schema, objects: Mapping[str, str]) -> Metric | None:
+    nodes = definition.nodes(":metric")
+    if not nodes:
+        return None
+    direction = word(nodes[0], "'minimize' or 'maximize'")
+    if direction.folded() not in _DIRECTIONS:
+        raise ParseError(
+            f"a metric begins with 'minimize' or 'maximize', not '{direction.text}'",
+            place=direction.place, found=direction.text, valid=_DIRECTIONS,
+        )  # fmt: skip
+    if len(nodes) != 2:
+        raise ParseError("a metric is written (:metric minimize NUMBER)", place=direction.place)
+    term = _with_total_time(parse_term(nodes[1]))
+    checked = schema if TOTAL_TIME.function in schema.functions else schema.merged(_TOTAL_TIME_DECLARED)
+    check(Comparison("<=", term, Constant(0), place=definition.place), checked, objects=objects)
+    return Metric("minimize" if direction.folded() == "minimize" else "maximize", term)
+
+
+def _with_total_time(term: Term) -> Term:
+    """The term, with `total-time` as a function also where it stands without parentheses."""
+    match term:
+        case Constant(TOTAL_TIME.function):
+            return replace(TOTAL_TIME, place=term.place)
+        case Arithmetic(_, args):
+            return replace(term, args=tuple(map(_with_total_time, args)))
+        case _:
+            return term
 
 
 class _Init:
@@ -152,6 +194,12 @@ class _Init:
         self.values: dict[Fact, float] = {}
 
     def read(self, node: Node) -> None:
+        if isinstance(node, Group) and node.head() == "and":
+            for part in node.items[1:]:
+                self.read(part)
+            return
+        _refuse_timed(node)
+        refuse_forms(node)
         e = parse_condition(node)
         check(e, self.schema, objects=self.objects)
         match e:
@@ -165,6 +213,15 @@ class _Init:
                 self.values[Fact(function, _values(args))] = value
             case _:
                 raise ParseError("':init' has facts and (= (FUNCTION ...) NUMBER)", place=e.place)
+
+
+def _refuse_timed(node: Node) -> None:
+    """`(at 5 (open door))`: no fact has a number first and a group second."""
+    if not isinstance(node, Group) or node.head() != "at" or len(node.items) != 3:
+        return
+    time, fact = node.items[1:]
+    if isinstance(time, Word) and is_number(time.text) and isinstance(fact, Group):
+        raise refused(TIMED_INITIAL, f"at {time.text}", node.place)
 
 
 def _is_number(value: object) -> TypeGuard[float]:

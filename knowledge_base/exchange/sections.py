@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
-from knowledge_base.errors import ParseError, Place
+from knowledge_base.errors import ParseError, Place, nearest, printable
+from knowledge_base.exchange.beyond import SECTIONS, refused
 from knowledge_base.language.sexpr import Group, Node, Word, read
 
 REQUIREMENTS = frozenset(
@@ -32,9 +33,13 @@ REQUIREMENTS = frozenset(
         ":constraints",
         ":action-costs",
         ":time",
+        ":hierarchy",
+        ":method-preconditions",
+        ":contingent",
+        ":multi-agent",
     }
 )
-"""What PDDL 1.2 to 3.1 can require; only what is really used is judged."""
+"""What PDDL 1.2 to 3.1 and its relatives can require; only what is really used is judged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,26 +67,31 @@ class Definition:
         return group.items[1:] if group else ()
 
     def requirements(self) -> tuple[str, ...]:
-        """The `:requirements` in lower case.
+        """The `:requirements` in lower case, known or not."""
+        return tuple(word(node, "a requirement").folded() for node in self.nodes(":requirements"))
 
-        Raises:
-            ParseError: one that PDDL does not know.
-        """
-        words = [_requirement(node) for node in self.nodes(":requirements")]
-        return tuple(words)
+    def notes(self) -> Iterator[str]:
+        """What deserves a look though it changes nothing: requirements that nobody knows, each with its place."""
+        for node in self.nodes(":requirements"):
+            found = word(node, "a requirement")
+            if found.folded() not in REQUIREMENTS:
+                meant = nearest(found.text, REQUIREMENTS)
+                hint = f"; did you mean '{meant}'?" if meant else ""
+                yield f"{found.place}: PDDL has no requirement '{printable(found.text)}'{hint}"
 
 
-def read_definition(text: str, source: str | None, kind: str, known: Mapping[str, str | None]) -> Definition:
+def read_definition(text: str, source: str | None, kind: str, known: Collection[str]) -> Definition:
     """Read a whole file of one definition.
 
     Args:
         text: the file's text.
         source: its name for messages.
         kind: `domain` or `problem`.
-        known: the sections it may have; those with a reason are known but not supported.
+        known: the sections it may have.
 
     Raises:
-        ParseError: it is no such definition, or a section is unknown or not supported.
+        ParseError: it is no such definition, or a section is unknown.
+        UnsupportedConstructError: a section is one of those that nothing here can plan with.
     """
     define = _define(read(text, source), source)
     if len(define.items) < 2 or not isinstance(define.items[1], Group):
@@ -129,21 +139,12 @@ def _name(group: Group, kind: str) -> tuple[str, Place]:
     return name.folded(), name.place
 
 
-def _section(node: Node, kind: str, known: Mapping[str, str | None]) -> tuple[str, Group]:
+def _section(node: Node, kind: str, known: Collection[str]) -> tuple[str, Group]:
     head = node.head() if isinstance(node, Group) else None
     if not isinstance(node, Group) or head is None:
         raise ParseError(f"a section of the {kind} is expected: (:keyword ...)", place=node.place)
+    if head in SECTIONS:
+        raise refused(SECTIONS[head], head, node.place)
     if head not in known:
         raise ParseError(f"a {kind} has no section '{head}'", place=node.items[0].place, found=head, valid=known)
-    if known[head] is not None:
-        raise ParseError(f"'{head}' is not supported: {known[head]}", place=node.place)
     return head, node
-
-
-def _requirement(node: Node) -> str:
-    found = word(node, "a requirement")
-    if found.folded() not in REQUIREMENTS:
-        raise ParseError(
-            f"PDDL has no requirement '{found.text}'", place=found.place, found=found.text, valid=REQUIREMENTS
-        )
-    return found.folded()

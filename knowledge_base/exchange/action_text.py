@@ -1,0 +1,111 @@
+"""The `:action` and `:durative-action` sections of a domain file as read, names not resolved yet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from knowledge_base.errors import ParseError, Place, SchemaError
+from knowledge_base.exchange.beyond import ACTION_PARTS, refuse_forms, refused
+from knowledge_base.exchange.durative_text import read_duration, read_timed
+from knowledge_base.exchange.sections import word
+from knowledge_base.language.effect import NO_EFFECT, Effect
+from knowledge_base.language.expression import TRUE, Expression, TypedVariable
+from knowledge_base.language.parser import parse_condition, parse_effect, parse_variables
+from knowledge_base.language.sexpr import Group, Node, Word
+from knowledge_base.language.timed import Duration, Timed
+
+ACTION, DURATIVE_ACTION = ":action", ":durative-action"
+_PARTS = {
+    ACTION: (":parameters", ":precondition", ":effect"),
+    DURATIVE_ACTION: (":parameters", ":duration", ":condition", ":effect"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ActionText:
+    """A planning action as written; what is left out is `()`, true, or no effect.
+
+    A durative action has a `duration` and what is `timed` about it; its precondition and effect are what these
+    amount to when nothing else happens meanwhile (see `Timed`).
+    """
+
+    name: str
+    parameters: tuple[TypedVariable, ...]
+    precondition: Expression
+    effect: Effect
+    place: Place = field(compare=False)
+    duration: Duration | None = None
+    timed: Timed | None = None
+
+
+def read_actions(sections: Iterable[tuple[str, Group]]) -> tuple[ActionText, ...]:
+    """The actions among a domain's sections, in order.
+
+    Raises:
+        ParseError: the form of one is wrong.
+        UnsupportedConstructError: one uses a construct that nothing here can plan with.
+        SchemaError: two actions have one name.
+    """
+    actions: dict[str, ActionText] = {}
+    for keyword, group in sections:
+        if keyword not in _PARTS:
+            continue
+        action = _action(keyword, group)
+        if action.name in actions:
+            first = actions[action.name].place
+            raise SchemaError(
+                f"the action '{action.name}' is defined a second time; first at {first}", place=action.place
+            )
+        actions[action.name] = action
+    return tuple(actions.values())
+
+
+def _action(keyword: str, group: Group) -> ActionText:
+    if len(group.items) < 2:
+        raise ParseError(f"an action has a name: ({keyword} NAME ...)", place=group.place)
+    name = word(group.items[1], "the action's name")
+    if name.text.startswith(":"):
+        raise ParseError(f"an action has a name: ({keyword} NAME ...)", place=name.place)
+    parts = _action_parts(keyword, group.items[2:], name)
+    parameters = parse_variables(parts[":parameters"]) if ":parameters" in parts else ()
+    return (_durative if keyword == DURATIVE_ACTION else _instantaneous)(name, parameters, parts)
+
+
+def _instantaneous(name: Word, parameters: tuple[TypedVariable, ...], parts: dict[str, Node]) -> ActionText:
+    return ActionText(
+        name=name.folded(),
+        parameters=parameters,
+        precondition=parse_condition(parts[":precondition"]) if ":precondition" in parts else TRUE,
+        effect=parse_effect(parts[":effect"]) if ":effect" in parts else NO_EFFECT,
+        place=name.place,
+    )
+
+
+def _durative(name: Word, parameters: tuple[TypedVariable, ...], parts: dict[str, Node]) -> ActionText:
+    if ":duration" not in parts:
+        raise ParseError(f"how long does '{name.text}' take? ':duration (= ?duration SECONDS)'", place=name.place)
+    duration = read_duration(parts[":duration"])
+    timed = read_timed(parts.get(":condition"), parts.get(":effect"), duration)
+    return ActionText(name.folded(), parameters, timed.precondition, timed.effect, name.place, duration, timed)
+
+
+def _action_parts(keyword: str, nodes: Sequence[Node], name: Word) -> dict[str, Node]:
+    parts: dict[str, Node] = {}
+    for position in range(0, len(nodes), 2):
+        key = word(nodes[position], f"a keyword of the action '{name.text}'")
+        part = key.folded()
+        if part in ACTION_PARTS:
+            raise refused(ACTION_PARTS[part], part, key.place)
+        if part not in _PARTS[keyword]:
+            what = "a durative action" if keyword == DURATIVE_ACTION else "an action"
+            raise ParseError(
+                f"{what} has no part '{key.text}'", place=key.place, found=key.text, valid=_PARTS[keyword]
+            )
+        if part in parts:
+            raise ParseError(f"a second '{part}' of the action '{name.text}'", place=key.place)
+        if position + 1 == len(nodes):
+            raise ParseError(f"'{part}' is followed by nothing", place=key.place)
+        refuse_forms(nodes[position + 1])
+        parts[part] = nodes[position + 1]
+    return parts
