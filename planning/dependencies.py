@@ -12,7 +12,7 @@ from itertools import chain
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Fact
-from knowledge_base.language.application import choices
+from knowledge_base.language.application import apply_effect, choices
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When, substitute_effect
 from knowledge_base.language.evaluation import World, evaluate_term, holds
 from knowledge_base.language.expression import (
@@ -31,6 +31,7 @@ from knowledge_base.language.expression import (
     parts_of,
     substitute,
 )
+from knowledge_base.overlay import Overlay
 from planning.conditions import Literal
 
 Ground = Literal | Fact
@@ -60,10 +61,15 @@ class Changes:
     reads: set[Fact] = field(default_factory=set)
 
 
-def changes(effect: Effect, world: World) -> Changes:
-    """What a ground effect does in `world`, which stays as it is."""
-    found = Changes()
-    _collect(effect, world, found)
+def changes(effects: Iterable[Effect], world: World) -> Changes:
+    """What ground effects do one after the other, beginning in `world`, which stays as it is.
+
+    An action has one effect, a durative one two: at its start and at its end.
+    """
+    found, ahead = Changes(), Overlay(world)
+    for effect in effects:
+        _collect(effect, ahead, found)
+        ahead.apply(apply_effect(effect, ahead))
     return found
 
 

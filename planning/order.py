@@ -16,12 +16,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.effect import substitute_effect
-from knowledge_base.language.evaluation import World
+from knowledge_base.language.evaluation import World, holds
 from knowledge_base.language.expression import Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
@@ -61,11 +61,13 @@ class PartialOrder:
         links: what is brought about, by whom and for whom.
         before: pairs of steps of which the first ends before the second begins; those that follow from others are
             left out (the transitive reduction).
+        begin_before: pairs of steps of which the first begins before the second does; they may overlap.
     """
 
     steps: tuple[PlanStep, ...]
     links: tuple[CausalLink, ...] = ()
     before: frozenset[tuple[int, int]] = frozenset()
+    begin_before: frozenset[tuple[int, int]] = frozenset()
 
     @cached_property
     def waits_for(self) -> Mapping[int, tuple[int, ...]]:
@@ -85,7 +87,22 @@ class PartialOrder:
 
     def restricted(self, pairs: Iterable[tuple[int, int]]) -> PartialOrder:
         """The same with more pairs of steps in order, the first of each also first in the plan."""
-        return PartialOrder(self.steps, self.links, reduced({*self.before, *pairs}))
+        return replace(self, before=reduced({*self.before, *pairs}))
+
+
+def in_sequence(plan: Plan) -> PartialOrder:
+    """All steps one after the other."""
+    return PartialOrder(plan.steps, before=frozenset((n, n + 1) for n in range(1, len(plan.steps))))
+
+
+def scheduled(plan: Plan) -> PartialOrder:
+    """The steps as the plan's schedule has them: what it has end before another begins, and the order of the starts."""
+    timed = list(enumerate(plan.schedule, start=1))
+    ends = {(i, j) for j, later in timed for i, earlier in timed[: j - 1] if earlier.end <= later.start}
+    order = PartialOrder(plan.steps, before=reduced(ends))
+    last = {j: max((one.start for one in plan.schedule if one.start < now.start), default=None) for j, now in timed}
+    begun = {(i, j) for j in last for i, one in timed if one.start == last[j] and i not in order.earlier[j]}
+    return replace(order, begin_before=frozenset(begun))
 
 
 def causal_links(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> tuple[CausalLink, ...]:
@@ -167,9 +184,12 @@ class _Tracing:
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
         """Step number `number` comes next."""
         action, bindings = domain.action(step), domain.bindings(step)
-        doing = changes(substitute_effect(action.effect, bindings), self.world)
+        timed = action.timed
+        effects = (action.effect,) if timed is None else (timed.start_effect, timed.end_effect)
+        doing = changes([substitute_effect(effect, bindings) for effect in effects], self.world)
         needed = conjuncts(substitute(action.precondition, bindings), self.world)
-        for condition in dict.fromkeys((*needed, *doing.conditions)):
+        asked = (one for one in doing.conditions if holds(one, self.world, {}))  # else its own start brings it about
+        for condition in dict.fromkeys((*needed, *asked)):
             self.need(number, condition, str(step))
         for fluent in doing.reads:
             self._rely(number, fluent)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from knowledge_base.errors import InputError
+
 
 @dataclass(frozen=True, slots=True)
 class PlanStep:
@@ -18,10 +20,34 @@ class PlanStep:
 
 
 @dataclass(frozen=True, slots=True)
+class Timing:
+    """When a step begins, in seconds from the beginning of the plan, and how long it takes."""
+
+    start: float
+    duration: float = 0.0
+
+    @property
+    def end(self) -> float:
+        """When it is over."""
+        return self.start + self.duration
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
-    """Steps to be taken in order; no steps when the goal already holds."""
+    """Steps to be taken in order; no steps when the goal already holds.
+
+    Attributes:
+        steps: the steps; with a schedule in the order of their starts.
+        schedule: when an engine that plans with durations has each of them begin; empty if nobody says.
+    """
 
     steps: tuple[PlanStep, ...] = ()
+    schedule: tuple[Timing, ...] = ()
+
+    def __post_init__(self) -> None:
+        starts = [timing.start for timing in self.schedule]
+        if starts and (len(starts) != len(self.steps) or starts != sorted(starts)):
+            raise InputError(f"a schedule has a time for each of the {len(self.steps)} steps, by start; found {starts}")
 
     def __str__(self) -> str:
         """One step a line, as planners write plans."""

@@ -21,6 +21,7 @@ from dsc.model.states import (
     AnyState,
     CompositeState,
     DynamicState,
+    FinalState,
     OrthogonalState,
     State,
     SubmachineState,
@@ -33,10 +34,11 @@ from knowledge_base.language.effect import substitute_effect
 DEFAULT_RETRIES = 3
 """Bound on `retry` and `replan` responses that name none, so that no rule can go on for ever."""
 
-REPLAN_STATE = "replan"
-"""Final state of a generated plot that sends it back to planning."""
-GAVE_UP_STATE = "gave_up"
-"""Final state of a generated plot that ends the attempt."""
+REPLAN = "replan"
+"""Outcome of a generated plot that sends it back to planning; `gave_up` ends the attempt.
+
+Wherever a step stands, there is a final state beside it that emits each of the two.
+"""
 
 
 def expand_rules(plot: ActionPlot, plots: Plots) -> ActionPlot:
@@ -59,9 +61,11 @@ class _Expansion:
     plots: Plots
     counters: dict[str, Variable] = field(default_factory=dict)
     names: set[str] = field(default_factory=set)
+    beside: dict[str, Mapping[str, AnyState]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.names = {name for name, _, _ in self.plot.walk()}
+        self.beside = {name: scope.states for scope in self.plot.scopes() for name in scope.states}
 
     def scope(self, states: Mapping[str, AnyState]) -> dict[str, AnyState]:
         """The states of one scope, each followed by the recoveries its rules need."""
@@ -92,14 +96,18 @@ class _Expansion:
                 if rule.on == event and (not rule.of or name in rule.of):
                     own += self._answer(rule, f"{name}_{event}_{number}", name, state, recoveries)
             if self.plot.generated:
-                own.append(self._replan(event))
+                own.append(self._replan(name, event))
             if own:
                 on[event] = tuple(own)
         return {name: state.model_copy(update={"on": on}), **recoveries}
 
-    def _replan(self, event: str) -> Transition:
-        reason = "no candidate fits" if event == NO_CANDIDATE else event
-        return Transition.model_validate({"to": REPLAN_STATE, "assign": {"reason": reason}})
+    def _replan(self, name: str, event: str) -> Transition:
+        return self._ending(name, REPLAN, "no candidate fits" if event == NO_CANDIDATE else event)
+
+    def _ending(self, name: str, outcome: str, reason: str) -> Transition:
+        """To the final state beside a step that ends the generated plot with the outcome."""
+        ends = (each for each, one in self.beside[name].items() if isinstance(one, FinalState) and one.emit == outcome)
+        return Transition.model_validate({"to": next(ends, outcome), "assign": {"reason": reason}})
 
     def _answer(
         self, rule: Rule, key: str, name: str, state: State, recoveries: dict[str, AnyState]
@@ -140,10 +148,10 @@ class _Expansion:
         if then == "continue":
             return self._wired(rule, name, state, DONE)
         if then == "replan" and self.plot.generated:
-            return [self._replan(rule.on)]
+            return [self._replan(name, rule.on)]
         if then == "give_up":
             if self.plot.generated:
-                return [Transition.model_validate({"to": GAVE_UP_STATE, "assign": {"reason": rule.on}})]
+                return [self._ending(name, GAVE_UP, rule.on)]
             return [_because(rule.on, one) for one in self._wired(rule, name, state, GAVE_UP)]
         return [Transition(target=name if then in {"retry", "replan"} else then)]
 

@@ -1,0 +1,90 @@
+"""What a plan step may take hold of while it is carried out: components, and time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from dsc.dynamic.library import Library
+from dsc.model.actions import Configure, Switch, Trigger, flat
+from dsc.model.plot import ActionPlot, Rule
+from dsc.model.states import DynamicState, State, SubmachineState
+from dsc.sequencer.dispatcher import DEFAULT_WITHIN
+from knowledge_base.facts import Value
+from knowledge_base.language.expression import And, Comparison, Constant, Expression, substitute
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What plots may use, in whatever way they run.
+
+    Attributes:
+        components: names of the components that they start, configure or switch.
+        anything: they may use others as well: they plan, or bind a plot that is a value.
+        seconds: the sum of the time limits of their skills.
+    """
+
+    components: frozenset[str] = frozenset()
+    anything: bool = False
+    seconds: float = 0.0
+
+    def clashes(self, other: Usage, shared: Iterable[str] = ()) -> bool:
+        """Whether both may need one component at once that is not among the `shared` ones."""
+        return self.anything or other.anything or bool((self.components & other.components).difference(shared))
+
+
+def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] = ()) -> Usage:
+    """What the plots may use, and the recoveries that the rules have for their outcomes.
+
+    Raises:
+        UnknownNameError: a plot uses one that is not there.
+    """
+    found: dict[str, ActionPlot] = {}
+    waiting, rules = list(plots), tuple(rules)
+    emitted = {event for plot in waiting for event in plot.emits}
+    waiting += [library.plot(rule.do.use) for rule in rules if rule.do.use and rule.on in emitted]
+    while waiting:
+        plot = waiting.pop()
+        if plot.name not in found:
+            found[plot.name] = plot
+            waiting += [library.plot(name) for name in sorted(plot.uses())]
+    actions = [action for plot in found.values() for action in _actions(plot)]
+    names = {_component(action) for action in actions}
+    limits = [action.within or DEFAULT_WITHIN for action in actions if isinstance(action, Trigger)]
+    return Usage(frozenset(names), any(map(_is_open, found.values())), sum(limits))
+
+
+def fitting(plots: Iterable[ActionPlot], bindings: Mapping[str, Value]) -> tuple[ActionPlot, ...]:
+    """The plots whose condition does not rule out these arguments, whatever the world is like; all if none does not."""
+    plots = tuple(plots)
+    return tuple(plot for plot in plots if plot.when is None or not _is_false(plot.when, bindings)) or plots
+
+
+def _is_false(e: Expression, bindings: Mapping[str, Value]) -> bool:
+    match substitute(e, bindings):
+        case And(parts):
+            return any(_is_false(part, {}) for part in parts)
+        case Comparison("=" | "!=" as operator, Constant(left), Constant(right)):
+            return (left == right) is not (operator == "=")
+        case _:
+            return False
+
+
+def _actions(plot: ActionPlot) -> Iterable[Trigger | Configure | Switch]:
+    blocks = [actions for _, state, _ in plot.walk() if isinstance(state, State) for _, actions in state.blocks()]
+    found = (action for block in blocks for action in flat(block))
+    return [action for action in found if isinstance(action, Trigger | Configure | Switch)]
+
+
+def _component(action: Trigger | Configure | Switch) -> str:
+    match action:
+        case Trigger(trigger=port) | Configure(set=port):
+            return port.partition(".")[0]
+        case Switch(switch=name):
+            return name
+
+
+def _is_open(plot: ActionPlot) -> bool:
+    states = [state for _, state, _ in plot.walk()]
+    planned = any(isinstance(state, DynamicState) and state.goal is not None for state in states)
+    return planned or any(isinstance(state, SubmachineState) and state.use.startswith("?") for state in states)
