@@ -111,9 +111,16 @@ def skill(
 
 
 class Component:
-    """Base of all components; `name` is how charts address it and may be chosen at deployment."""
+    """Base of all components.
+
+    Attributes:
+        name: how charts address it; may be chosen at deployment.
+        concurrent: whether it can carry out several skills at once. Steps of a plan that use one which cannot never
+            overlap; what plots start side by side is their own affair.
+    """
 
     name: str = ""
+    concurrent: bool = False
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()

@@ -40,6 +40,7 @@ class Executive:
         components: the skills.
         knowledge: the world model; an empty one of the domain's schema if left out.
         planner: finds plans; pyperplan in a process of its own if left out.
+        parallel: whether steps of a plan that need not wait for each other are carried out side by side.
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
@@ -53,6 +54,8 @@ class Executive:
         components: Iterable[Component],
         knowledge: KnowledgeBase | None = None,
         planner: Planner | None = None,
+        *,
+        parallel: bool = True,
     ) -> None:
         self.domain = domain if isinstance(domain, PlanningDomain) else PlanningDomain.from_pddl(domain)
         self.components = tuple(components)
@@ -65,6 +68,7 @@ class Executive:
         if planner is None:
             planner = self._own_planner = PlannerProcess()
         self._planner = planner
+        self._parallel = parallel
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
@@ -127,7 +131,8 @@ class Executive:
         sequencer = Sequencer(self.library, self.knowledge, components, clock, trace, open_ended=open_ended)
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner, clock, trace,
-            working_for=sequencer.working_for,
+            working_for=sequencer.working_for, parallel=self._parallel,
+            shared=[component.name for component in components if component.concurrent],
         )  # fmt: skip
         sequencer.dispatcher.deploy(planning)
         if prepare is not None:
