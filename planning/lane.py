@@ -95,7 +95,7 @@ class Writer:
             state["entry"] = {"set": f"planner.{self._plan}", "to": number}
         if step.over_all:
             state["always"] = [
-                self._replan(lane, f"{to_text(one)} no longer holds during {step.text}", [Not(one)])
+                self._replan(lane, f"lost during {step.text}: {to_text(one)}", [Not(one)])
                 for one in step.over_all
             ]
         if step.seconds is not None:

@@ -28,7 +28,7 @@ from planning.plan import PlanStep
 from planning.relevance import changed_predicates, predicates_of
 from planning.usage import Usage, fitting, usage
 
-PATIENCE = 2.0
+PATIENCE = 2
 """A step that takes so many times as long as its action says, or as its skills may take together, is broken off."""
 _CONFIRM = ActionPlot.model_fields["confirm"].default
 
