@@ -71,7 +71,7 @@ class Writer:
         """The states of one lane, without the one at its end."""
         first = lane.numbers[0] if lane.numbers else None
         states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
-        for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=True):
+        for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
             states[f"step_{number}"] = self._step(number, lane)
             states[f"after_{number}"] = self._after(number, following, lane)
             if following is not None and self._waits[following]:

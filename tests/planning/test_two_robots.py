@@ -29,6 +29,10 @@ def planner():
     planner.kill()
 
 
+def is_robot_of(author, step):
+    return author in step.args
+
+
 def run(two_tables, planner, items, seed, *, parallel=True):
     records = []
     robots = two_tables.team(items, parallel=parallel, seed=seed, planner=planner)
@@ -37,7 +41,7 @@ def run(two_tables, planner, items, seed, *, parallel=True):
     end = robots.achieve(two_tables.GOAL)
     assert end.finished
     assert robots.knowledge.ask(two_tables.GOAL)
-    replay = Replay(robots.domain, before, two_tables.GOAL)
+    replay = Replay(robots.domain, before, two_tables.GOAL, is_robot_of)
     for record in records:
         replay.take(record)
     return records, replay
@@ -47,7 +51,7 @@ def sizes(seed):
     return {robot: int(7 * uniform(seed, robot, "items")) or 1 for robot in ("anna", "bert")}
 
 
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", range(12))
 def test_no_causal_link_is_ever_violated(two_tables, planner, seed):
     records, replay = run(two_tables, planner, sizes(seed), seed)
     assert replay.problems == []
@@ -56,9 +60,9 @@ def test_no_causal_link_is_ever_violated(two_tables, planner, seed):
     assert [record.type for record in records].count("plan.found") == 1  # nothing had to be planned again
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_both_at_once_take_at_most_six_tenths_of_the_time(two_tables, planner, seed):
-    items = {"anna": 3 + seed, "bert": 3 + seed}
+    items = {"anna": 2 + seed, "bert": 2 + seed}
     apart, replay = run(two_tables, planner, items, seed, parallel=False)
     assert replay.overlapping() == []
     together, replay = run(two_tables, planner, items, seed)
@@ -69,7 +73,7 @@ def test_both_at_once_take_at_most_six_tenths_of_the_time(two_tables, planner, s
 def test_the_checker_finds_a_step_that_takes_away_what_another_one_needs(two_tables, planner):
     records, _ = run(two_tables, planner, {"anna": 2, "bert": 2}, 0)
     robots = two_tables.team({"anna": 2, "bert": 2})
-    replay = Replay(robots.domain, Overlay(robots.knowledge.snapshot()), two_tables.GOAL)
+    replay = Replay(robots.domain, Overlay(robots.knowledge.snapshot()), two_tables.GOAL, is_robot_of)
     for record in records:
         if record.type == "knowledge" and "(open bin)" in record.data["added"]:
             record.data["added"].remove("(open bin)")  # as if the lid had been seen to stay closed

@@ -7,6 +7,7 @@ that its successor `after_n` is left when the step's effects have been seen.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -18,7 +19,7 @@ from knowledge_base.overlay import Overlay
 from planning.order import causal_links, standing
 from planning.plan import Plan, PlanStep
 
-STATE = re.compile(r".*/(step|after)_(\d+)")
+STATE = re.compile(r"(?:.*/)?(step|after)_(\d+)")
 
 
 def parsed(text):
@@ -34,11 +35,13 @@ class Replay:
         domain: the planning domain.
         world: as it was when the run began.
         goal: what the plan is for.
+        works_for: whether the author of a change carries out a step.
     """
 
     domain: object
     world: Overlay
     goal: str
+    works_for: Callable[[str, PlanStep], bool]
     steps: dict[int, PlanStep] = field(default_factory=dict)
     began: dict[int, float] = field(default_factory=dict)
     ended: dict[int, float] = field(default_factory=dict)
@@ -77,14 +80,15 @@ class Replay:
     def _change(self, record):
         removed, added = ([_fact(text) for text in record.data[key]] for key in ("removed", "added"))
         for number in self.running:
-            if record.data["author"] in self.steps[number].args:
-                continue  # the robot that takes the step
+            if self.works_for(record.data["author"], self.steps[number]):
+                continue
             for condition in self._needs(number):
                 undone = added if isinstance(condition, Not) else removed
                 atom = condition.body if isinstance(condition, Not) else condition
                 if Fact(atom.predicate, tuple(arg.value for arg in atom.args)) in undone:
                     self.problems.append(f"{record.t:g}: {condition} undone during {self.steps[number]}")
-        self.world.apply(Delta(removed=tuple(removed), added=tuple(added)))
+        values = {_fact(text): value for text, value in record.data["values"].items()}
+        self.world.apply(Delta(removed=tuple(removed), added=tuple(added), values=values))
         self._look(record.t)
 
     def _look(self, t):
