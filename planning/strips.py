@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
 
+FEATURES = ("numeric", "costs", "durations", "derived")
+"""What a problem may need of an engine beyond STRIPS; everything else is compiled away when posing."""
+
+
 @dataclass(frozen=True, slots=True)
 class GroundAction:
     """One way to take one plan step.
@@ -27,12 +31,14 @@ class GroundAction:
         precondition: facts that must hold before.
         adds: facts that hold afterwards.
         deletes: facts that hold no longer, none of them in `adds`.
+        cost: what taking it once adds to the plan's cost; never negative, 1 if nobody says otherwise.
     """
 
     step: PlanStep | None
     precondition: tuple[Fact, ...]
     adds: tuple[Fact, ...]
     deletes: tuple[Fact, ...]
+    cost: float = 1.0
 
     def applicable(self, state: Collection[Fact]) -> bool:
         """Whether the precondition holds in `state`."""
@@ -70,6 +76,15 @@ class Problem:
     actions: tuple[GroundAction, ...]
     unreachable: tuple[str, ...] = ()
     whole: Problem | None = None
+
+    @property
+    def features(self) -> frozenset[str]:
+        """What an engine must be able to do beyond STRIPS: a subset of `FEATURES`.
+
+        `costs` is a wish rather than a need: an engine that cannot do them still gives a plan, not a cheap one.
+        """
+        costs = {action.cost for action in self.actions if action.step is not None}
+        return frozenset({"costs"} if len(costs) > 1 else ())
 
     @property
     def simulated_seconds(self) -> float:
@@ -115,6 +130,7 @@ class Problem:
                     refer(a.precondition),
                     refer(a.adds),
                     refer(a.deletes),
+                    a.cost,
                 ]
                 for a in self.actions
             ],
@@ -142,8 +158,9 @@ class Problem:
                     read(pre),
                     read(add),
                     read(gone),
+                    cost,
                 )
-                for step, pre, add, gone in data["actions"]
+                for step, pre, add, gone, cost in data["actions"]
             ),
             unreachable=tuple(data["unreachable"]),
             whole=None if data["whole"] is None else Problem.from_json(data["whole"]),
