@@ -1,7 +1,8 @@
 """Conditions after everything that cannot change was evaluated: what is left for a planner to decide.
 
 Quantifiers are expanded over the known objects; types, equality, numbers and predicates that no action
-changes are evaluated on the world (partial evaluation). What remains is in negation normal form.
+changes are evaluated on the world (partial evaluation). What remains is in negation normal form, its leaves
+literals and bounds on numbers that actions change.
 """
 
 from __future__ import annotations
@@ -10,12 +11,15 @@ import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.evaluation import World, evaluate_term, holds
 from knowledge_base.language.expression import (
     And,
+    Arithmetic,
     Atom,
+    Call,
     Comparison,
     Constant,
     Exists,
@@ -27,7 +31,11 @@ from knowledge_base.language.expression import (
     Term,
     TypedVariable,
     Variable,
+    parts_of,
 )
+from knowledge_base.language.printer import to_text
+from planning.errors import UnsupportedActionError
+from planning.quantities import OPPOSITE, Assignment, Bound, Quantity, combined
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -60,8 +68,9 @@ class Some:
     parts: tuple[Residual, ...]
 
 
-Residual = bool | Literal | Every | Some
-"""What is left of a condition: already decided, or a formula of literals."""
+Leaf = Literal | Bound
+Residual = bool | Leaf | Every | Some
+"""What is left of a condition: already decided, or a formula of literals and bounds."""
 
 
 def every(parts: Iterable[Residual]) -> Residual:
@@ -93,38 +102,46 @@ def negation(residual: Residual) -> Residual:
             return not residual
         case Literal():
             return residual.negated
+        case Bound("=", left, right):
+            return _apart(left, right)
+        case Bound(operator, left, right):
+            return Bound(OPPOSITE[operator], left, right)
         case Every(parts):
             return some(map(negation, parts))
         case Some(parts):
             return every(map(negation, parts))
 
 
-def alternatives(residual: Residual) -> Iterator[tuple[Literal, ...]]:
-    """The disjunctive normal form, one conjunction of literals after the other, contradictions left out.
+def _apart(left: Quantity, right: Quantity) -> Residual:
+    """`!=` as engines take it."""
+    return Some((Bound("<", left, right), Bound(">", left, right)))
+
+
+def alternatives(residual: Residual) -> Iterator[tuple[Leaf, ...]]:
+    """The disjunctive normal form, one conjunction of leaves after the other, contradictory literals left out.
 
     There may be exponentially many; take as many as you can bear.
     """
     match residual:
         case bool():
             yield from [()] if residual else []
-        case Literal():
+        case Literal() | Bound():
             yield (residual,)
         case Some(parts):
             yield from itertools.chain.from_iterable(map(alternatives, parts))
         case Every(parts):
             for choice in itertools.product(*(tuple(alternatives(part)) for part in parts)):
                 conjunction = dict.fromkeys(itertools.chain.from_iterable(choice))
-                if not any(literal.negated in conjunction for literal in conjunction):
+                if not any(isinstance(one, Literal) and one.negated in conjunction for one in conjunction):
                     yield tuple(conjunction)
 
 
 @dataclass(frozen=True, slots=True)
-class ConditionalFact:
-    """One ground effect: the fact is added or deleted if the condition held before."""
+class Change:
+    """One ground effect: a literal becomes true, or a number changes, if the condition held before."""
 
     condition: Residual
-    fact: Fact
-    added: bool
+    what: Literal | Assignment
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +150,7 @@ class Grounder:
 
     Attributes:
         world: the present.
-        changing: the predicates that the considered actions change.
+        changing: the predicates and functions that the considered actions change.
         keep_false: leave unchangeable facts that do not hold in the result, so that a goal which needs them
             can say which they are.
     """
@@ -142,37 +159,56 @@ class Grounder:
     changing: frozenset[str]
     keep_false: bool = False
 
+    def precondition(self, e: Expression, bindings: Mapping[str, Value]) -> Residual:
+        """As `residual`, but facts that must hold or not hold in any case are left in, also unchangeable ones.
+
+        What is left then does not depend on them, and can be used again when somebody else changed them.
+        """
+        match e:
+            case And(parts):
+                return every(self.precondition(part, bindings) for part in parts)
+            case Atom(name) if name in self.world.schema.predicates:
+                return Literal(self.fact(e, bindings))
+            case Not(Atom(name) as atom) if name in self.world.schema.predicates:
+                return Literal(self.fact(atom, bindings), positive=False)
+            case _:
+                return self.residual(e, bindings)
+
     def residual(self, e: Expression, bindings: Mapping[str, Value], *, wanted: bool = True) -> Residual:
-        """What is left of `e` (of its negation if not `wanted`) for the planner."""
+        """What is left of `e` (of its negation if not `wanted`) for the planner.
+
+        Raises:
+            UnsupportedActionError: a fact is about a number that actions change.
+        """
         match e:
             case Atom():
-                return self._atom(e, bindings, wanted=wanted)
+                found = self._atom(e, bindings, wanted=wanted)
             case Not(body):
-                return self.residual(body, bindings, wanted=not wanted)
+                found = self.residual(body, bindings, wanted=not wanted)
             case And(parts) | Or(parts):
                 join = every if isinstance(e, And) is wanted else some
-                return join(self.residual(part, bindings, wanted=wanted) for part in parts)
+                found = join(self.residual(part, bindings, wanted=wanted) for part in parts)
             case Imply(premise, conclusion):
-                return self.residual(Or((Not(premise), conclusion)), bindings, wanted=wanted)
+                found = self.residual(Or((Not(premise), conclusion)), bindings, wanted=wanted)
             case Exists(variables, body) | Forall(variables, body):
                 join = every if isinstance(e, Forall) is wanted else some
-                return join(
-                    self.residual(body, inner, wanted=wanted) for inner in self.choices(variables, bindings)
-                )
+                choices = self.choices(variables, bindings)
+                found = join(self.residual(body, inner, wanted=wanted) for inner in choices)
             case Comparison():
-                return holds(e, self.world, bindings) is wanted
+                found = self._comparison(e, bindings, wanted=wanted)
+        return found
 
     def effects(
         self,
         effect: Effect,
         bindings: Mapping[str, Value],
         condition: Residual = True,  # noqa: FBT002  a formula that is decided already
-    ) -> Iterator[ConditionalFact]:
-        """The ground effects on changing predicates; effects on numbers are left out."""
+    ) -> Iterator[Change]:
+        """The ground effects on changing predicates and functions."""
         match effect:
             case Add(atom) | Delete(atom):
                 if atom.predicate in self.changing:
-                    yield ConditionalFact(condition, self.fact(atom, bindings), added=isinstance(effect, Add))
+                    yield Change(condition, Literal(self.fact(atom, bindings), isinstance(effect, Add)))
             case AllOf(parts):
                 for part in parts:
                     yield from self.effects(part, bindings, condition)
@@ -184,7 +220,8 @@ class Grounder:
                 if both is not False:
                     yield from self.effects(body, bindings, both)
             case Assign():
-                return
+                if effect.call.function in self.changing:
+                    yield Change(condition, self._assignment(effect, bindings))
 
     def choices(
         self, variables: Iterable[TypedVariable], bindings: Mapping[str, Value]
@@ -199,9 +236,59 @@ class Grounder:
         types = variable.types or ("object",)
         return dict.fromkeys(name for one in types for name in self.world.objects(one))
 
-    def fact(self, atom: Atom, bindings: Mapping[str, Value]) -> Fact:
-        """The atom with values for its terms."""
-        return Fact(atom.predicate, tuple(self._value(term, bindings) for term in atom.args))
+    def fact(self, atom: Atom | Call, bindings: Mapping[str, Value]) -> Fact:
+        """The atom, or the numeric fluent, with values for its terms.
+
+        Raises:
+            UnsupportedActionError: one of them is a number that actions change.
+        """
+        name = atom.predicate if isinstance(atom, Atom) else atom.function
+        return Fact(name, tuple([self._value(term, bindings) for term in atom.args]))
+
+    def quantity(self, term: Term, bindings: Mapping[str, Value]) -> Quantity:
+        """What the term is worth, as far as that cannot change.
+
+        Raises:
+            InputError: it is no number, or divides by zero.
+        """
+        match term:
+            case Call(function) if function in self.changing:
+                return self.fact(term, bindings)
+            case Arithmetic(operator, args) if self.changes(term):
+                try:
+                    return combined(operator, tuple(self.quantity(arg, bindings) for arg in args))
+                except ArithmeticError as error:
+                    raise InputError(f"{to_text(term)} cannot be computed: {error}", place=term.place) from None
+            case _:
+                number = evaluate_term(term, self.world, bindings)
+                if isinstance(number, str):
+                    raise InputError(f"'{number}' is no number", place=term.place)
+                return number
+
+    def changes(self, e: Expression | Term) -> bool:
+        """Whether it asks for a number that actions change."""
+        return (isinstance(e, Call) and e.function in self.changing) or any(map(self.changes, parts_of(e)))
+
+    def _comparison(self, e: Comparison, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:
+        if not self.changes(e):
+            return holds(e, self.world, bindings) is wanted
+        left, right = self.quantity(e.left, bindings), self.quantity(e.right, bindings)
+        bound = _apart(left, right) if e.operator == "!=" else Bound(e.operator, left, right)
+        return bound if wanted else negation(bound)
+
+    def _assignment(self, effect: Assign, bindings: Mapping[str, Value]) -> Assignment:
+        fluent, amount = self.fact(effect.call, bindings), self.quantity(effect.value, bindings)
+        match effect.operator:
+            case "increase":
+                return Assignment(fluent, amount, increase=True)
+            case "decrease":
+                return Assignment(fluent, combined("-", (amount,)), increase=True)
+            case "scale-up":
+                return Assignment(fluent, combined("*", (fluent, amount)), increase=False)
+            case "scale-down":
+                return Assignment(fluent, combined("/", (fluent, amount)), increase=False)
+            case _:
+                return Assignment(fluent, amount, increase=False)
 
     def _value(self, term: Term, bindings: Mapping[str, Value]) -> Value:
         match term:
@@ -209,6 +296,11 @@ class Grounder:
                 return bindings[name]
             case Constant(value):
                 return value
+            case _ if self.changes(term):
+                raise UnsupportedActionError(
+                    f"a fact about a number that actions change cannot be planned with: {to_text(term)}",
+                    place=term.place,
+                )
             case _:
                 return evaluate_term(term, self.world, bindings)
 

@@ -13,9 +13,12 @@ from knowledge_base.language.expression import And, Expression, TypedVariable, s
 from knowledge_base.language.printer import to_text
 from planning.conditions import Every, Grounder, Literal, Residual, Some
 from planning.grounding import Reached, Rule
+from planning.numbering import as_fact
 from planning.plan import PlanStep
-from planning.problem import as_fact, check_goal, grounded
-from planning.relevance import effect_leaves, reachable
+from planning.problem import Poser, check_goal
+from planning.quantities import Bound
+from planning.reduction import Task, reachable
+from planning.relevance import effect_leaves
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -35,16 +38,46 @@ def why_unsolvable(domain: PlanningDomain, world: World, goal: Expression) -> tu
         InputError: as for `planning.problem.pose`.
     """
     check_goal(goal, world)
-    problem = grounded(domain, world, goal)
-    if problem.wanted is False:
+    posing = Poser(domain).posing(world, goal)
+    if posing.task is None:
         return (f"{explain(goal, world).deciding} and no planning action changes that",)
-    rules = tuple(Rule.of(case, problem.grounder) for action in problem.actions for case in _cases(action))
-    possible, _ = reachable(problem.init, problem.ways)
-    known = dict.fromkeys([*_present(rules, world), *sorted(possible, key=str)])
-    causes = _Causes(domain, rules, problem.grounder, frozenset(known), Reached(known))
-    return tuple(dict.fromkeys(causes.of(problem.wanted))) or (
+    grounder = Grounder(world, posing.relevant.changing)
+    rules = tuple(Rule.of(case, grounder) for action in posing.relevant.actions for case in _cases(action))
+    reach = _Reach.of(posing.task, world)
+    known = dict.fromkeys([*_present(rules, world), *sorted(reach.facts, key=str)])
+    causes = _Causes(domain, rules, grounder, reach, frozenset(known), Reached(known))
+    return tuple(dict.fromkeys(causes.of(posing.wanted))) or (
         "each goal fact can be reached by itself, but not all of them together",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Reach:
+    """What can hold if nothing ever became false.
+
+    Attributes:
+        facts: in positive normal form.
+        fluents: the numbers that can change.
+        world: the present.
+    """
+
+    facts: frozenset[Fact]
+    fluents: frozenset[Fact]
+    world: World
+
+    @staticmethod
+    def of(task: Task, world: World) -> _Reach:
+        reached, _ = reachable(task)
+        numbering = task.numbering
+        named = [one for one in reached if isinstance(numbering.named(one), Fact)]
+        fluents = frozenset(numbering.fact(one) for one in named if one in numbering.fluents)
+        return _Reach(frozenset(map(numbering.fact, named)) - fluents, fluents, world)
+
+    def allows(self, bound: Bound) -> bool:
+        """Whether the bound holds, or one of its numbers can change."""
+        asked = set(bound.fluents())
+        present = {one: self.world.value(one.predicate, one.args) for one in asked}
+        return bound.holds(present) or not self.fluents.isdisjoint(asked)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +96,7 @@ class _Causes:
     domain: PlanningDomain
     rules: tuple[Rule, ...]
     grounder: Grounder
+    reach: _Reach
     reached: frozenset[Fact]
     index: Reached
 
@@ -72,6 +106,9 @@ class _Causes:
             case Literal():
                 if as_fact(wanted) not in self.reached:
                     yield self.chain(wanted.fact) if wanted.positive else _stays(wanted.fact)
+            case Bound():
+                if not self.reach.allows(wanted):
+                    yield f"{wanted} does not hold, and no planning action that can be taken changes that"
             case Every(parts):
                 for part in parts:
                     yield from self.of(part)
@@ -134,10 +171,15 @@ class _Causes:
         step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in parameters))
         needed = [self.grounder.fact(atom, bindings) for atom in rule.atoms]
         others = _parts(rule.action.precondition)
-        unmet = [c for c in others if c not in rule.atoms and self.grounder.residual(c, bindings) is False]
+        unmet = [c for c in others if c not in rule.atoms and self.hopeless(c, bindings)]
         missing = tuple(fact for fact in needed if fact not in self.reached)
         fixed = len(unmet) + sum(fact.predicate not in self.grounder.changing for fact in missing)
         return _Nearest(step, missing, tuple(to_text(substitute(c, bindings)) for c in unmet), fixed)
+
+    def hopeless(self, condition: Expression, bindings: dict[str, Value]) -> bool:
+        """Whether the condition is false and nothing that may happen changes that."""
+        left = self.grounder.residual(condition, bindings)
+        return left is False or (isinstance(left, Bound) and not self.reach.allows(left))
 
 
 def _cases(action: PlanningAction) -> Iterator[PlanningAction]:

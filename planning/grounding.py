@@ -1,26 +1,22 @@
-"""From planning actions with parameters to the ground actions that can ever be taken.
-
-Relaxed reachability by a worklist (semi-naive, as in Helmert 2009, *Concise finite-domain
-representations*): a fact that was newly reached is joined with those reached before, so that only argument
-tuples are met whose positive preconditions can all become true.
-"""
+"""From a planning action with parameters to ground ones: its ways with given arguments, its arguments as a join."""
 
 from __future__ import annotations
 
 import itertools
-from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.expression import And, Atom, Constant, Expression, Variable
-from planning.conditions import ConditionalFact, Grounder, Literal, Residual, alternatives, every, negation
+from planning.conditions import Grounder, Leaf, Literal, Residual, alternatives, every, negation
 from planning.errors import UnsupportedActionError
 from planning.plan import PlanStep
+from planning.quantities import Assignment, combined, fluents
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from knowledge_base.schema import Schema
     from planning.domain import PlanningAction
 
 _MOST_CONDITIONS = 6  # of one ground action; each doubles the number of ways to take it
@@ -29,29 +25,31 @@ _MOST_ALTERNATIVES = 64
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One way to take a step: a conjunction of literals and unconditional effects."""
+    """One way to take a step: a conjunction and unconditional effects.
+
+    Attributes:
+        step: the step; `None` for bookkeeping that no plan shows.
+        condition: literals and bounds that must hold before.
+        effects: literals that become true; none contradicts another.
+        assignments: how numbers change, one for each fluent.
+    """
 
     step: PlanStep | None
-    condition: tuple[Literal, ...]
-    adds: tuple[Fact, ...]
-    deletes: tuple[Fact, ...] = ()
-
-
-def ground(actions: Sequence[PlanningAction], grounder: Grounder) -> list[Variant]:
-    """Every way to take every step that is reachable when deletions and negative conditions are ignored.
-
-    Raises:
-        UnsupportedActionError: an action has too many conditional effects or alternatives.
-    """
-    return list(_Reachability(actions, grounder).variants())
+    condition: tuple[Leaf, ...]
+    effects: tuple[Literal, ...]
+    assignments: tuple[Assignment, ...] = ()
 
 
 def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Grounder) -> Iterator[Variant]:
-    """The ways to take one step: one for each alternative of its precondition and conditional effects."""
-    precondition = grounder.residual(action.precondition, bindings)
+    """The ways to take one step: one for each alternative of its precondition and conditional effects.
+
+    Raises:
+        UnsupportedActionError: there are too many, or a number changes in two ways at once.
+    """
+    precondition = grounder.precondition(action.precondition, bindings)
     if precondition is False:
         return
-    step = PlanStep(action.name, tuple(str(bindings[p.name]) for p in action.parameters))
+    step = PlanStep(action.name, tuple([str(bindings[p.name]) for p in action.parameters]))
     effects = list(grounder.effects(action.effect, bindings))
     conditions = list(dict.fromkeys(e.condition for e in effects if e.condition is not True))
     if len(conditions) > _MOST_CONDITIONS:
@@ -63,11 +61,12 @@ def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Gr
     for taken in itertools.product((True, False), repeat=len(conditions)):
         chosen = [c if yes else negation(c) for c, yes in zip(conditions, taken, strict=True)]
         happening = {True, *(c for c, yes in zip(conditions, taken, strict=True) if yes)}
+        changes = [e.what for e in effects if e.condition in happening]
         for condition in _bounded(every([precondition, *chosen]), action):
-            yield _variant(step, condition, [e for e in effects if e.condition in happening])
+            yield Variant(step, condition, _literals(changes), _assignments(changes, action))
 
 
-def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Literal, ...]]:
+def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ...]]:
     found = list(itertools.islice(alternatives(condition), _MOST_ALTERNATIVES + 1))
     if len(found) > _MOST_ALTERNATIVES:
         raise UnsupportedActionError(
@@ -78,13 +77,29 @@ def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Literal,
     return found
 
 
-def _variant(step: PlanStep, condition: tuple[Literal, ...], effects: Iterable[ConditionalFact]) -> Variant:
-    adds: dict[Fact, None] = {}
-    deletes: dict[Fact, None] = {}
-    for effect in effects:
-        (adds if effect.added else deletes)[effect.fact] = None
-    kept = tuple(d for d in deletes if d not in adds)  # PDDL: a fact both deleted and added is true
-    return Variant(step, condition, tuple(adds), kept)
+def _literals(changes: Iterable[Literal | Assignment]) -> tuple[Literal, ...]:
+    literals = dict.fromkeys(c for c in changes if isinstance(c, Literal))
+    # PDDL: a fact both deleted and added is true
+    return tuple([one for one in literals if one.positive or one.negated not in literals])
+
+
+def _assignments(changes: Iterable[Literal | Assignment], action: PlanningAction) -> tuple[Assignment, ...]:
+    found: dict[Fact, Assignment] = {}
+    for change in changes:
+        if isinstance(change, Assignment):
+            first = found.get(change.fluent)
+            found[change.fluent] = change if first is None else _both(first, change, action)
+    return tuple(found.values())
+
+
+def _both(first: Assignment, second: Assignment, action: PlanningAction) -> Assignment:
+    if first.increase and second.increase:
+        return Assignment(first.fluent, combined("+", (first.amount, second.amount)), increase=True)
+    if first == second and first.fluent not in fluents(first.amount):
+        return first
+    raise UnsupportedActionError(
+        f"planning action '{action.name}' changes {first.fluent} in two ways at once", place=action.place
+    )
 
 
 class Reached:
@@ -132,12 +147,7 @@ class Rule:
     @staticmethod
     def of(action: PlanningAction, grounder: Grounder) -> Rule:
         """The rule for an action."""
-        predicates = grounder.world.schema.predicates
-        atoms = tuple(
-            atom
-            for atom in _conjuncts(action.precondition)
-            if atom.predicate in predicates and all(isinstance(t, Variable | Constant) for t in atom.args)
-        )
+        atoms = joined_atoms(action, grounder.world.schema)
         return Rule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters})
 
     def unify(self, atom: Atom, fact: Fact, bindings: Mapping[str, Value]) -> dict[str, Value] | None:
@@ -170,51 +180,13 @@ class Rule:
                 yield from self.join(reached, atoms[:best] + atoms[best + 1 :], extended)
 
 
-class _Reachability:
-    def __init__(self, actions: Sequence[PlanningAction], grounder: Grounder) -> None:
-        self._grounder = grounder
-        self._reached = Reached()
-        self._queue: deque[Fact] = deque()
-        self._met: set[Fact] = set()
-        self._done: set[PlanStep] = set()
-        self._rules = [Rule.of(action, grounder) for action in actions]
-        self._triggers: dict[str, list[tuple[Rule, int]]] = {}
-        for rule in self._rules:
-            for position, atom in enumerate(rule.atoms):
-                self._triggers.setdefault(atom.predicate, []).append((rule, position))
-
-    def variants(self) -> Iterator[Variant]:
-        for predicate in self._triggers:
-            arity = len(self._grounder.world.schema.predicates[predicate].parameters)
-            for args in self._grounder.world.match(predicate, (None,) * arity):
-                self._meet(Fact(predicate, args))
-        for rule in self._rules:
-            if not rule.atoms:
-                yield from self._take(rule, {})
-        while self._queue:
-            fact = self._queue.popleft()
-            self._reached.add(fact)
-            for rule, position in self._triggers.get(fact.predicate, ()):
-                start = rule.unify(rule.atoms[position], fact, {})
-                rest = rule.atoms[:position] + rule.atoms[position + 1 :]
-                for bindings in rule.join(self._reached, rest, start) if start is not None else ():
-                    yield from self._take(rule, bindings)
-
-    def _meet(self, fact: Fact) -> None:
-        if fact not in self._met:
-            self._met.add(fact)
-            self._queue.append(fact)
-
-    def _take(self, rule: Rule, bindings: dict[str, Value]) -> Iterator[Variant]:
-        open_parameters = [p for p in rule.action.parameters if p.name not in bindings]
-        for full in self._grounder.choices(open_parameters, bindings):
-            step = PlanStep(rule.action.name, tuple(str(full[p.name]) for p in rule.action.parameters))
-            if step not in self._done:
-                self._done.add(step)
-                for variant in variants(rule.action, full, self._grounder):
-                    for fact in variant.adds:
-                        self._meet(fact)
-                    yield variant
+def joined_atoms(action: PlanningAction, schema: Schema) -> tuple[Atom, ...]:
+    """The positive conjuncts of an action's precondition that facts can be joined with."""
+    return tuple(
+        atom
+        for atom in _conjuncts(action.precondition)
+        if atom.predicate in schema.predicates and all(isinstance(t, Variable | Constant) for t in atom.args)
+    )
 
 
 def _conjuncts(e: Expression) -> Iterator[Atom]:

@@ -1,235 +1,244 @@
 """Posing a problem: the slice of the world and of the domain that matters for a goal, ready for an engine.
 
-The steps of it: choose the relevant actions; ground them along what is reachable; evaluate what cannot
-change; make negative conditions positive; turn a disjunctive goal into bookkeeping actions after the last
-real one; leave out what cannot matter; leave out objects that others can stand in for.
+The steps of it: choose the relevant actions; ground them along what is reachable, evaluating what cannot
+change; turn a disjunctive goal into bookkeeping actions after the last real one; leave out what cannot matter;
+leave out objects that others can stand in for; make negative conditions positive.
 """
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.check import check
-from knowledge_base.language.effect import Assign
 from knowledge_base.language.evaluation import holds
-from knowledge_base.language.expression import Call, Comparison, Expression, Term, parts_of
+from knowledge_base.language.expression import Expression, Term
 from knowledge_base.language.printer import to_text
-from knowledge_base.schema import ROOT_TYPE
-from planning.conditions import Every, Grounder, Literal, Residual, Some
+from planning.conditions import Every, Grounder, Leaf, Literal, Residual, Some
+from planning.costs import ignored, metric_of
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
-from planning.grounding import Variant, ground
-from planning.interchange import spared, without
-from planning.relevance import (
-    changed_predicates,
-    effect_conditions,
-    effect_leaves,
-    pruned,
-    reachable,
-    relevant_actions,
-)
+from planning.grounding import Variant
+from planning.groundwork import Groundwork, Way, numbered, things_of
+from planning.interchange import spared
+from planning.quantities import Bound, fluents
+from planning.reduction import Task, pruned, reachable
+from planning.relevance import Relevant, relevant
 from planning.strips import GroundAction, Problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from knowledge_base.language.evaluation import World
-    from planning.domain import PlanningAction, PlanningDomain
+    from planning.domain import PlanningDomain
+    from planning.numbering import Numbering
 
 # Names with blanks, which no declared name can clash with.
-_ACTING, _FINISHED = Fact("still acting"), Fact("finished acting")
-_NOT, _ONE_OF = "not ", "one of"
+_ACTING, _FINISHED = Literal(Fact("still acting")), Literal(Fact("finished acting"))
+_ONE_OF = "one of"
+_MOST_KEPT = 8  # goals of different kinds, each with its ground actions
 
 
-@dataclass(frozen=True, slots=True)
-class Grounded:
-    """A problem before anything that cannot contribute is left out.
-
-    Attributes:
-        actions: the planning actions that may matter.
-        grounder: evaluates conditions as far as these actions do not change them.
-        wanted: what is left of the goal; `False` if it can never hold.
-        init: facts that hold now, in positive normal form.
-        goal: facts that shall hold.
-        ways: the ground actions.
-    """
-
-    actions: tuple[PlanningAction, ...]
-    grounder: Grounder
-    wanted: Residual
-    init: tuple[Fact, ...] = ()
-    goal: tuple[Fact, ...] = ()
-    ways: tuple[GroundAction, ...] = ()
-
-
-def pose(domain: PlanningDomain, world: World, goal: Expression) -> Problem:
+def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Term | None = None) -> Problem:
     """The problem of reaching `goal` from `world`, which stays as it is.
+
+    Args:
+        domain: the planning actions.
+        world: the present.
+        goal: what shall hold.
+        metric: what the plan shall have as little of as possible; `(total-cost)` if the domain declares that.
 
     Raises:
         InputError: the goal has a free variable, or names something that is not declared or not known.
-        UnsupportedGoalError: the goal asks about a number that actions change.
+        UnsupportedGoalError: the goal states a fact about a number that actions change.
         UnsupportedActionError: so does an action that matters, or it has too many alternatives.
     """
-    check_goal(goal, world)
-    if holds(goal, world):
-        return Problem(domain.name, {}, (), (), ())
-    whole = grounded(domain, world, goal)
-    if whole.wanted is False:
-        return Problem(domain.name, {}, (), (), (), unreachable=(to_text(goal),))
-    reached, possible = reachable(whole.init, whole.ways)
-    missing = dict.fromkeys(_said(fact, goal) for fact in whole.goal if fact not in reached)
-    if missing:
-        return Problem(domain.name, {}, (), (), (), unreachable=tuple(missing))
-    parts = pruned(whole.init, whole.goal, possible)
-    return _sliced(_problem(domain.name, world, *parts), world)
-
-
-def _said(missing: Fact, goal: Expression) -> str:
-    """A goal fact as its reader knows it."""
-    if missing.predicate.startswith(_NOT):
-        return f"(not {Fact(missing.predicate.removeprefix(_NOT), missing.args)})"
-    return to_text(goal) if missing.predicate == _ONE_OF else str(missing)
+    return Poser(domain).pose(world, goal, metric)
 
 
 def check_goal(goal: Expression, world: World) -> None:
     """Raise an `InputError` unless the goal says something about the things of this world."""
-    known = {name: world.type_of(name) or ROOT_TYPE for name in world.objects(ROOT_TYPE)}
-    check(goal, world.schema, objects=known)
+    check(goal, world.schema, objects=things_of(world))
 
 
-def grounded(domain: PlanningDomain, world: World, goal: Expression) -> Grounded:
-    """The problem of reaching a checked goal, with everything evaluated that cannot change.
+@dataclass(frozen=True, slots=True)
+class Posing:
+    """A problem before anything that cannot contribute is left out.
 
-    Raises:
-        UnsupportedGoalError, UnsupportedActionError: as for `pose`.
+    Attributes:
+        relevant: what of the domain matters.
+        grounder: evaluates conditions as far as the relevant actions do not change them.
+        wanted: what is left of the goal; `False` if it can never hold.
+        task: the ground problem; `None` if it can never hold.
     """
-    actions = relevant_actions(goal, domain.actions.values())
-    _refuse_numbers(goal, actions, domain)
-    changing = frozenset(p for action in actions for p in changed_predicates(action.effect))
-    grounder = Grounder(world, changing)
-    wanted = replace(grounder, keep_false=True).residual(goal, {})
-    if wanted is False:
-        return Grounded(actions, grounder, wanted)
-    ways, literals = _with_conjunctive_goal(ground(actions, grounder), wanted)
-    facts, ground_actions = _positive(ways, literals, world)
-    return Grounded(actions, grounder, wanted, facts, tuple(map(as_fact, literals)), ground_actions)
+
+    relevant: Relevant
+    grounder: Grounder
+    wanted: Residual
+    task: Task | None
 
 
-def _sliced(whole: Problem, world: World) -> Problem:
-    left_out = spared(whole.init, whole.goal, whole.actions, whole.objects)
-    if not left_out:
-        return whole
-    possible = without(whole.actions, left_out)
-    reached, _ = reachable(whole.init, possible)
-    if not reached.issuperset(whole.goal):
-        return whole
-    slice_ = _problem(whole.domain, world, *pruned(whole.init, whole.goal, possible))
-    return replace(slice_, whole=whole)
+class Poser:
+    """Poses one problem after the other for a domain, and keeps what the next one needs again.
+
+    The problem is the same as that of a new poser, only sooner. May be used by several threads.
+    """
+
+    def __init__(self, domain: PlanningDomain) -> None:
+        self._domain = domain
+        self._kept: dict[tuple[tuple[str, ...], frozenset[str], Term | None], Groundwork] = {}
+        self._lock = threading.Lock()
+
+    def pose(self, world: World, goal: Expression, metric: Term | None = None) -> Problem:
+        """See `planning.problem.pose`."""
+        check_goal(goal, world)
+        if holds(goal, world):
+            return self._nothing()
+        metric = metric_of(metric, world.schema)
+        with self._lock:
+            posing = self.posing(world, goal, metric)
+            if posing.task is None:
+                return self._nothing(to_text(goal))
+            reached, possible = reachable(posing.task)
+            missing = [said(posing.task.numbering, one, goal) for one in posing.task.goal if one not in reached]
+            if missing:
+                return self._nothing(*dict.fromkeys(missing))
+            possible, notes = _priced(possible, metric)
+            return self._sliced(pruned(posing.task, possible), world, notes)
+
+    def posing(self, world: World, goal: Expression, metric: Term | None = None) -> Posing:
+        """The problem of reaching a checked goal, with everything evaluated that cannot change.
+
+        Raises:
+            UnsupportedGoalError, UnsupportedActionError: as for `pose`.
+        """
+        matters = relevant(goal, metric, self._domain.actions.values())
+        grounder = Grounder(world, matters.changing, keep_false=True)
+        try:
+            wanted = grounder.residual(goal, {})
+        except UnsupportedActionError as error:
+            raise UnsupportedGoalError(error.message, place=error.place) from None
+        if wanted is False:
+            return Posing(matters, grounder, wanted, None)
+        numbering, ways = self._groundwork(matters, metric, world)
+        ways, goal_numbers = _with_conjunctive_goal(ways, wanted, numbering)
+        init = (numbering.present(world) - {numbering.of(_ACTING.negated)}) | {numbering.of(_ACTING)}
+        task = Task(numbering, init, goal_numbers, ways)
+        return Posing(matters, grounder, wanted, task)
+
+    def _groundwork(self, matters: Relevant, metric: Term | None, world: World) -> tuple[Numbering, Sequence[Way]]:
+        """The ground actions that may matter, those of an earlier problem if they serve."""
+        key = (tuple(action.name for action in matters.actions), matters.changing, metric)
+        known = self._kept.pop(key, None)  # taken out, so that an error on the way leaves nothing half done
+        if known is None or not known.serves(world):
+            known = Groundwork(matters, metric, world)
+        ways = known.ways(world)
+        while len(self._kept) >= _MOST_KEPT:
+            del self._kept[next(iter(self._kept))]
+        self._kept[key] = known
+        return known.numbering, ways
+
+    def _sliced(self, task: Task, world: World, notes: tuple[str, ...]) -> Problem:
+        whole = self._problem(task, world, notes)
+        left = spared(task)
+        if len(left) == len(task.ways):
+            return whole
+        slice_ = replace(task, ways=left)
+        reached, possible = reachable(slice_)
+        if not reached.issuperset(task.goal):
+            return whole
+        return replace(self._problem(pruned(slice_, possible), world, notes), whole=whole)
+
+    def _problem(self, task: Task, world: World, notes: tuple[str, ...]) -> Problem:
+        init, _ = _split(task.numbering, task.init)
+        goal, bounds = _split(task.numbering, task.goal)
+        actions = tuple(_ground_action(way, task.numbering) for way in task.ways)
+        mentioned = dict.fromkeys(arg for action in actions if action.step for arg in action.step.args)
+        mentioned.update(dict.fromkeys(str(value) for fact in (*init, *goal) for value in fact.args))
+        types = {one: world.type_of(one) for one in mentioned}
+        objects = {one: kind for one, kind in types.items() if kind is not None}
+        numbers = {one: world.value(one.predicate, one.args) for one in _fluents(actions, bounds)}
+        return Problem(self._domain.name, objects, init, goal, actions, (), None, numbers, bounds, notes)
+
+    def _nothing(self, *unreachable: str) -> Problem:
+        """A problem that needs no engine: the goal holds, or cannot be reached."""
+        return Problem(self._domain.name, {}, (), (), (), unreachable)
 
 
-def _problem(
-    name: str,
-    world: World,
-    init: tuple[Fact, ...],
-    goal: tuple[Fact, ...],
-    actions: tuple[GroundAction, ...],
-) -> Problem:
-    mentioned = dict.fromkeys(v for a in actions for v in (a.step.args if a.step else ()))
-    mentioned.update(dict.fromkeys(str(v) for fact in (*init, *goal) for v in fact.args))
-    types = {one: world.type_of(one) for one in mentioned}
-    return Problem(name, {one: kind for one, kind in types.items() if kind is not None}, init, goal, actions)
+def _priced(possible: list[Way], metric: Term | None) -> tuple[list[Way], tuple[str, ...]]:
+    """The ways with their costs, or all with the same cost and a note why."""
+    if all(way.cost is not None for way in possible):
+        return possible, ()
+    return [replace(way, cost=1.0) for way in possible], () if metric is None else (ignored(metric),)
 
 
-def _with_conjunctive_goal(ways: list[Variant], goal: Residual) -> tuple[list[Variant], tuple[Literal, ...]]:
-    """The goal as literals; a disjunction in it becomes a fact that bookkeeping actions can add.
+def _split(numbering: Numbering, numbers: Iterable[int]) -> tuple[tuple[Fact, ...], tuple[Bound, ...]]:
+    """Facts in positive normal form, and bounds."""
+    facts: list[Fact] = []
+    bounds: list[Bound] = []
+    for number in numbers:
+        one = numbering.named(number)
+        if isinstance(one, Bound):
+            bounds.append(one)
+        else:
+            facts.append(numbering.fact(number))
+    return tuple(facts), tuple(bounds)
+
+
+def _ground_action(way: Way, numbering: Numbering) -> GroundAction:
+    needs, bounds = _split(numbering, way.needs)
+    adds = tuple([numbering.fact(one) for one in way.adds if one not in numbering.fluents])
+    deletes = tuple(map(numbering.fact, way.deletes))
+    return GroundAction(way.step, needs, adds, deletes, 0.0 if way.cost is None else way.cost, bounds, way.assignments)
+
+
+def _fluents(actions: Iterable[GroundAction], goal: Iterable[Bound]) -> dict[Fact, None]:
+    """All numeric fluents that matter."""
+    found = dict.fromkeys(fluent for bound in goal for fluent in bound.fluents())
+    for action in actions:
+        found.update((fluent, None) for bound in action.bounds for fluent in bound.fluents())
+        for one in action.assignments:
+            found.update(dict.fromkeys((one.fluent, *fluents(one.amount))))
+    return found
+
+
+def _with_conjunctive_goal(
+    ways: Sequence[Way], goal: Residual, numbering: Numbering
+) -> tuple[Sequence[Way], tuple[int, ...]]:
+    """The goal as literals and bounds; a disjunction in it becomes a fact that bookkeeping actions can add.
 
     They can be taken only after the last real action: a disjunct that held once might be undone later.
     """
     bookkeeping: list[Variant] = []
-    literals = _conjunction(goal, bookkeeping)
+    wanted = tuple(map(numbering.of, _conjunction(goal, bookkeeping)))
     if not bookkeeping:
-        return ways, literals
-    acting, finished = Literal(_ACTING), Literal(_FINISHED)
-    real = [Variant(w.step, (*w.condition, acting), w.adds, w.deletes) for w in ways]
-    finish = Variant(None, (acting,), (_FINISHED,), (_ACTING,))
-    closing = [Variant(None, (*w.condition, finished), w.adds) for w in bookkeeping]
-    return [*real, finish, *closing], literals
+        return ways, wanted
+    finish = Variant(None, (_ACTING,), (_ACTING.negated, _FINISHED))
+    closing = [Variant(None, (*way.condition, _FINISHED), way.effects) for way in bookkeeping]
+    acting = numbering.of(_ACTING)
+    real = [replace(way, needs=(*way.needs, acting)) for way in ways]
+    return [*real, *(numbered(variant, numbering, 0.0) for variant in (finish, *closing))], wanted
 
 
-def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Literal, ...]:
+def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Leaf, ...]:
     match goal:
-        case Literal():
+        case Literal() | Bound():
             return (goal,)
         case Every(parts):
-            return tuple(literal for part in parts for literal in _conjunction(part, bookkeeping))
+            return tuple(leaf for part in parts for leaf in _conjunction(part, bookkeeping))
         case Some(parts):
             choices = [_conjunction(part, bookkeeping) for part in parts]
-            chosen = Fact(_ONE_OF, (len(bookkeeping),))
+            chosen = Literal(Fact(_ONE_OF, (len(bookkeeping),)))
             bookkeeping.extend(Variant(None, choice, (chosen,)) for choice in choices)
-            return (Literal(chosen),)
+            return (chosen,)
         case _:
             return ()
 
 
-def _positive(
-    ways: Iterable[Variant], goal: Iterable[Literal], world: World
-) -> tuple[tuple[Fact, ...], tuple[GroundAction, ...]]:
-    """Initial facts and actions in positive normal form."""
-    ways = list(ways)
-    asked = dict.fromkeys([*goal, *(literal for way in ways for literal in way.condition)])
-    opposite = {literal.fact: as_fact(literal) for literal in asked if not literal.positive}
-    facts = tuple(as_fact(literal) for literal in asked if _holds(literal, world))
-    return facts, tuple(_ground_action(way, opposite) for way in ways)
-
-
-def _ground_action(way: Variant, opposite: dict[Fact, Fact]) -> GroundAction:
-    return GroundAction(
-        way.step,
-        tuple(map(as_fact, way.condition)),
-        (*way.adds, *(opposite[f] for f in way.deletes if f in opposite)),
-        (*way.deletes, *(opposite[f] for f in way.adds if f in opposite)),
-    )
-
-
-def as_fact(literal: Literal) -> Fact:
-    """The literal in positive normal form."""
-    return literal.fact if literal.positive else Fact(_NOT + literal.fact.predicate, literal.fact.args)
-
-
-def _holds(literal: Literal, world: World) -> bool:
-    fact = literal.fact
-    if fact.predicate not in world.schema.predicates:
-        return fact == _ACTING
-    return world.holds(fact.predicate, fact.args) is literal.positive
-
-
-def _refuse_numbers(goal: Expression, actions: Sequence[PlanningAction], domain: PlanningDomain) -> None:
-    """Conditions on numbers that actions change are out of reach of the engines."""
-    leaves = [leaf for a in domain.actions.values() for leaf in effect_leaves(a.effect)]
-    changed = {leaf.call.function for leaf in leaves if isinstance(leaf, Assign)}
-    for comparison in _comparisons(goal):
-        if _functions(comparison) & changed:
-            raise UnsupportedGoalError(
-                f"the goal compares a number that planning actions change: {to_text(comparison)}",
-                place=comparison.place,
-            )
-    for action in actions:
-        for condition in (action.precondition, *effect_conditions(action.effect)):
-            for comparison in _comparisons(condition):
-                if _functions(comparison) & changed:
-                    raise UnsupportedActionError(
-                        f"planning action '{action.name}' compares a number that planning actions change:"
-                        f" {to_text(comparison)}",
-                        place=comparison.place,
-                    )
-
-
-def _comparisons(e: Expression | Term) -> list[Comparison]:
-    own = [e] if isinstance(e, Comparison) else []
-    return own + [found for part in parts_of(e) for found in _comparisons(part)]
-
-
-def _functions(e: Expression | Term) -> set[str]:
-    own = {e.function} if isinstance(e, Call) else set()
-    return own.union(*(_functions(part) for part in parts_of(e)))
+def said(numbering: Numbering, missing: int, goal: Expression) -> str:
+    """A part of the goal as its reader knows it."""
+    what = numbering.named(missing)
+    if isinstance(what, Fact) and what.predicate == _ONE_OF:
+        return to_text(goal)
+    return f"(not {what})" if missing & 1 else str(what)

@@ -1,16 +1,18 @@
-"""A planning problem as a value: ground STRIPS (typed PDDL after grounding), the form every engine takes.
+"""A planning problem as a value: ground STRIPS with numbers (PDDL 2.1 after grounding), the form every engine takes.
 
-Everything is positive: where a condition needs `(not (p a))`, the fact `(not-p a)` is carried along instead
+Facts are positive: where a condition needs `(not (p a))`, the fact `(not-p a)` is carried along instead
 (positive normal form); its predicate is written `not p`, with a blank, so that no declared name can clash.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from knowledge_base.facts import Fact
 from planning.plan import Plan, PlanStep
+from planning.quantities import Assignment, Bound, Numbers, from_json, to_json
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 
 FEATURES = ("numeric", "costs", "durations", "derived")
 """What a problem may need of an engine beyond STRIPS; everything else is compiled away when posing."""
+
+_NONE: Numbers = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +36,8 @@ class GroundAction:
         adds: facts that hold afterwards.
         deletes: facts that hold no longer, none of them in `adds`.
         cost: what taking it once adds to the plan's cost; never negative, 1 if nobody says otherwise.
+        bounds: what must hold of numbers before.
+        assignments: how numbers change, one for each fluent, all computed from the numbers before.
     """
 
     step: PlanStep | None
@@ -39,14 +45,31 @@ class GroundAction:
     adds: tuple[Fact, ...]
     deletes: tuple[Fact, ...]
     cost: float = 1.0
+    bounds: tuple[Bound, ...] = ()
+    assignments: tuple[Assignment, ...] = ()
 
-    def applicable(self, state: Collection[Fact]) -> bool:
-        """Whether the precondition holds in `state`."""
-        return all(needed in state for needed in self.precondition)
+    def applicable(self, state: Collection[Fact], numbers: Numbers = _NONE) -> bool:
+        """Whether the precondition holds in `state` and with these numbers."""
+        return self.lacks(state, numbers) is None
+
+    def lacks(self, state: Collection[Fact], numbers: Numbers = _NONE) -> Fact | Bound | None:
+        """The first part of the precondition that does not hold."""
+        missing = next((needed for needed in self.precondition if needed not in state), None)
+        return missing or next((bound for bound in self.bounds if not bound.holds(numbers)), None)
 
     def apply(self, state: Iterable[Fact]) -> frozenset[Fact]:
         """The state after it."""
         return (frozenset(state) - frozenset(self.deletes)) | frozenset(self.adds)
+
+    def count(self, numbers: Numbers) -> Numbers:
+        """The numbers after it.
+
+        Raises:
+            ArithmeticError: one of them cannot be computed.
+        """
+        if not self.assignments:
+            return numbers
+        return {**numbers, **{one.fluent: one.result(numbers) for one in self.assignments}}
 
     def facts(self) -> tuple[Fact, ...]:
         """Every fact it mentions."""
@@ -66,7 +89,10 @@ class Problem:
         unreachable: goal facts, as text, that no sequence of actions can make true even if nothing ever
             became false; if there are any, the problem is proven unsolvable without asking an engine.
         whole: the problem without the slice of interchangeable objects, for when the slice has no plan;
-            `None` if nothing was sliced off.
+            `None` if nothing was sliced off. In JSON only whether there is one: it is sent when its turn comes.
+        numbers: the numeric fluents' values now, as far as they matter.
+        bounds: what shall hold of numbers.
+        notes: what was asked for and cannot be had, e.g. a metric that no engine is told about; for people.
     """
 
     domain: str
@@ -76,6 +102,9 @@ class Problem:
     actions: tuple[GroundAction, ...]
     unreachable: tuple[str, ...] = ()
     whole: Problem | None = None
+    numbers: Mapping[Fact, float] = field(default_factory=dict)
+    bounds: tuple[Bound, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def features(self) -> frozenset[str]:
@@ -84,7 +113,12 @@ class Problem:
         `costs` is a wish rather than a need: an engine that cannot do them still gives a plan, not a cheap one.
         """
         costs = {action.cost for action in self.actions if action.step is not None}
-        return frozenset({"costs"} if len(costs) > 1 else ())
+        numeric = bool(self.bounds) or any(action.bounds or action.assignments for action in self.actions)
+        return frozenset([*(["costs"] if len(costs) > 1 else ()), *(["numeric"] if numeric else ())])
+
+    def cost(self, chosen: Iterable[int]) -> float:
+        """What the actions with these indices cost together."""
+        return sum(self.actions[index].cost for index in chosen)
 
     @property
     def simulated_seconds(self) -> float:
@@ -97,23 +131,27 @@ class Problem:
 
     def plan(self, chosen: Sequence[int]) -> Plan | str:
         """The plan that executes the actions with these indices, or why that is no solution."""
-        state = frozenset(self.init)
+        state, numbers = frozenset(self.init), self.numbers
         for index in chosen:
             if not 0 <= index < len(self.actions):
                 return f"there is no action number {index}"
             action = self.actions[index]
-            if not action.applicable(state):
-                missing = next(needed for needed in action.precondition if needed not in state)
+            missing = action.lacks(state, numbers)
+            if missing is not None:
                 return f"{action.step} is not applicable, {missing} does not hold"
-            state = action.apply(state)
+            try:
+                state, numbers = action.apply(state), action.count(numbers)
+            except ArithmeticError as error:
+                return f"what {action.step} changes cannot be computed: {error}"
         missing_goals = [wanted for wanted in self.goal if wanted not in state]
-        if missing_goals:
-            return f"goal fact {missing_goals[0]} does not hold at the end"
+        missing_bounds = [bound for bound in self.bounds if not bound.holds(numbers)]
+        if missing_goals or missing_bounds:
+            return f"goal fact {[*missing_goals, *missing_bounds][0]} does not hold at the end"
         steps = (self.actions[index].step for index in chosen)
         return Plan(tuple(step for step in steps if step is not None))
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON data, exactly reversible; facts are listed once and referred to by number."""
+        """As JSON data, reversible except for `whole`; facts are listed once and referred to by number."""
         number: dict[Fact, int] = {}
 
         def refer(facts: Iterable[Fact]) -> list[int]:
@@ -131,11 +169,16 @@ class Problem:
                     refer(a.adds),
                     refer(a.deletes),
                     a.cost,
+                    [_bound_to_json(one) for one in a.bounds],
+                    [[to_json(one.fluent), to_json(one.amount), one.increase] for one in a.assignments],
                 ]
                 for a in self.actions
             ],
             "unreachable": list(self.unreachable),
-            "whole": None if self.whole is None else self.whole.to_json(),
+            "numbers": [[to_json(fluent), number] for fluent, number in self.numbers.items()],
+            "bounds": [_bound_to_json(one) for one in self.bounds],
+            "notes": list(self.notes),
+            "whole": self.whole is not None,
         }
         return {"facts": [[f.predicate, *f.args] for f in number], **rest}
 
@@ -145,7 +188,7 @@ class Problem:
         facts = [Fact(predicate, tuple(args)) for predicate, *args in data["facts"]]
 
         def read(numbers: Iterable[int]) -> tuple[Fact, ...]:
-            return tuple(facts[n] for n in numbers)
+            return tuple([facts[n] for n in numbers])
 
         return Problem(
             domain=data["domain"],
@@ -159,9 +202,26 @@ class Problem:
                     read(add),
                     read(gone),
                     cost,
+                    tuple(map(_bound_from_json, bounds)),
+                    tuple(Assignment(_fluent(one), from_json(amount), more) for one, amount, more in assignments),
                 )
-                for step, pre, add, gone, cost in data["actions"]
+                for step, pre, add, gone, cost, bounds, assignments in data["actions"]
             ),
             unreachable=tuple(data["unreachable"]),
-            whole=None if data["whole"] is None else Problem.from_json(data["whole"]),
+            numbers={_fluent(fluent): number for fluent, number in data["numbers"]},
+            bounds=tuple(map(_bound_from_json, data["bounds"])),
+            notes=tuple(data["notes"]),
         )
+
+
+def _bound_to_json(bound: Bound) -> list[Any]:
+    return [bound.operator, to_json(bound.left), to_json(bound.right)]
+
+
+def _bound_from_json(data: Sequence[Any]) -> Bound:
+    return Bound(data[0], from_json(data[1]), from_json(data[2]))
+
+
+def _fluent(data: Any) -> Fact:
+    name, *args = data["fluent"]
+    return Fact(name, tuple(args))

@@ -1,0 +1,125 @@
+"""Literals, bounds and numeric fluents as numbers, which are compared and looked up much faster than values.
+
+Whatever is numbered has an even number; the odd one after a fact's is the literal that it does not hold.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact, Value
+from planning.conditions import Leaf, Literal
+from planning.quantities import Bound
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from knowledge_base.language.evaluation import World
+
+NOT = "not "
+"""Before a predicate: the fact that carries a negative literal (positive normal form). No declared name has a blank."""
+
+
+class Numbering:
+    """Grows; a number once given stays.
+
+    Attributes:
+        fluents: the numbers of numeric fluents.
+    """
+
+    def __init__(self) -> None:
+        self._numbers: dict[Fact | Bound, int] = {}
+        self._named: list[Fact | Bound] = []
+        self._wants: dict[int, dict[int, None]] = {}
+        self._supports: dict[int, dict[int, None]] = {}
+        self.fluents: set[int] = set()
+        self._renamed: dict[tuple[str, str], dict[int, int]] = {}
+
+    @property
+    def wants(self) -> Mapping[int, Mapping[int, None]]:
+        """Bound -> the fluents it asks about."""
+        return self._wants
+
+    @property
+    def supports(self) -> Mapping[int, Mapping[int, None]]:
+        """Fluent -> the bounds that ask about it."""
+        return self._supports
+
+    def of(self, leaf: Leaf) -> int:
+        """The number of a literal or bound."""
+        if isinstance(leaf, Literal):
+            return self._number(leaf.fact) + (not leaf.positive)
+        known = self._numbers.get(leaf)
+        return self._bound(leaf) if known is None else known
+
+    def fluent(self, fluent: Fact) -> int:
+        """The number of a numeric fluent."""
+        number = self._number(fluent)
+        self.fluents.add(number)
+        return number
+
+    def named(self, number: int) -> Fact | Bound:
+        """What has the number, or is denied by it."""
+        return self._named[number >> 1]
+
+    def fact(self, number: int) -> Fact:
+        """The literal in positive normal form."""
+        fact = self._named[number >> 1]
+        if not isinstance(fact, Fact):
+            raise TypeError(f"{fact} is no fact")
+        return as_fact(Literal(fact, not number & 1))
+
+    def present(self, world: World) -> set[int]:
+        """The numbers of all literals and bounds that hold in `world`; fluents have no truth."""
+        functions = world.schema.functions
+        values = {
+            one: world.value(one.predicate, one.args)
+            for one in self._named
+            if isinstance(one, Fact) and one.predicate in functions
+        }
+        held: set[int] = set()
+        for i, one in enumerate(self._named):
+            if isinstance(one, Bound):
+                held.update((2 * i,) if one.holds(values) else ())
+            elif one not in values:
+                held.add(2 * i + (not world.holds(one.predicate, one.args)))
+        return held
+
+    def renaming(self, name: str, other: str) -> Callable[[int], int]:
+        """A function from numbers to the numbers of the same about `other` in the place of `name`."""
+        known = self._renamed.setdefault((name, other), {})
+
+        def rename(number: int) -> int:
+            image = known.get(number)
+            if image is None:
+                image = known[number] = self._image(number, name, other)
+            return image
+
+        return rename
+
+    def _image(self, number: int, name: str, other: str) -> int:
+        one = self._named[number >> 1]
+        if isinstance(one, Bound) or name not in one.args:
+            return number
+        args: tuple[Value, ...] = tuple([other if value == name else value for value in one.args])
+        return self._number(Fact(one.predicate, args)) + (number & 1)
+
+    def _number(self, one: Fact | Bound) -> int:
+        number = self._numbers.get(one)
+        if number is None:
+            number = self._numbers[one] = 2 * len(self._named)
+            self._named.append(one)
+        return number
+
+    def _bound(self, bound: Bound) -> int:
+        number = self._number(bound)
+        for one in bound.fluents():
+            fluent = self.fluent(one)
+            self._wants.setdefault(number, {})[fluent] = None
+            self._supports.setdefault(fluent, {})[number] = None
+        return number
+
+
+def as_fact(literal: Literal) -> Fact:
+    """The literal in positive normal form."""
+    return literal.fact if literal.positive else Fact(NOT + literal.fact.predicate, literal.fact.args)

@@ -1,0 +1,201 @@
+"""Ground numeric expressions (PDDL 2.1, level 2): what is left of a term when what cannot change was computed."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from knowledge_base.facts import Fact
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """`+ - * /` on quantities; `-` with one argument negates."""
+
+    operator: str
+    args: tuple[Quantity, ...]
+
+
+Quantity = float | Fact | Operation
+"""A number, the value of a ground numeric fluent (written as a `Fact`), or something computed from these."""
+
+Numbers = Mapping[Fact, float]
+
+_COMPUTE: Mapping[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+}
+_COMPARE: Mapping[str, Callable[[float, float], bool]] = {
+    "=": operator.eq,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
+"""The comparison that holds exactly when the other one does not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """A comparison of two quantities; the operator is one of `= < <= > >=`."""
+
+    operator: str
+    left: Quantity
+    right: Quantity
+
+    def holds(self, numbers: Numbers) -> bool:
+        """Whether it is true; what cannot be computed (a division by zero) is not.
+
+        A fluent that `numbers` does not have is 0.
+        """
+        try:
+            return _COMPARE[self.operator](value(self.left, numbers), value(self.right, numbers))
+        except ArithmeticError:
+            return False
+
+    def fluents(self) -> Iterator[Fact]:
+        """The numeric fluents it asks about."""
+        yield from fluents(self.left)
+        yield from fluents(self.right)
+
+    def __str__(self) -> str:
+        """In PDDL: `(> (fuel truck1) 3)`."""
+        return f"({self.operator} {text(self.left)} {text(self.right)})"
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """A ground numeric effect: the fluent becomes `amount`, or (`increase`) more by it."""
+
+    fluent: Fact
+    amount: Quantity
+    increase: bool
+
+    def result(self, numbers: Numbers) -> float:
+        """The fluent's value afterwards.
+
+        Raises:
+            ArithmeticError: it cannot be computed.
+        """
+        amount = value(self.amount, numbers)
+        return numbers.get(self.fluent, 0.0) + amount if self.increase else amount
+
+
+def value(quantity: Quantity, numbers: Numbers) -> float:
+    """What the quantity is worth.
+
+    Raises:
+        ArithmeticError: a division by zero, or a result out of range.
+    """
+    match quantity:
+        case Fact():
+            return numbers.get(quantity, 0.0)
+        case Operation(name, args):
+            first, *rest = (value(arg, numbers) for arg in args)
+            if not rest:
+                return -first
+            for number in rest:
+                first = _COMPUTE[name](first, number)
+            return first
+        case _:
+            return quantity
+
+
+def combined(name: str, args: tuple[Quantity, ...]) -> Quantity:
+    """The operation on quantities, computed at once if all of them are numbers.
+
+    Raises:
+        ArithmeticError: a division by zero.
+    """
+    whole = Operation(name, args)
+    return whole if any(isinstance(arg, Fact | Operation) for arg in args) else value(whole, {})
+
+
+def fluents(quantity: Quantity) -> Iterator[Fact]:
+    """The numeric fluents that a quantity depends on."""
+    match quantity:
+        case Fact():
+            yield quantity
+        case Operation(_, args):
+            for arg in args:
+                yield from fluents(arg)
+
+
+def linear(quantity: Quantity) -> dict[Fact, float] | None:
+    """The coefficients of a sum of fluents (constants dropped); `None` if it is no such sum."""
+    match quantity:
+        case Fact():
+            return {quantity: 1.0}
+        case Operation("+" | "-" as name, args):
+            return _sum(name, args)
+        case Operation("*", args):
+            numbers = [arg for arg in args if not isinstance(arg, Fact | Operation)]
+            others = [arg for arg in args if isinstance(arg, Fact | Operation)]
+            return _scaled(linear(others[0]), _product(numbers)) if len(others) == 1 else None
+        case Operation("/", (dividend, float() | int() as divisor)):
+            return _scaled(linear(dividend), 1 / divisor) if divisor else None
+        case Operation():
+            return None
+        case _:
+            return {}
+
+
+def _sum(name: str, args: tuple[Quantity, ...]) -> dict[Fact, float] | None:
+    signs = [1.0 if name == "+" or (i == 0 and len(args) > 1) else -1.0 for i in range(len(args))]
+    total: dict[Fact, float] = {}
+    for sign, arg in zip(signs, args, strict=True):
+        part = linear(arg)
+        if part is None:
+            return None
+        for fluent, coefficient in part.items():
+            total[fluent] = total.get(fluent, 0.0) + sign * coefficient
+    return total
+
+
+def _product(numbers: list[float]) -> float:
+    product = 1.0
+    for number in numbers:
+        product *= number
+    return product
+
+
+def _scaled(part: dict[Fact, float] | None, factor: float) -> dict[Fact, float] | None:
+    return None if part is None else {fluent: factor * coefficient for fluent, coefficient in part.items()}
+
+
+def text(quantity: Quantity) -> str:
+    """In PDDL: `(+ (fuel truck1) 3)`."""
+    match quantity:
+        case Fact():
+            return str(quantity)
+        case Operation(name, args):
+            return f"({name} {' '.join(map(text, args))})"
+        case _:
+            return f"{quantity:g}"
+
+
+def to_json(quantity: Quantity) -> Any:
+    """As JSON data: a number, `{"fluent": [NAME, ARG, ...]}` or `[OPERATOR, ARG, ...]`."""
+    match quantity:
+        case Fact(name, args):
+            return {"fluent": [name, *args]}
+        case Operation(name, args):
+            return [name, *map(to_json, args)]
+        case _:
+            return quantity
+
+
+def from_json(data: Any) -> Quantity:
+    """The quantity that `to_json` wrote."""
+    match data:
+        case {"fluent": [str() as name, *args]}:
+            return Fact(name, tuple(args))
+        case [str() as name, *args]:
+            return Operation(name, tuple(map(from_json, args)))
+        case _:
+            return float(data) if isinstance(data, float) else int(data)
