@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from knowledge_base.language.expression import Call, Term
+from knowledge_base.language.expression import Arithmetic, Call, Term
 from knowledge_base.language.printer import to_text
 from planning.quantities import Assignment, linear
 from planning.relevance import names_of
@@ -17,6 +17,7 @@ from planning.relevance import names_of
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.facts import Fact
     from knowledge_base.schema import Schema
     from planning.conditions import Grounder
@@ -25,12 +26,12 @@ TOTAL_COST = Call("total-cost")
 """What PDDL calls the sum of action costs; the metric of a domain that declares it, unless another is asked for."""
 
 
-def metric_of(metric: Term | None, schema: Schema) -> Term | None:
-    """The given metric or else `(total-cost)`, if its functions are declared."""
+def metric_of(metric: Metric | None, schema: Schema) -> Term | None:
+    """What plans shall have as little of as possible: by default `(total-cost)`, if it is declared."""
+    if metric is not None:
+        return metric.term if metric.direction == "minimize" else Arithmetic("-", (metric.term,))
     declared = schema.functions.get(TOTAL_COST.function)
-    if metric is None and declared is not None and declared.arity == 0:
-        return TOTAL_COST
-    return metric
+    return TOTAL_COST if declared is not None and declared.arity == 0 else None
 
 
 def ignored(metric: Term) -> str:

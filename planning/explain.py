@@ -12,6 +12,7 @@ from knowledge_base.language.evaluation import World, explain
 from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
 from knowledge_base.language.printer import to_text
 from planning.conditions import Every, Grounder, Literal, Residual, Some
+from planning.derived import derivation
 from planning.grounding import Reached, Rule
 from planning.numbering import as_fact
 from planning.plan import PlanStep
@@ -38,6 +39,8 @@ def why_unsolvable(domain: PlanningDomain, world: World, goal: Expression) -> tu
         InputError: as for `planning.problem.pose`.
     """
     check_goal(goal, world)
+    derived = derivation(domain)
+    domain, world, goal = derived.domain, derived.world(world), derived.expand(goal)
     posing = Poser(domain).posing(world, goal)
     if posing.task is None:
         return (f"{explain(goal, world).deciding} and no planning action changes that",)
@@ -73,11 +76,22 @@ class _Reach:
         fluents = frozenset(numbering.fact(one) for one in named if one in numbering.fluents)
         return _Reach(frozenset(map(numbering.fact, named)) - fluents, fluents, world)
 
-    def allows(self, bound: Bound) -> bool:
-        """Whether the bound holds, or one of its numbers can change."""
-        asked = set(bound.fluents())
-        present = {one: self.world.value(one.predicate, one.args) for one in asked}
-        return bound.holds(present) or not self.fluents.isdisjoint(asked)
+    def allows(self, condition: Residual) -> bool:
+        """Whether the condition holds, or may hold: each of its leaves by itself."""
+        match condition:
+            case bool():
+                return condition
+            case Literal(fact, positive):
+                present = self.world.holds(fact.predicate, fact.args) is positive
+                return present or as_fact(condition) in self.facts
+            case Bound():
+                asked = set(condition.fluents())
+                numbers = {one: self.world.value(one.predicate, one.args) for one in asked}
+                return condition.holds(numbers) or not self.fluents.isdisjoint(asked)
+            case Every(parts):
+                return all(map(self.allows, parts))
+            case Some(parts):
+                return any(map(self.allows, parts))
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,15 +185,12 @@ class _Causes:
         step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in parameters))
         needed = [self.grounder.fact(atom, bindings) for atom in rule.atoms]
         others = _parts(rule.action.precondition)
-        unmet = [c for c in others if c not in rule.atoms and self.hopeless(c, bindings)]
+        unmet = [
+            c for c in others if c not in rule.atoms and not self.reach.allows(self.grounder.residual(c, bindings))
+        ]
         missing = tuple(fact for fact in needed if fact not in self.reached)
         fixed = len(unmet) + sum(fact.predicate not in self.grounder.changing for fact in missing)
         return _Nearest(step, missing, tuple(to_text(substitute(c, bindings)) for c in unmet), fixed)
-
-    def hopeless(self, condition: Expression, bindings: dict[str, Value]) -> bool:
-        """Whether the condition is false and nothing that may happen changes that."""
-        left = self.grounder.residual(condition, bindings)
-        return left is False or (isinstance(left, Bound) and not self.reach.allows(left))
 
 
 def _cases(action: PlanningAction) -> Iterator[PlanningAction]:

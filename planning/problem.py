@@ -18,6 +18,7 @@ from knowledge_base.language.expression import Expression, Term
 from knowledge_base.language.printer import to_text
 from planning.conditions import Every, Grounder, Leaf, Literal, Residual, Some
 from planning.costs import ignored, metric_of
+from planning.derived import derivation
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.grounding import Variant
 from planning.groundwork import Groundwork, Way, numbered, things_of
@@ -30,6 +31,7 @@ from planning.strips import GroundAction, Problem
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.language.evaluation import World
     from planning.domain import PlanningDomain
     from planning.numbering import Numbering
@@ -40,18 +42,19 @@ _ONE_OF = "one of"
 _MOST_KEPT = 8  # goals of different kinds, each with its ground actions
 
 
-def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Term | None = None) -> Problem:
+def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Metric | None = None) -> Problem:
     """The problem of reaching `goal` from `world`, which stays as it is.
 
     Args:
         domain: the planning actions.
         world: the present.
         goal: what shall hold.
-        metric: what the plan shall have as little of as possible; `(total-cost)` if the domain declares that.
+        metric: what makes a plan better than another; to minimize `(total-cost)` if the domain declares that.
 
     Raises:
         InputError: the goal has a free variable, or names something that is not declared or not known.
-        UnsupportedGoalError: the goal states a fact about a number that actions change.
+        UnsupportedGoalError: the goal states a fact about a number that actions change, or asks for a derived
+            predicate that cannot be planned with.
         UnsupportedActionError: so does an action that matters, or it has too many alternatives.
     """
     return Poser(domain).pose(world, goal, metric)
@@ -86,34 +89,43 @@ class Poser:
     """
 
     def __init__(self, domain: PlanningDomain) -> None:
-        self._domain = domain
+        self._derivation = derivation(domain)
+        self._domain = self._derivation.domain
         self._kept: dict[tuple[tuple[str, ...], frozenset[str], Term | None], Groundwork] = {}
         self._lock = threading.Lock()
 
-    def pose(self, world: World, goal: Expression, metric: Term | None = None) -> Problem:
+    def pose(self, world: World, goal: Expression, metric: Metric | None = None) -> Problem:
         """See `planning.problem.pose`."""
         check_goal(goal, world)
-        if holds(goal, world):
+        world = self._derivation.world(world)
+        if holds(self._derivation.expand(goal), world):
             return self._nothing()
-        metric = metric_of(metric, world.schema)
+        amount = metric_of(metric, world.schema)
         with self._lock:
-            posing = self.posing(world, goal, metric)
+            posing = self.posing(world, goal, amount)
             if posing.task is None:
                 return self._nothing(to_text(goal))
             reached, possible = reachable(posing.task)
             missing = [said(posing.task.numbering, one, goal) for one in posing.task.goal if one not in reached]
             if missing:
                 return self._nothing(*dict.fromkeys(missing))
-            possible, notes = _priced(possible, metric)
+            possible, notes = _priced(possible, amount)
             return self._sliced(pruned(posing.task, possible), world, notes)
 
     def posing(self, world: World, goal: Expression, metric: Term | None = None) -> Posing:
         """The problem of reaching a checked goal, with everything evaluated that cannot change.
 
+        Args:
+            world: the present, with derived facts.
+            goal: what shall hold.
+            metric: what plans shall have little of.
+
         Raises:
             UnsupportedGoalError, UnsupportedActionError: as for `pose`.
         """
+        goal = self._derivation.expand(goal)
         matters = relevant(goal, metric, self._domain.actions.values())
+        self._derivation.require_supported(goal, matters.actions)
         grounder = Grounder(world, matters.changing, keep_false=True)
         try:
             wanted = grounder.residual(goal, {})

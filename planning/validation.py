@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.evaluation import World, explain
+from knowledge_base.language.evaluation import World, explain, holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
-from planning.domain import PlanningDomain
+from planning.derived import derivation
 from planning.plan import Plan
+
+if TYPE_CHECKING:
+    from planning.domain import PlanningDomain
+    from planning.plan import PlanStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,17 +38,26 @@ def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression)
     Steps that name no action of the domain, or no known object, make the plan invalid like any other; so does
     a goal about an object that is not there any more.
     """
-    ahead = Overlay(world)
+    derived = derivation(domain)
+    ahead = Overlay(derived.world(world))
     for index, step in enumerate(plan.steps):
-        try:
-            why_not = domain.why_not(step, ahead)
-            if not why_not.truth:
-                return Validation(valid=False, failing_step=index, why=str(why_not.deciding))
-            ahead.apply(domain.effects(step, ahead))
-        except InputError as error:
-            return Validation(valid=False, failing_step=index, why=str(error))
+        why_not = _obstacle(step, derived.domain, ahead)
+        if why_not is not None:
+            return Validation(valid=False, failing_step=index, why=why_not)
     try:
-        reached = explain(goal, ahead)
+        wanted = derived.expand(goal)
+        reached = holds(wanted, ahead)
+        return Validation(reached, why="" if reached else str(explain(wanted, ahead).deciding))
     except InputError as error:
         return Validation(valid=False, why=str(error))
-    return Validation(valid=True) if reached.truth else Validation(valid=False, why=str(reached.deciding))
+
+
+def _obstacle(step: PlanStep, domain: PlanningDomain, ahead: Overlay) -> str | None:
+    """Take the step, or say why that cannot be."""
+    try:
+        if not domain.applicable(step, ahead):
+            return str(domain.why_not(step, ahead).deciding)
+        ahead.apply(domain.effects(step, ahead))
+    except InputError as error:
+        return str(error)
+    return None

@@ -8,6 +8,7 @@ import shutil
 import pytest
 from searching import breadth_first, cheapest, solution
 
+from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.store import KnowledgeBase
@@ -216,6 +217,10 @@ def roads():
     return domain, kb
 
 
+def cheap(text):
+    return Metric("minimize", parse_term(text))
+
+
 def there(problem, search):
     chosen = search(problem)
     return problem.cost(chosen), [step.action for step in problem.plan(chosen).steps]
@@ -230,15 +235,22 @@ def test_total_cost_is_the_cost_of_each_action():
 
 def test_a_metric_is_a_sum_of_what_actions_raise():
     domain, world = roads()
-    problem = pose(domain, world, parse_condition("(at b)"), parse_term("(+ (* 3 (total-cost)) (tolls) 7)"))
+    problem = pose(domain, world, parse_condition("(at b)"), cheap("(+ (* 3 (total-cost)) (tolls) 7)"))
     assert there(problem, cheapest) == (28.5, ["go"] * 3)
-    problem = pose(domain, world, parse_condition("(at b)"), parse_term("(+ (* 2 (total-cost)) (tolls))"))
+    problem = pose(domain, world, parse_condition("(at b)"), cheap("(+ (* 2 (total-cost)) (tolls))"))
     assert there(problem, cheapest) == (21.0, ["pay", "go", "go", "go"])
+
+
+def test_to_maximize_is_to_minimize_the_opposite():
+    domain, world = roads()
+    slow = Metric("maximize", parse_term("(- (total-cost))"))
+    goal = parse_condition("(at b)")
+    assert pose(domain, world, goal, slow) == pose(domain, world, goal)
 
 
 @pytest.mark.parametrize("metric", ["(* (tolls) (total-cost))", "(speed)", "(total-time)"])
 def test_a_metric_that_is_no_cost_is_ignored_and_said(metric):
-    problem = pose(*roads(), parse_condition("(and (at b) (paid))"), parse_term(metric))
+    problem = pose(*roads(), parse_condition("(and (at b) (paid))"), cheap(metric))
     assert problem.features == frozenset()
     assert metric in problem.notes[0]
     assert {action.cost for action in problem.actions} == {1.0}
