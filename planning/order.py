@@ -27,6 +27,7 @@ from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
 from planning.conditions import Literal
 from planning.dependencies import Changes, Ground, Support, changes, conjuncts, support
+from planning.derived import derivation
 from planning.domain import PlanningDomain
 from planning.plan import Plan, PlanStep
 
@@ -125,10 +126,11 @@ def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression
     Raises:
         InputError: the plan does not lead to the goal.
     """
-    tracing = _Tracing(Overlay(world))
+    derived = derivation(domain)
+    tracing = _Tracing(Overlay(derived.world(world)))
     for number, step in enumerate(plan.steps, start=1):
-        tracing.take(number, step, domain)
-    for condition in conjuncts(goal, tracing.world):
+        tracing.take(number, step, derived.domain)
+    for condition in conjuncts(derived.expand(goal), tracing.world):
         tracing.need(len(plan.steps) + 1, condition, "the goal")
     pairs = {(first, second) for first, second in tracing.pairs if PRESENT < first < second <= len(plan.steps)}
     return PartialOrder(plan.steps, tuple(dict.fromkeys(tracing.links)), reduced(pairs))

@@ -16,6 +16,7 @@ from dsc.events import GAVE_UP
 from dsc.model.plot import ActionPlot, Rule
 from dsc.validation.structure import RESPONSES
 from planning.chains import chains
+from planning.derived import derivation
 from planning.lane import FINISHED, Lane, Writer
 from planning.order import PartialOrder, in_sequence, scheduled
 from planning.steps import CarriedStep, carried, sketched
@@ -58,6 +59,7 @@ def plot_from_plan(
     """
     if order is None:
         order = scheduled(plan) if plan.schedule else in_sequence(plan)
+    domain = derivation(domain).domain  # the knowledge base knows no derived predicates
     rules = [rule for rule in rules if not rule.of and rule.do.then in RESPONSES]  # others are about their plot alone
     steps = [
         sketched(step, domain) if library is None else carried(step, domain, library, rules) for step in plan.steps

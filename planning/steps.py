@@ -25,7 +25,7 @@ from knowledge_base.language.expression import (
 )
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import PlanStep
-from planning.relevance import changed_predicates, predicates_of
+from planning.relevance import changed, names_of
 from planning.usage import Usage, fitting, usage
 
 PATIENCE = 2
@@ -147,8 +147,8 @@ def _watched(action: PlanningAction) -> Iterator[Expression]:
     """Over-all conditions that the action does not change itself: what it does when is its own affair."""
     if action.timed is not None:
         effects = (action.timed.start_effect, action.timed.end_effect)
-        own = {name for effect in effects for name in changed_predicates(effect)}
-        yield from (one for one in parts(action.timed.over_all) if not own.intersection(predicates_of(one)))
+        own = {name for effect in effects for name in changed(effect)}
+        yield from (one for one in parts(action.timed.over_all) if not own.intersection(names_of(one)))
 
 
 def _literals(effect: Effect) -> list[Add | Delete]:

@@ -125,6 +125,21 @@ def test_a_plan_that_does_not_lead_to_the_goal_has_no_links(shop):
         order_of(shop, "drill a", goal="(drilled b)")
 
 
+def test_what_follows_from_facts_is_brought_about_by_who_brings_about_the_facts(world_of):
+    domain = PlanningDomain.parse("""
+(define (domain kitchen) (:types pan)
+  (:predicates (hot ?p - pan) (oiled ?p - pan) (ready ?p - pan) (fried ?p - pan))
+  (:derived (ready ?p - pan) (and (hot ?p) (oiled ?p)))
+  (:action heat :parameters (?p - pan) :precondition () :effect (hot ?p))
+  (:action oil :parameters (?p - pan) :precondition () :effect (oiled ?p))
+  (:action fry :parameters (?p - pan) :precondition (ready ?p) :effect (fried ?p)))
+""")
+    world = world_of(domain.schema, {"big": "pan"})
+    order = deordered(Plan(steps("heat big", "oil big", "fry big")), domain, world, parse_condition("(fried big)"))
+    assert order.before == {(1, 3), (2, 3)}
+    assert list(map(str, order.links))[:2] == ["1 -(hot big)-> 3", "2 -(oiled big)-> 3"]
+
+
 def test_pairs_that_follow_from_others_are_left_out():
     assert reduced({(1, 2), (2, 3), (1, 3), (1, 4), (3, 4)}) == {(1, 2), (2, 3), (3, 4)}
 
