@@ -21,7 +21,7 @@ from functools import cached_property
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.effect import substitute_effect
-from knowledge_base.language.evaluation import World, holds
+from knowledge_base.language.evaluation import World, apply_effect, holds
 from knowledge_base.language.expression import Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
@@ -186,9 +186,12 @@ class _Tracing:
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
         """Step number `number` comes next."""
         action, bindings = domain.action(step), domain.bindings(step)
-        timed = action.timed
-        effects = (action.effect,) if timed is None else (timed.start_effect, timed.end_effect)
-        doing = changes([substitute_effect(effect, bindings) for effect in effects], self.world)
+        effect = substitute_effect(action.effect, bindings)
+        if action.timed is None:
+            doing = changes(effect, self.world)
+        else:
+            start, end = (substitute_effect(e, bindings) for e in (action.timed.start_effect, action.timed.end_effect))
+            doing = changes(end, self.world, after=start)
         needed = conjuncts(substitute(action.precondition, bindings), self.world)
         asked = (one for one in doing.conditions if holds(one, self.world, {}))  # else its own start brings it about
         for condition in dict.fromkeys((*needed, *asked)):
@@ -196,7 +199,7 @@ class _Tracing:
         for fluent in doing.reads:
             self._rely(number, fluent)
         self._change(number, doing)
-        self.world.apply(domain.effects(step, self.world))
+        self.world.apply(apply_effect(effect, self.world))
 
     def need(self, user: int, condition: Expression, whose: str) -> None:
         """A step, or the goal, needs a ground condition now."""
