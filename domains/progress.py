@@ -22,10 +22,16 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
 _STEP = re.compile(r"step_\d+")
 
 
-def _stages(name: str, state: dict[str, Any]) -> set[str]:
-    """The states in which something is done: those with a plot inside, here and in composites."""
-    inner = {found for key, one in state.get("states", {}).items() for found in _stages(key, one)}
-    return inner | ({name} if state.keys() & {"use", "dynamic", "goal"} else set())
+def _working(scope: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The states in which something is done: those with a plot inside, here, in composites and in regions."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, state in scope["states"].items():
+        inner = [state] if "states" in state else state.get("regions", {}).values()
+        for one in inner:
+            found |= _working(one)
+        if state.keys() & {"use", "dynamic", "goal"}:
+            found[name] = state
+    return found
 
 
 class PlainProgress:
@@ -44,10 +50,10 @@ class PlainProgress:
             self._write(f"{record.t:8.1f} s  {line}")
 
     def _learn_steps(self, plot: dict[str, Any]) -> None:
-        for name, state in plot["states"].items():
-            self._stages |= _stages(name, state)
+        working = _working(plot)
+        self._stages |= working.keys()
         if plot.get("generated"):
-            self._steps = {k: s["about"] for k, s in plot["states"].items() if _STEP.fullmatch(k)}
+            self._steps = {name: state["about"] for name, state in working.items() if _STEP.fullmatch(name)}
 
     def lines(self, record: Record) -> list[str]:
         """What a record has to say to people, if anything."""

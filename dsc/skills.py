@@ -117,10 +117,13 @@ class Component:
     Attributes:
         name: how charts address it; it may be chosen at deployment.
         domain: what it brings to the planning domain: a PDDL file, or PDDL text; `None` for nothing.
+        concurrent: whether it can carry out several skills at once. Steps of a plan that use one which cannot never
+            overlap; what plots start side by side is their own affair.
     """
 
     name: str = ""
     domain: ClassVar[Path | str | None] = None
+    concurrent: bool = False
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()

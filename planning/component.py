@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from dsc.sequencer.sequencer import CHART
@@ -12,13 +13,14 @@ from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition
 from planning.explain import why_unsolvable
+from planning.order import PartialOrder, deordered, in_sequence, scheduled
 from planning.plan import Plan, PlanFound, ProvenUnsolvable, TimedOut
 from planning.plot import plot_from_plan
 from planning.problem import pose
 from planning.validation import validate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Iterator
 
     from dsc.dynamic.library import Library
     from dsc.sequencer.clock import LoopClock
@@ -38,12 +40,25 @@ MAX_ATTEMPTS = 3
 
 @dataclass(slots=True)
 class _Running:
-    """A plan on its way: the step that is at work, and who waits to hear that the rest is of no use."""
+    """A plan on its way: the steps that are at work, and who waits to hear that the rest is of no use."""
 
-    plan: Plan
+    order: PartialOrder
     goal: Expression
-    step: int = 1
+    begun: set[int] = field(default_factory=set)
     broken: asyncio.Future[Outcome] | None = None
+
+    def begin(self, number: int) -> None:
+        """A step begins; those that it waits for are done."""
+        self.begun.add(number)
+
+    def ways_on(self) -> Iterator[Plan]:
+        """What may be left to do: of the steps at work, each may be half done, which counts as not or as all done."""
+        done = {earlier for number in self.begun for earlier in self.order.earlier[number]}
+        left = [number for number in range(1, len(self.order.steps) + 1) if number not in done]
+        at_work = sorted(self.begun - done)
+        for count in range(len(at_work) + 1):
+            for gone in itertools.combinations(at_work, count):
+                yield Plan(tuple(self.order.steps[number - 1] for number in left if number not in gone))
 
 
 class PlanningComponent(Component):
@@ -59,6 +74,8 @@ class PlanningComponent(Component):
         planner: finds plans.
         clock: holds simulated time while the planner works.
         trace: hears `plan.asked`, `plan.found`, `plan.none`, `plan.broken`.
+        parallel: whether steps that need not wait for each other are carried out side by side.
+        shared: names of components that can carry out several skills at once.
         working_for: names of the components that carry out skills for the state that started an action, by the
             action's id; what they observe is the running step's own doing and is judged when the step ends.
     """
@@ -74,6 +91,9 @@ class PlanningComponent(Component):
         clock: LoopClock,
         trace: Trace,
         working_for: Callable[[str], frozenset[str]],
+        *,
+        parallel: bool = True,
+        shared: Collection[str] = (),
     ) -> None:
         super().__init__()
         self._domain = domain
@@ -83,6 +103,8 @@ class PlanningComponent(Component):
         self._clock = clock
         self._trace = trace
         self._working_for = working_for
+        self._parallel = parallel
+        self._shared = {self.name, *shared}
         self._running: dict[str, _Running] = {}
         self._plans = 0
 
@@ -91,7 +113,7 @@ class PlanningComponent(Component):
         await super().configure(parameter, value)
         running = self._running.get(parameter)
         if running is not None:
-            running.step = int(value)
+            running.begin(int(value))
             self._judge_plan(running, "the steps before")
 
     @skill(
@@ -175,8 +197,15 @@ class PlanningComponent(Component):
         self._plans += 1
         rules = self._library.plot(holder).rules if holder in self._library else ()
         name = f"plan_{self._plans}"
-        plot = plot_from_plan(answer.plan, self._domain, self._library, rules, name)
-        self._running[name] = _Running(answer.plan, goal)
+        plan, domain = answer.plan, self._domain
+        if plan.schedule:
+            order = scheduled(plan)
+        elif self._parallel:
+            order = deordered(plan, domain, self._knowledge, goal)
+        else:
+            order = in_sequence(plan)
+        plot = plot_from_plan(plan, domain, self._library, rules, name, order, self._shared)
+        self._running[name] = _Running(order, goal)
         steps = [str(step) for step in answer.plan.steps]
         limit = {} if answer.reproducible else _CUT_SHORT
         self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine, **limit)
@@ -189,13 +218,10 @@ class PlanningComponent(Component):
     def _judge_plan(self, running: _Running, author: str) -> None:
         why = None if running.broken is None or running.broken.done() else self._why_broken(running)
         if why is not None and running.broken is not None:
-            self._trace.record("plan.broken", reason=why, author=author, step=running.step)
+            self._trace.record("plan.broken", reason=why, author=author, step=max(running.begun, default=1))
             running.broken.set_result(Outcome("plan_invalid", {"reason": why, "author": author}))
 
     def _why_broken(self, running: _Running) -> str | None:
-        """Why what is left of the plan no longer leads to the goal; the step at work may be half done."""
-        left = running.plan.steps[running.step - 1 :]
-        whole = validate(Plan(left), self._domain, self._knowledge, running.goal)
-        if whole.valid or validate(Plan(left[1:]), self._domain, self._knowledge, running.goal).valid:
-            return None
-        return whole.why
+        """Why what is left of the plan no longer leads to the goal."""
+        found = [validate(plan, self._domain, self._knowledge, running.goal) for plan in running.ways_on()]
+        return None if any(one.valid for one in found) else found[0].why

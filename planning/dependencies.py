@@ -61,15 +61,21 @@ class Changes:
     reads: set[Fact] = field(default_factory=set)
 
 
-def changes(effects: Iterable[Effect], world: World) -> Changes:
-    """What ground effects do one after the other, beginning in `world`, which stays as it is.
+def changes(effect: Effect, world: World, after: Effect | None = None) -> Changes:
+    """What a ground effect does in `world`, which stays as it is.
 
-    An action has one effect, a durative one two: at its start and at its end.
+    Args:
+        effect: of an action.
+        world: where it happens.
+        after: of a durative action, its effect at the start, which comes first.
     """
-    found, ahead = Changes(), Overlay(world)
-    for effect in effects:
-        _collect(effect, ahead, found)
-        ahead.apply(apply_effect(effect, ahead))
+    found = Changes()
+    if after is not None:
+        _collect(after, world, found)
+        ahead = Overlay(world)
+        ahead.apply(apply_effect(after, world))
+        world = ahead
+    _collect(effect, world, found)
     return found
 
 

@@ -46,6 +46,7 @@ class Executive:
         knowledge: the world model; an empty one of the domain's schema if left out.
         planner: finds plans; if left out, pyperplan in simulated time, so that a run can be repeated, and in real
             time the engines that suit a problem, in a race.
+        parallel: whether steps of a plan that need not wait for each other are carried out side by side.
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
@@ -60,6 +61,8 @@ class Executive:
         components: Iterable[Component],
         knowledge: KnowledgeBase | None = None,
         planner: Planner | None = None,
+        *,
+        parallel: bool = True,
     ) -> None:
         self.components = tuple(components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
@@ -71,6 +74,7 @@ class Executive:
             self.library.add(achieve_plot())
         self._own_planners: dict[bool, CachingPlanner] = {}
         self._planner = planner
+        self._parallel = parallel
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
@@ -133,7 +137,8 @@ class Executive:
         sequencer = Sequencer(self.library, self.knowledge, components, clock, trace, open_ended=open_ended)
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
-            working_for=sequencer.working_for,
+            working_for=sequencer.working_for, parallel=self._parallel,
+            shared=[component.name for component in components if component.concurrent],
         )  # fmt: skip
         sequencer.dispatcher.deploy(planning)
         if prepare is not None:

@@ -22,6 +22,7 @@ from planning.order import PartialOrder
 from planning.steps import CarriedStep
 
 FINISHED = "finished"
+_DONE, _BEGUN = "done", "begun"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +55,12 @@ class Writer:
         self._steps = dict(enumerate(steps, start=1))
         self._plan = plan
         lane_of = {number: lane for lane in lanes for number in lane.numbers}
-        apart = [(first, second) for first, second in sorted(order.before) if lane_of[first] is not lane_of[second]]
-        self._waits: dict[int, list[str]] = {number: [] for number in self._steps}
-        for first, second in apart:
-            self._waits[second].append(f"done_{first}")
-        for first, second in sorted(order.begin_before):
-            if lane_of[first] is not lane_of[second]:
-                self._waits[second].append(f"begun_{first}")
-        self._flags = dict.fromkeys(flag for flags in self._waits.values() for flag in flags)
+        self._waits: dict[int, list[tuple[str, int]]] = {number: [] for number in self._steps}
+        for kind, pairs in ((_DONE, order.before), (_BEGUN, order.begin_before)):
+            for first, second in sorted(pairs):
+                if lane_of[first] is not lane_of[second]:
+                    self._waits[second].append((kind, first))
+        self._flags = dict.fromkeys(f"{kind}_{first}" for waits in self._waits.values() for kind, first in waits)
 
     @property
     def variables(self) -> Mapping[str, Any]:
@@ -72,7 +71,7 @@ class Writer:
         """The states of one lane, without the one at its end."""
         first = lane.numbers[0] if lane.numbers else None
         states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
-        for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=True):
+        for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
             states[f"step_{number}"] = self._step(number, lane)
             states[f"after_{number}"] = self._after(number, following, lane)
             if following is not None and self._waits[following]:
@@ -82,8 +81,11 @@ class Writer:
         return states
 
     def _before(self, number: int | None, lane: Lane) -> dict[str, Any]:
-        waits = [] if number is None else self._waits[number]
-        return {"always": self._onward(number, lane, [_is_set(flag) for flag in waits])}
+        if number is None:
+            return {"always": self._onward(number, lane, ())}
+        waits = self._waits[number]
+        told = {"about": "waits for " + ", ".join(self._steps[other].text for _, other in waits)} if waits else {}
+        return {**told, "always": self._onward(number, lane, [_is_set(flag, other) for flag, other in waits])}
 
     def _step(self, number: int, lane: Lane) -> dict[str, Any]:
         step = self._steps[number]
@@ -93,7 +95,7 @@ class Writer:
             state["entry"] = {"set": f"planner.{self._plan}", "to": number}
         if step.over_all:
             state["always"] = [
-                self._replan(lane, f"{to_text(one)} no longer holds during {step.text}", [Not(one)])
+                self._replan(lane, f"lost during {step.text}: {to_text(one)}", [Not(one)])
                 for one in step.over_all
             ]
         if step.seconds is not None:
@@ -101,7 +103,7 @@ class Writer:
         return state
 
     def _after(self, number: int, following: int | None, lane: Lane) -> dict[str, Any]:
-        step, flag = self._steps[number], f"done_{number}"
+        step, flag = self._steps[number], f"{_DONE}_{number}"
         told = {"assign": {flag: True}} if flag in self._flags else {}
         if following is not None and self._waits[following]:
             onward = [_guarded({"to": f"before_{following}", **told}, step.expected)]
@@ -119,7 +121,7 @@ class Writer:
         first, assigned = tuple(first), dict((told or {}).get("assign", {}))
         if number is None:
             return [_guarded({"to": lane.finished, **(told or {})}, first)]
-        step, flag = self._steps[number], f"begun_{number}"
+        step, flag = self._steps[number], f"{_BEGUN}_{number}"
         if flag in self._flags:
             assigned[flag] = True
         begin = {"to": f"step_{number}", **({"assign": assigned} if assigned else {})}
@@ -135,5 +137,5 @@ def _guarded(transition: dict[str, Any], when: tuple[Expression, ...]) -> dict[s
     return {**transition, "when": when[0] if len(when) == 1 else And(when)} if when else transition
 
 
-def _is_set(flag: str) -> Expression:
-    return Comparison("=", Variable(flag), Constant(value=True))
+def _is_set(kind: str, number: int) -> Expression:
+    return Comparison("=", Variable(f"{kind}_{number}"), Constant(value=True))

@@ -21,12 +21,13 @@ from functools import cached_property
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.effect import substitute_effect
-from knowledge_base.language.evaluation import World, holds
+from knowledge_base.language.evaluation import World, apply_effect, holds
 from knowledge_base.language.expression import Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
 from planning.conditions import Literal
 from planning.dependencies import Changes, Ground, Support, changes, conjuncts, support
+from planning.derived import derivation
 from planning.domain import PlanningDomain
 from planning.plan import Plan, PlanStep
 
@@ -125,10 +126,11 @@ def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression
     Raises:
         InputError: the plan does not lead to the goal.
     """
-    tracing = _Tracing(Overlay(world))
+    derived = derivation(domain)
+    tracing = _Tracing(Overlay(derived.world(world)))
     for number, step in enumerate(plan.steps, start=1):
-        tracing.take(number, step, domain)
-    for condition in conjuncts(goal, tracing.world):
+        tracing.take(number, step, derived.domain)
+    for condition in conjuncts(derived.expand(goal), tracing.world):
         tracing.need(len(plan.steps) + 1, condition, "the goal")
     pairs = {(first, second) for first, second in tracing.pairs if PRESENT < first < second <= len(plan.steps)}
     return PartialOrder(plan.steps, tuple(dict.fromkeys(tracing.links)), reduced(pairs))
@@ -184,9 +186,12 @@ class _Tracing:
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
         """Step number `number` comes next."""
         action, bindings = domain.action(step), domain.bindings(step)
-        timed = action.timed
-        effects = (action.effect,) if timed is None else (timed.start_effect, timed.end_effect)
-        doing = changes([substitute_effect(effect, bindings) for effect in effects], self.world)
+        effect = substitute_effect(action.effect, bindings)
+        if action.timed is None:
+            doing = changes(effect, self.world)
+        else:
+            start, end = (substitute_effect(e, bindings) for e in (action.timed.start_effect, action.timed.end_effect))
+            doing = changes(end, self.world, after=start)
         needed = conjuncts(substitute(action.precondition, bindings), self.world)
         asked = (one for one in doing.conditions if holds(one, self.world, {}))  # else its own start brings it about
         for condition in dict.fromkeys((*needed, *asked)):
@@ -194,7 +199,7 @@ class _Tracing:
         for fluent in doing.reads:
             self._rely(number, fluent)
         self._change(number, doing)
-        self.world.apply(domain.effects(step, self.world))
+        self.world.apply(apply_effect(effect, self.world))
 
     def need(self, user: int, condition: Expression, whose: str) -> None:
         """A step, or the goal, needs a ground condition now."""

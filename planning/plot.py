@@ -16,9 +16,10 @@ from dsc.events import GAVE_UP
 from dsc.model.plot import ActionPlot, Rule
 from dsc.validation.structure import RESPONSES
 from planning.chains import chains
+from planning.derived import derivation
 from planning.lane import FINISHED, Lane, Writer
 from planning.order import PartialOrder, in_sequence, scheduled
-from planning.steps import CarriedStep, carried, sketched
+from planning.steps import CarriedStep, Carrier, sketched
 from planning.usage import Usage
 
 if TYPE_CHECKING:
@@ -58,10 +59,10 @@ def plot_from_plan(
     """
     if order is None:
         order = scheduled(plan) if plan.schedule else in_sequence(plan)
+    domain = derivation(domain).domain  # the knowledge base knows no derived predicates
     rules = [rule for rule in rules if not rule.of and rule.do.then in RESPONSES]  # others are about their plot alone
-    steps = [
-        sketched(step, domain) if library is None else carried(step, domain, library, rules) for step in plan.steps
-    ]
+    writing = None if library is None else Carrier(domain, library, rules)
+    steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
     order = order.restricted(_clashes([step.usage for step in steps], order, shared))
     lanes = _lanes(order, steps)
     writer = Writer(steps, order, lanes, None if library is None else name)

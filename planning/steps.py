@@ -28,7 +28,7 @@ from planning.plan import PlanStep
 from planning.relevance import changed, names_of
 from planning.usage import Usage, fitting, usage
 
-PATIENCE = 2.0
+PATIENCE = 2
 """A step that takes so many times as long as its action says, or as its skills may take together, is broken off."""
 _CONFIRM = ActionPlot.model_fields["confirm"].default
 
@@ -64,26 +64,41 @@ class CarriedStep:
     usage: Usage = field(default_factory=Usage)
 
 
-def carried(step: PlanStep, domain: PlanningDomain, library: Library, rules: Iterable[Rule] = ()) -> CarriedStep:
-    """The step as a dynamic state over the plots that carry it out, as far as its arguments do not rule them out.
+class Carrier:
+    """Knows how steps are carried out: by which plots, and what these take hold of.
 
-    Raises:
-        UnknownNameError: no plot implements its action, or one uses a plot that is not there.
+    Args:
+        domain: has the steps' actions.
+        library: has the plots that implement them.
+        rules: may use more plots for what those end with.
     """
-    bindings = domain.bindings(step)
-    candidates = fitting(implementing(step, library), bindings)
-    taken = {name for plot in candidates for name in plot.parameters}
-    used = usage(candidates, library, rules)
-    content = {
-        "dynamic": [plot.name for plot in candidates],
-        "with": {name: value for name, value in bindings.items() if name in taken},
-    }
-    assumed = all(plot.effects == "assumed" for plot in candidates)
-    return _step(
-        step, domain, content, None if used.anything else PATIENCE * used.seconds,
-        assumed=assumed, confirm=max(plot.confirm for plot in candidates),
-        outcomes=frozenset(event for plot in candidates for event in plot.emits), usage=used,
-    )  # fmt: skip
+
+    def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule] = ()) -> None:
+        self._domain = domain
+        self._library = library
+        self._rules = tuple(rules)
+        self._usage: dict[tuple[str, ...], Usage] = {}  # most steps have the candidates of others
+
+    def carried(self, step: PlanStep) -> CarriedStep:
+        """The step as a dynamic state over the plots that carry it out, if its arguments do not rule them out.
+
+        Raises:
+            UnknownNameError: no plot implements its action, or one uses a plot that is not there.
+        """
+        bindings = self._domain.bindings(step)
+        candidates = fitting(implementing(step, self._library), bindings)
+        names = tuple(plot.name for plot in candidates)
+        if names not in self._usage:
+            self._usage[names] = usage(candidates, self._library, self._rules)
+        used = self._usage[names]
+        taken = {name for plot in candidates for name in plot.parameters}
+        content = {"dynamic": names, "with": {name: value for name, value in bindings.items() if name in taken}}
+        return _step(
+            step, self._domain, content, None if used.anything else PATIENCE * used.seconds,
+            assumed=all(plot.effects == "assumed" for plot in candidates),
+            confirm=max(plot.confirm for plot in candidates),
+            outcomes=frozenset(event for plot in candidates for event in plot.emits), usage=used,
+        )  # fmt: skip
 
 
 def sketched(step: PlanStep, domain: PlanningDomain) -> CarriedStep:

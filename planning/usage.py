@@ -11,7 +11,7 @@ from dsc.model.plot import ActionPlot, Rule
 from dsc.model.states import DynamicState, State, SubmachineState
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import And, Comparison, Constant, Expression, substitute
+from knowledge_base.language.expression import And, Comparison, Constant, Expression, substitute_term
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +61,13 @@ def fitting(plots: Iterable[ActionPlot], bindings: Mapping[str, Value]) -> tuple
 
 
 def _is_false(e: Expression, bindings: Mapping[str, Value]) -> bool:
-    match substitute(e, bindings):
+    match e:
         case And(parts):
-            return any(_is_false(part, {}) for part in parts)
-        case Comparison("=" | "!=" as operator, Constant(left), Constant(right)):
-            return (left == right) is not (operator == "=")
+            return any(_is_false(part, bindings) for part in parts)
+        case Comparison("=" | "!=" as operator):
+            sides = [substitute_term(side, bindings) for side in (e.left, e.right)]
+            values = [side.value for side in sides if isinstance(side, Constant)]
+            return len(values) == len(sides) and (values[0] == values[1]) is not (operator == "=")
         case _:
             return False
 

@@ -62,3 +62,13 @@ def test_on_a_terminal_a_status_line_stands_below_the_same_lines(skill):
     assert all(line in shown for line in LINES)
     assert "left 4  plans 1" in shown
     assert ("arm.grasp([cup])" in shown) == (skill == "arm.grasp")
+
+
+def test_steps_that_stand_side_by_side_are_told_as_well():
+    lane = {"states": {"before_2": {}, "step_2": {"about": "(throw can)", "dynamic": ["throw"]}}}
+    plan = {"plot": "plan_2", "generated": True, "states": {"work": {"regions": {"anna": lane}}}}
+    lines = []
+    progress = PlainProgress(lines.append)
+    progress(record(1, "plot", plot=plan))
+    progress(record(2, "step", **step(["clear/execute/work", "clear/execute/before_2", "clear/execute/step_2"])))
+    assert [line.split(" s  ", 1)[1] for line in lines] == ["step   2  (throw can)"]
