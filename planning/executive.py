@@ -23,6 +23,7 @@ from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.component import PlanningComponent
 from planning.domain import PlanningDomain
+from planning.foresight import Foresight
 from planning.implementations import check_implementations
 from planning.planner import Planner, PlannerProcess
 from planning.problem import check_goal
@@ -40,6 +41,7 @@ class Executive:
         components: the skills.
         knowledge: the world model; an empty one of the domain's schema if left out.
         planner: finds plans; pyperplan in a process of its own if left out.
+        foresight: tries out plans in a simulation before they are carried out.
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
@@ -53,6 +55,7 @@ class Executive:
         components: Iterable[Component],
         knowledge: KnowledgeBase | None = None,
         planner: Planner | None = None,
+        foresight: Foresight | None = None,
     ) -> None:
         self.domain = domain if isinstance(domain, PlanningDomain) else PlanningDomain.from_pddl(domain)
         self.components = tuple(components)
@@ -65,6 +68,7 @@ class Executive:
         if planner is None:
             planner = self._own_planner = PlannerProcess()
         self._planner = planner
+        self._foresight = foresight
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
@@ -127,8 +131,9 @@ class Executive:
         sequencer = Sequencer(self.library, self.knowledge, components, clock, trace, open_ended=open_ended)
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner, clock, trace,
-            working_for=sequencer.working_for,
+            working_for=sequencer.working_for, foresight=self._foresight,
         )  # fmt: skip
+        sequencer.listen(planning.note_choices)
         sequencer.dispatcher.deploy(planning)
         if prepare is not None:
             prepare(sequencer)

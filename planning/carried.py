@@ -1,0 +1,44 @@
+"""A plan on its way, as the planning component remembers it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from planning.course import Course
+    from planning.plan import PlanStep
+    from planning.repair import Attempt
+    from planning.strips import Problem
+
+
+@dataclass(slots=True)
+class Carried:
+    """A plan that has a plot, and is or was carried out.
+
+    Attributes:
+        name: its plot's.
+        course: how far it is.
+        attempt: what has been tried for its goal.
+        holder, seconds, replans: of the dynamic state that it is for.
+        problem: what it solves, for a planner that goes on.
+        following: steps that take its place; if their plan began with the step at work, once that has ended.
+        following_name: what the plot of these steps will be called; `None` if they are steps of this very plan.
+        following_kept: how many steps of this plan they end with.
+        begun: is told when a step begins, while the plan is watched.
+        stopped: who watched it ended it; otherwise a step did.
+    """
+
+    name: str
+    course: Course
+    attempt: Attempt
+    holder: str
+    seconds: float
+    replans: int
+    problem: Problem | None = None
+    following: tuple[PlanStep, ...] | None = None
+    following_name: str | None = None
+    following_kept: int = 0
+    begun: Callable[[int], None] | None = None
+    stopped: bool = False
