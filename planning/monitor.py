@@ -168,16 +168,16 @@ class Monitor:
 
     def _link_fired(self, e: Expression, firing: Firing) -> None:
         author = None if firing.truth else self._foreign(firing)
-        if author is not None and self._matters(e):
-            self._hear(self._broken(author, firing.version, e))
-
-    def _matters(self, fallen: Expression) -> bool:
-        """Whether the plan is of no use since a condition does not hold any more."""
+        if author is None or _true(self._course.goal, self._knowledge):  # that the goal is reached is heard by itself
+            return
         course, world = self._course, self._knowledge
-        needed, later = course.needed() or {}, course.needed_later() or {}
-        if fallen in needed and fallen in later:  # whatever the step at work has done by now
-            return shortest_end(course.coming(), self._domain, world, course.goal) is None
-        return not course.stands(world)
+        if e in (course.needed() or {}) and e in (course.needed_later() or {}):
+            # Whatever the step at work has done by now; if a later step can be the next one, it will be.
+            if shortest_end(course.coming(), self._domain, world, course.goal) is None:
+                self._hear(self._broken(author, firing.version, e))
+        elif not course.stands(world):  # the step at work itself is hit
+            end = shortest_end(course.coming(), self._domain, world, course.goal)
+            self._hear(self._broken(author, firing.version, e) if end is None else Shorter(end))
 
     def _changed(self, change: Change) -> None:
         if not self._is_own(change.author) and not self._course.stands(self._knowledge):
@@ -185,7 +185,8 @@ class Monitor:
 
     def _broken(self, author: str, version: int, fallen: Expression | None = None) -> Broken:
         course = self._course
-        needed = {**(course.needed_later() or {}), **(course.needed() or {})}
+        now, later = course.needed() or {}, course.needed_later() or {}
+        needed = {**now, **{one: user for one, user in later.items() if one not in now}}
         if fallen is None:
             fallen = next((one for one in needed if not _true(one, self._knowledge)), None)
         why = validate(Plan(course.left_steps), self._domain, self._knowledge, course.goal).why

@@ -76,7 +76,6 @@ class Search:
         domain, knowledge, planner, clock: as everywhere.
         telling: hears what is excluded, readmitted and rejected.
         foresight: has to agree with a plan before it counts.
-        patience: see `PATIENCE`.
     """
 
     def __init__(
@@ -87,7 +86,6 @@ class Search:
         clock: LoopClock,
         telling: Telling,
         foresight: Foresight | None = None,
-        patience: float = PATIENCE,
     ) -> None:
         self._domain = domain
         self._knowledge = knowledge
@@ -95,7 +93,6 @@ class Search:
         self._clock = clock
         self._telling = telling
         self._foresight = foresight
-        self._patience = patience
         self._excluded: dict[PlanStep, float] = {}
 
     def exclude(self, step: PlanStep, why: str) -> None:
@@ -219,12 +216,13 @@ class Search:
             expired.set()
             loop.call_soon_threadsafe(asked.cancel)
 
-        timer = threading.Timer(seconds + self._patience, expire)
+        timer = threading.Timer(seconds + PATIENCE, expire)
         timer.daemon = True
         timer.start()
         try:
             with self._clock.hold():
-                return await asked
+                answer: object = await asked
+            return answer if isinstance(answer, PlanningOutcome) else EngineFailed(engine, f"no answer: {answer!r:.80}")
         except asyncio.CancelledError:
             if not expired.is_set() or _cancelled_from_outside():
                 raise
