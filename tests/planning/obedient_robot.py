@@ -14,14 +14,16 @@ class ObedientRobot(Component):
     Args:
         domain: what its steps do.
         script: for steps as text, one after the other what their calls observe instead: a `Delta`, or `FAILED`.
+        failing_calls: the calls that fail, counted from 1.
     """
 
     name = "robot"
 
-    def __init__(self, domain, script=None):
+    def __init__(self, domain, script=None, failing_calls=()):
         super().__init__()
         self.domain = domain
         self.script = {step: list(answers) for step, answers in (script or {}).items()}
+        self.failing_calls = failing_calls
         self.done = []
         self.knowledge = None
 
@@ -32,6 +34,8 @@ class ObedientRobot(Component):
         step = PlanStep(action, tuple(filter(None, (one, two, three))))
         self.done.append(f"{step}" if way == action else f"{way}: {step}")
         answers = self.script.get(self.done[-1], [])
+        if len(self.done) in self.failing_calls:
+            return Outcome("failed")
         observed = answers.pop(0) if answers else self.domain.effects(step, self.knowledge)
         return Outcome("failed") if observed == FAILED else Outcome("did", observed=observed or Delta())
 
