@@ -281,7 +281,7 @@ class PlanningComponent(Component):
 
 def _with_last_candidate(plot: ActionPlot, name: str) -> ActionPlot:
     """The plot with a candidate of its first step put behind the others."""
-    first = plot.states["step_1"]
+    first = plot.states.get("step_1")
     if not isinstance(first, DynamicState):
         return plot
     order = tuple(sorted(first.dynamic, key=lambda candidate: candidate == name))  # the others stay in order
