@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dsc.skills import Outcome
-from knowledge_base.errors import InputError
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
 from planning.course import Course, shortest_end
@@ -164,8 +163,8 @@ class _Watch:
         self._about.telling.asked(to_text(course.goal), self._about.knowledge.version)
         try:
             found = await self._about.search.plan(course.goal, self._carried.seconds, course.left_steps)
-        except InputError as error:
-            found = NotFound("failed", str(error))
+        except Exception as error:  # noqa: BLE001  whatever goes wrong beside a plan must not leave it unwatched
+            found = NotFound("failed", f"{type(error).__name__}: {error}")
         self._put(found)
 
     async def _improve(self, planner: Improving, problem: Problem) -> None:
