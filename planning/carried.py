@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncGenerator
+
     from planning.course import Course
-    from planning.plan import PlanStep
+    from planning.plan import PlanningOutcome, PlanStep
     from planning.repair import Attempt
-    from planning.strips import Problem
 
 
 @dataclass(slots=True)
@@ -22,7 +23,7 @@ class Carried:
         course: how far it is.
         attempt: what has been tried for its goal.
         holder, seconds, replans: of the dynamic state that it is for.
-        problem: what it solves, for a planner that goes on.
+        better: what comes of a planner that goes on after it.
         following: steps that take its place; if their plan began with the step at work, once that has ended.
         following_name: what the plot of these steps will be called; `None` if they are steps of this very plan.
         following_kept: how many steps of this plan they end with.
@@ -36,7 +37,7 @@ class Carried:
     holder: str
     seconds: float
     replans: int
-    problem: Problem | None = None
+    better: AsyncGenerator[PlanningOutcome, None] | None = None
     following: tuple[PlanStep, ...] | None = None
     following_name: str | None = None
     following_kept: int = 0

@@ -71,7 +71,6 @@ class PlanningComponent(Component):
         self._domain = domain
         self._library = library
         self._knowledge = knowledge
-        self._planner = planner
         self._working_for = working_for
         self._telling = Telling(trace)
         self._search = Search(domain, knowledge, planner, clock, self._telling, foresight)
@@ -130,7 +129,7 @@ class PlanningComponent(Component):
                 return self._none(found.kind, found.reason)
             course = Course(found.steps, self._domain, wanted)
             attempt = Attempt() if before is None else before.attempt
-            carried = Carried(self._new_name(), course, attempt, holder, seconds, replans, found.problem)
+            carried = Carried(self._new_name(), course, attempt, holder, seconds, replans, found.better)
             form = self._plot(carried)
         except InputError as error:
             return self._none("failed", str(error))
@@ -166,8 +165,7 @@ class PlanningComponent(Component):
             return author == CHART or author in self._working_for(call.action_id)
 
         watching = Watching(
-            self._required(plan), self._domain, self._knowledge, self._planner, self._search, self._telling,
-            self._new_name, is_own,
+            self._required(plan), self._domain, self._knowledge, self._search, self._telling, self._new_name, is_own,
         )  # fmt: skip
         return await watching.watch()
 

@@ -1,23 +1,23 @@
-"""A planner that goes on: better plans for a problem that has a plan already."""
+"""A planner that goes on: a plan at once, and better ones later."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
+    from collections.abc import AsyncGenerator
 
-    from planning.plan import PlanFound
+    from planning.plan import PlanningOutcome
     from planning.strips import Problem
 
 
 @runtime_checkable
 class Improving(Protocol):
-    """What a `Planner` can offer besides `solve`."""
+    """What a `Planner` can offer besides `solve`; asked for in real time only, since no two such runs are the same."""
 
-    def improved(self, problem: Problem) -> AsyncIterator[PlanFound]:
-        """Better plans for a problem that `solve` found a plan for, as they come; it ends when no more will.
+    def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+        """First what `solve` says, then each better plan that is found within the `seconds` of real time.
 
-        It is closed early when the plan ends. A better plan replaces the steps that have not begun.
+        It is closed when no better plan is of use any more, which ends the search.
         """
         ...

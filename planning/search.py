@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from planning.explain import why_unsolvable
+from planning.improving import Improving
 from planning.mending import mending
 from planning.plan import EngineFailed, PlanFound, PlanningOutcome, PlanStep, ProvenUnsolvable, TimedOut
 from planning.problem import pose
@@ -19,7 +20,7 @@ from planning.repair import EXCLUDED_SECONDS, without
 from planning.validation import Validation, validate
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import AsyncGenerator, Awaitable, Collection
 
     from dsc.sequencer.clock import LoopClock
     from knowledge_base.language.expression import Expression
@@ -47,18 +48,23 @@ class Found:
 
     Attributes:
         answer: the plan, and where it comes from.
-        problem: what it solves; `None` for one that keeps the end of the plan before.
         kept: how many steps at the end of the plan before it keeps.
+        better: what comes of a planner that goes on; to be closed.
     """
 
     answer: PlanFound
-    problem: Problem | None
     kept: int = 0
+    better: AsyncGenerator[PlanningOutcome, None] | None = None
 
     @property
     def steps(self) -> tuple[PlanStep, ...]:
         """The plan's steps."""
         return self.answer.plan.steps
+
+    async def close(self) -> None:
+        """No better plan is wanted."""
+        if self.better is not None:
+            await self.better.aclose()
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +73,9 @@ class NotFound:
 
     kind: str
     reason: str
+
+
+_Answer = tuple[PlanningOutcome, "AsyncGenerator[PlanningOutcome, None] | None"]
 
 
 class Search:
@@ -125,11 +134,13 @@ class Search:
                 verdict = await self._foreseen(found)
                 if verdict.valid:
                     return found
+                await found.close()
                 before = ()
                 if verdict.failing_step is None or len(rejected) == MAX_REJECTED:
                     return NotFound("failed", f"the simulation foresees that it fails: {verdict.why}")
                 rejected[found.steps[verdict.failing_step]] = verdict.why
                 continue
+            await found.close()
             changed += 1
             if version == self._knowledge.version:
                 wrong = f"the plan found does not lead to the goal: {verdict.why} ({found.answer.engine})"
@@ -151,9 +162,10 @@ class Search:
             return mended
         with self._clock.hold():  # grounding takes its time as well: in a thread, so that a stop is obeyed
             problem = await asyncio.to_thread(pose, self._domain, snapshot, goal)
-        answer = await self._answer(problem, seconds, rejected)
+        answer, better = await self._answer(problem, seconds, rejected)
         if isinstance(answer, PlanFound):
-            return Found(replace(answer, reproducible=answer.reproducible and mended is None), problem)
+            reproducible = answer.reproducible and mended is None
+            return Found(replace(answer, reproducible=reproducible), better=better)
         if isinstance(answer, TimedOut):
             return NotFound("timed_out", f"no plan within {answer.seconds:g} s ({answer.engine})")
         if isinstance(answer, EngineFailed):
@@ -165,15 +177,15 @@ class Search:
             missing = await asyncio.to_thread(why_unsolvable, self._domain, snapshot, goal)
         return NotFound("unsolvable", "; ".join(missing) or answer.reason)
 
-    async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> PlanningOutcome:
+    async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> _Answer:
         """The planner's answer, without the excluded steps if there is a plan without them."""
         excluded = self._excluded_now()
-        answer = await self._solve(without(problem, {*excluded, *rejected}), seconds)
+        answer, better = await self._solve(without(problem, {*excluded, *rejected}), seconds)
         if isinstance(answer, ProvenUnsolvable) and excluded and not problem.unreachable:
             self._excluded.clear()
             self._telling.readmitted(excluded)
             return await self._solve(without(problem, rejected), seconds)
-        return answer
+        return answer, better
 
     async def _mended(
         self, goal: Expression, seconds: float, before: Sequence[PlanStep], snapshot: WorldState
@@ -184,11 +196,12 @@ class Search:
             how = await asyncio.to_thread(mending, before, excluded, self._domain, snapshot, goal)
         if how is None:
             return None
-        answer = await self._solve(without(how.problem, excluded), min(seconds / 4, MENDING_SECONDS))
+        seconds = min(seconds / 4, MENDING_SECONDS)
+        answer, _ = await self._solve(without(how.problem, excluded), seconds, going_on=False)
         if not isinstance(answer, PlanFound):
             return answer if isinstance(answer, TimedOut) else None
         plan = how.mended(answer.plan, before, self._domain, snapshot, goal)
-        return None if plan is None else Found(replace(answer, plan=plan), None, kept=len(how.end))
+        return None if plan is None else Found(replace(answer, plan=plan), kept=len(how.end))
 
     def _excluded_now(self) -> set[PlanStep]:
         now = self._clock.now()
@@ -206,10 +219,21 @@ class Search:
             self._telling.rejected(step, verdict.why, found.answer.engine)
         return verdict
 
-    async def _solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """The planner's answer, or that it gave none in time or failed; in real time, whatever the clock says."""
+    async def _solve(self, problem: Problem, seconds: float, *, going_on: bool = True) -> _Answer:
+        """The planner's answer, and what may follow if it goes on (not in simulated time, which is the same twice)."""
+        if going_on and not self._clock.simulated and isinstance(self._planner, Improving):
+            better = self._planner.plans(problem, seconds)
+            answer = await self._bounded(anext(better), seconds)
+            if isinstance(answer, PlanFound):
+                return answer, better
+            await better.aclose()
+            return answer, None
+        return await self._bounded(self._planner.solve(problem, seconds), seconds), None
+
+    async def _bounded(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
+        """The answer, or that there was none in time or none at all; in real time, whatever the clock says."""
         loop, engine = asyncio.get_running_loop(), type(self._planner).__name__
-        asked = asyncio.ensure_future(self._planner.solve(problem, seconds))
+        asked = asyncio.ensure_future(answering)
         expired = threading.Event()
 
         def expire() -> None:
@@ -221,7 +245,7 @@ class Search:
         timer.start()
         try:
             with self._clock.hold():
-                answer: object = await asked
+                answer = await asked
             return answer if isinstance(answer, PlanningOutcome) else EngineFailed(engine, f"no answer: {answer!r:.80}")
         except asyncio.CancelledError:
             if not expired.is_set() or _cancelled_from_outside():

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Callable
+from contextlib import aclosing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,17 +12,15 @@ from dsc.skills import Outcome
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
 from planning.course import Course, shortest_end
-from planning.improving import Improving
 from planning.monitor import Broken, Monitor, News, Reached, Shorter
+from planning.plan import PlanFound
 from planning.search import Found, NotFound, Search
 
 if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
     from planning.carried import Carried
     from planning.domain import PlanningDomain
-    from planning.plan import Plan, PlanFound, PlanStep
-    from planning.planner import Planner
-    from planning.strips import Problem
+    from planning.plan import Plan, PlanningOutcome, PlanStep
     from planning.telling import Telling
 
 
@@ -46,7 +45,7 @@ class Watching:
 
     Attributes:
         carried: the plan.
-        domain, knowledge, planner, search, telling: as in the planning component.
+        domain, knowledge, search, telling: as in the planning component.
         new_name: names a plan.
         is_own: whether a change by this author is the running step's own doing.
     """
@@ -54,7 +53,6 @@ class Watching:
     carried: Carried
     domain: PlanningDomain
     knowledge: KnowledgeBase
-    planner: Planner
     search: Search
     telling: Telling
     new_name: Callable[[], str]
@@ -87,11 +85,11 @@ class _Watch:
         self._beside: list[asyncio.Task[None]] = []
 
     def begin(self) -> None:
-        about, carried = self._about, self._carried
+        carried = self._carried
         carried.begun = self._begun
         self._look("earlier")  # the world went on between the search and now
-        if isinstance(about.planner, Improving) and carried.problem is not None:
-            self._beside.append(asyncio.create_task(self._improve(about.planner, carried.problem)))
+        if carried.better is not None:
+            self._beside.append(asyncio.create_task(self._improve(carried.better)))
 
     def end(self) -> None:
         self._carried.begun = None
@@ -163,13 +161,17 @@ class _Watch:
         self._about.telling.asked(to_text(course.goal), self._about.knowledge.version)
         try:
             found = await self._about.search.plan(course.goal, self._carried.seconds, course.left_steps)
+            if isinstance(found, Found):
+                await found.close()
         except Exception as error:  # noqa: BLE001  whatever goes wrong beside a plan must not leave it unwatched
             found = NotFound("failed", f"{type(error).__name__}: {error}")
         self._put(found)
 
-    async def _improve(self, planner: Improving, problem: Problem) -> None:
-        async for answer in planner.improved(problem):
-            self._put(_Better(answer))
+    async def _improve(self, better: AsyncGenerator[PlanningOutcome, None]) -> None:
+        async with aclosing(better):
+            async for answer in better:
+                if isinstance(answer, PlanFound):
+                    self._put(_Better(answer))
 
     def _better(self, plan: Plan) -> tuple[PlanStep, ...] | None:
         """The step at work and then the end of a better plan, if that is shorter than what is left."""

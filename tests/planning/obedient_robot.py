@@ -1,4 +1,4 @@
-"""A robot for any domain: each planning action is one skill call of a second, which a script may let go wrong."""
+"""A robot for any domain: each planning action is one skill call, which a script may let go wrong."""
 
 from dsc import ActionPlot, Component, Outcome, SkillCall, skill
 from knowledge_base import Delta
@@ -15,22 +15,24 @@ class ObedientRobot(Component):
         domain: what its steps do.
         script: for steps as text, one after the other what their calls observe instead: a `Delta`, or `FAILED`.
         failing_calls: the calls that fail, counted from 1.
+        seconds: how long a call takes.
     """
 
     name = "robot"
 
-    def __init__(self, domain, script=None, failing_calls=()):
+    def __init__(self, domain, script=None, failing_calls=(), seconds=1.0):
         super().__init__()
         self.domain = domain
         self.script = {step: list(answers) for step, answers in (script or {}).items()}
         self.failing_calls = failing_calls
+        self.seconds = seconds
         self.done = []
         self.knowledge = None
 
     @skill(outcomes={"did": {}, "failed": {}})
     async def act(self, call: SkillCall, way: str, action: str, one: str = "", two: str = "", three: str = "") -> Outcome:
         """One planning action, done in one way."""
-        await call.clock.sleep(1.0)
+        await call.clock.sleep(self.seconds)
         step = PlanStep(action, tuple(filter(None, (one, two, three))))
         self.done.append(f"{step}" if way == action else f"{way}: {step}")
         answers = self.script.get(self.done[-1], [])

@@ -52,10 +52,10 @@ class Run:
 
     def __init__(
         self, goal, script=None, *, planner=None, replans=4, ways=None, things=("cup",), plots_of=None, then=(), known=(),
-        foresight=None, prepare=None, links=ROUND,
+        foresight=None, prepare=None, links=ROUND, simulated=True,
     ):  # fmt: skip
         self.planner = planner or BreadthFirst()
-        self.robot = ObedientRobot(DOMAIN, script)
+        self.robot = ObedientRobot(DOMAIN, script, seconds=1.0 if simulated else 0.02)
         holder = parse_plot(HOLDER.replace("GOAL", goal).replace("REPLANS", str(replans)))
         program = Executive(DOMAIN, [holder, *plots(DOMAIN, ways)], [self.robot], planner=self.planner, foresight=foresight)
         self.knowledge = self.robot.knowledge = program.knowledge
@@ -71,7 +71,7 @@ class Run:
             if prepare is not None:
                 prepare(sequencer)
 
-        self.end = program.run("errand", prepare=ready)
+        self.end = program.run("errand", prepare=ready, simulated=simulated)
         self.how = self.end.emitted[-1].attributes["how"] if self.end.emitted else None
 
     def said(self, kind):
@@ -187,19 +187,25 @@ DETOUR = ("go a b", "sweep b", "go b a", "go a d", "go d c", "sweep c")
 
 
 class Improves(BreadthFirst):
-    """Finds a detour first, and a better plan after the first step has begun."""
+    """Finds a detour first, and a better plan when the first step has begun."""
 
     def __init__(self, better):
         super().__init__()
         self.better = better
+        self.begun = asyncio.Event()
+        self.closed = False
 
-    async def solve(self, problem, seconds):
-        self.asked.append(problem)
-        return found(*DETOUR)
+    async def plans(self, problem, seconds):
+        try:
+            yield found(*DETOUR)
+            await self.begun.wait()
+            yield self.better
+            await asyncio.get_running_loop().create_future()  # it would go on for ever
+        finally:
+            self.closed = True
 
-    async def improved(self, problem):
-        await asyncio.sleep(0.5)
-        yield self.better
+    def prepare(self, sequencer):
+        sequencer.trace.listen(lambda record: record.data.get("skill") == "robot.act" and self.begun.set())
 
 
 def found(*steps):
@@ -208,7 +214,9 @@ def found(*steps):
 
 
 def test_a_better_plan_found_later_replaces_the_steps_that_have_not_begun():
-    run = Run("(and (clean b) (clean c))", planner=Improves(found("go a b", "sweep b", "go b c", "sweep c")))
+    planner = Improves(found("go a b", "sweep b", "go b c", "sweep c"))
+    run = Run("(and (clean b) (clean c))", planner=planner, prepare=planner.prepare, simulated=False)
+    assert planner.closed
     assert (run.how, run.done) == ("reached", ["(go a b)", "(sweep b)", "(go b c)", "(sweep c)"])
     assert [data["steps"] for data in run.said("found")][1] == run.done
     assert len(run.said("replaced")) == 1
@@ -216,7 +224,9 @@ def test_a_better_plan_found_later_replaces_the_steps_that_have_not_begun():
 
 @pytest.mark.parametrize("worse", [("go a d", "go d a"), ("go a b",)], ids=["leads_elsewhere", "wrong"])
 def test_a_plan_found_later_that_does_not_fit_is_not_taken(worse):
-    run = Run("(and (clean b) (clean c))", planner=Improves(found(*worse)))
+    planner = Improves(found(*worse))
+    run = Run("(and (clean b) (clean c))", planner=planner, prepare=planner.prepare, simulated=False)
+    assert planner.closed
     assert run.done == [f"({step})" for step in DETOUR]
     assert run.said("replaced") == []
 
