@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from dsc.model.states import DynamicState
 from dsc.sequencer.sequencer import CHART
 from dsc.skills import Component, Outcome, SkillCall, skill
 from knowledge_base.errors import InputError, UnknownNameError
@@ -23,7 +22,6 @@ from planning.watching import Watching
 if TYPE_CHECKING:
     from dsc.dynamic.library import Library
     from dsc.engine.steps import Step
-    from dsc.model.plot import ActionPlot
     from dsc.sequencer.clock import LoopClock
     from dsc.trace import Trace
     from knowledge_base.language.expression import Expression
@@ -187,8 +185,10 @@ class PlanningComponent(Component):
         if _holds(course.goal, self._knowledge):
             del self._carried[plan]
             return Outcome("goal_holds")
-        steps = carried.following or course.left_steps
-        end = shortest_end(steps, self._domain, self._knowledge, course.goal)
+        if carried.following is None:
+            end = course.shortest_end(self._knowledge)
+        else:
+            end = shortest_end(carried.following, self._domain, self._knowledge, course.goal)
         failed = None if carried.stopped else self._failed_step(course)
         if end is not None and (carried.following is not None if failed is None else failed not in end):
             return self._go_on(carried, end, why)
@@ -261,7 +261,10 @@ class PlanningComponent(Component):
         rules = self._library.plot(carried.holder).rules if carried.holder in self._library else ()
         plan = Plan(carried.course.steps)
         plot = plot_from_plan(plan, self._domain, self._library, rules, carried.name)
-        return (plot if instead_of is None else _with_last_candidate(plot, instead_of)).to_form()
+        form = plot.to_form()
+        if instead_of is not None:
+            _put_last(instead_of, form["states"]["step_1"]["dynamic"])
+        return form
 
     def _carry(self, carried: Carried, form: dict[str, Any]) -> Outcome:
         self._carried[carried.name] = carried
@@ -277,13 +280,8 @@ class PlanningComponent(Component):
         return self._carried[plan]
 
 
-def _with_last_candidate(plot: ActionPlot, name: str) -> ActionPlot:
-    """The plot with a candidate of its first step put behind the others."""
-    first = plot.states.get("step_1")
-    if not isinstance(first, DynamicState):
-        return plot
-    order = tuple(sorted(first.dynamic, key=lambda candidate: candidate == name))  # the others stay in order
-    return plot.model_copy(update={"states": {**plot.states, "step_1": first.model_copy(update={"dynamic": order})}})
+def _put_last(candidate: str, candidates: list[str]) -> None:
+    candidates.sort(key=lambda name: name == candidate)  # the others stay in their order
 
 
 def _holds(e: Expression, world: KnowledgeBase) -> bool:

@@ -138,14 +138,23 @@ class Course:
 
     def stands(self, world: World) -> bool:
         """Whether the goal is reached from `world`; each step at work may not have begun or be done."""
-        at_work = self.at_work
-        sizes = range(len(at_work) + 1) if len(at_work) <= _MOST_AT_WORK else (0, len(at_work))
-        finished = itertools.chain.from_iterable(itertools.combinations(at_work, size) for size in sizes)
-        return any(leads_to(self._of(self._after(done)), self._domain, world, self.goal) for done in finished)
+        return any(leads_to(steps, self._domain, world, self.goal) for steps in self._ways_on())
+
+    def shortest_end(self, world: World) -> tuple[PlanStep, ...] | None:
+        """The fewest last steps that lead to the goal from `world`, each step at work among them or not."""
+        ends = (shortest_end(steps, self._domain, world, self.goal) for steps in self._ways_on())
+        return min((end for end in ends if end is not None), key=len, default=None)
 
     def coming(self) -> tuple[PlanStep, ...]:
         """The steps that have not begun."""
         return self._of(self._after(self.at_work))
+
+    def _ways_on(self) -> Iterator[tuple[PlanStep, ...]]:
+        """What may be left to do."""
+        at_work = self.at_work
+        sizes = range(len(at_work) + 1) if len(at_work) <= _MOST_AT_WORK else (0, len(at_work))
+        finished = itertools.chain.from_iterable(itertools.combinations(at_work, size) for size in sizes)
+        return (self._of(self._after(done)) for done in finished)
 
     def _after(self, done: Iterable[int]) -> tuple[int, ...]:
         gone = set(done)

@@ -210,6 +210,15 @@ def test_a_step_that_is_of_no_use_any_more_since_somebody_else_did_it_is_interru
     assert plan.news == [Shorter(tuple(STEPS[4:]))]
 
 
+def test_steps_at_work_at_once_are_left_out_of_what_is_left_when_they_are_done():
+    plan = Watched(TWO, parse_condition("(and (in p1 office) (in p2 office))"), SIDE_BY_SIDE, (fact("at", "eve", "hall"), fact("in", "p2", "hall")))
+    plan.begin(1)
+    plan.begin(2)
+    assert plan.course.shortest_end(plan.kb) == tuple(TWO)
+    plan.do(2)
+    assert plan.course.shortest_end(plan.kb) == (TWO[0], *TWO[2:])
+
+
 def test_a_closed_monitor_says_nothing():
     plan = Watched()
     plan.monitor.close()
