@@ -17,6 +17,12 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "plan.found": lambda data: f"plan with {len(data['steps'])} steps ({data['engine']})",
     "plan.none": lambda data: f"no plan, {data['kind']}: {data['reason']}",
     "plan.broken": lambda data: f"the plan no longer holds: {data['reason']}",
+    "plan.resumed": lambda data: f"the plan goes on at {data['step']}: {data['why']}",
+    "plan.skipped": lambda data: f"left out {', '.join(data['steps'])}: {data['why']}",
+    "plan.excluded": lambda data: f"for {data['seconds']:g} s no plan with {data['step']}: {data['why']}",
+    "plan.readmitted": lambda data: f"no plan without {', '.join(data['steps'])}",
+    "plan.rejected": lambda data: f"a plan fails in the simulation: {data['reason']}",
+    "plan.gave_up": lambda data: f"gave up: {data['reason']}",
     "rule": lambda data: f"rule  {data['rule']}",
 }
 _STEP = re.compile(r"step_\d+")

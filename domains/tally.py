@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from typing import Any
 
 from dsc.dynamic.selection import ACHIEVE
 from dsc.trace import Record
@@ -18,6 +16,7 @@ class Tally:
         recoveries: rules that answered, by their label.
         candidates: plots that dynamic states chose; planning is not among them.
         plans: plans that were found; `replans`: how often a plan under way was given up for a new one.
+        excluded: steps that plans did without for a while, since they had failed.
         seconds: run time of the last record.
     """
 
@@ -25,6 +24,7 @@ class Tally:
         self.outcomes: Counter[str] = Counter()
         self.recoveries: Counter[str] = Counter()
         self.candidates: Counter[str] = Counter()
+        self.excluded: Counter[str] = Counter()
         self.plans = 0
         self.replans = 0
         self.seconds = 0.0
@@ -40,12 +40,7 @@ class Tally:
             self.recoveries[record.data["rule"]] += 1
         elif record.type == "plan.found":
             self.plans += 1
-        elif record.type == "step":
-            for micro in record.data["microsteps"]:
-                self._transitions(micro["taken"])
-
-    def _transitions(self, taken: list[Mapping[str, Any]]) -> None:
-        for one in taken:
-            leaves_plan = one["from"].endswith(("/execute", "/judge"))
-            if leaves_plan and (one["to"] or "").endswith("/plan"):
-                self.replans += 1
+        elif record.type == "plan.replaced":
+            self.replans += 1
+        elif record.type == "plan.excluded":
+            self.excluded[record.data["step"]] += 1

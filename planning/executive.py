@@ -25,6 +25,7 @@ from knowledge_base.store import KnowledgeBase
 from planning.cache import CachingPlanner
 from planning.component import PlanningComponent
 from planning.domain import PlanningDomain
+from planning.foresight import Foresight
 from planning.fragments import shipped_by
 from planning.implementations import check_implementations
 from planning.planner import Planner, PlannerProcess
@@ -47,6 +48,7 @@ class Executive:
         planner: finds plans; if left out, pyperplan in simulated time, so that a run can be repeated, and in real
             time the engines that suit a problem, in a race.
         parallel: whether steps of a plan that need not wait for each other are carried out side by side.
+        foresight: tries out plans in a simulation before they are carried out.
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
@@ -63,6 +65,7 @@ class Executive:
         planner: Planner | None = None,
         *,
         parallel: bool = True,
+        foresight: Foresight | None = None,
     ) -> None:
         self.components = tuple(components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
@@ -75,6 +78,7 @@ class Executive:
         self._own_planners: dict[bool, CachingPlanner] = {}
         self._planner = planner
         self._parallel = parallel
+        self._foresight = foresight
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
@@ -139,7 +143,9 @@ class Executive:
             self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
             working_for=sequencer.working_for, parallel=self._parallel,
             shared=[component.name for component in components if component.concurrent],
+            foresight=self._foresight,
         )  # fmt: skip
+        sequencer.listen(planning.note_choices)
         sequencer.dispatcher.deploy(planning)
         if prepare is not None:
             prepare(sequencer)

@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from domains.clean_up_table.foresight import Physics
 from domains.clean_up_table.report import Report, summarise
 from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
@@ -107,7 +108,7 @@ def deploy(
         return lying
 
     components = [Base(world), Arm(world), Camera(world, believed), Voice(world)]
-    executive = Executive(domain, plots(), components, knowledge, planner)
+    executive = Executive(domain, plots(), components, knowledge, planner, foresight=Physics())
     deployed = CleanUpTable(world, executive)
     executive.listen(deployed.tally)
     if listener is not None:

@@ -50,6 +50,7 @@ class Report:
         skill_failures: outcomes of skills that were not hoped for, and how often.
         recoveries: rules that answered, and how often.
         candidates_chosen: plots that dynamic states chose, and how often.
+        excluded: steps that plans did without for a while since they had failed, and how often.
         faults: what the simulation did to the robot, in order.
         touched: the items that a permanent fault keeps from where they belong.
         simulated_s, wall_s: seconds of run time and of real time.
@@ -65,6 +66,7 @@ class Report:
     skill_failures: Mapping[str, int]
     recoveries: Mapping[str, int]
     candidates_chosen: Mapping[str, int]
+    excluded: Mapping[str, int]
     faults: tuple[Fault, ...]
     touched: tuple[str, ...]
     simulated_s: float
@@ -88,6 +90,7 @@ class Report:
             ("skill failures", self.skill_failures),
             ("recovered by rule", self.recoveries),
             ("candidates chosen", self.candidates_chosen),
+            ("done without for a while", self.excluded),
         ):
             if counts:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
@@ -109,6 +112,7 @@ def summarise(world: World, knowledge: KnowledgeBase, tally: Tally, end: RunEnd,
         skill_failures={name: n for name, n in sorted(tally.outcomes.items()) if name in FAILURES},
         recoveries=dict(sorted(tally.recoveries.items())),
         candidates_chosen=dict(sorted(tally.candidates.items())),
+        excluded=dict(sorted(tally.excluded.items())),
         faults=tuple(Fault(one.kind, one.permanent, one.items) for one in world.fired),
         touched=tuple(sorted(world.touched())),
         simulated_s=round(tally.seconds, 3),

@@ -104,18 +104,6 @@ def _parted(node: Node) -> tuple[Node, ...]:
     return (Word("-", node.place), *([Word(node.text[1:], after)] if node.text != "-" else []))
 
 
-def _unglued(nodes: Sequence[Node]) -> list[Node]:
-    """The list with `-cup`, as some files have it, in two words."""
-    return [part for node in nodes for part in _parted(node)]
-
-
-def _parted(node: Node) -> tuple[Node, ...]:
-    if isinstance(node, Group) or node.quoted or not node.text.startswith("-") or is_number(node.text):
-        return (node,)
-    after = Place(node.place.source, node.place.line, (node.place.column or 0) + 1)
-    return (Word("-", node.place), *([Word(node.text[1:], after)] if node.text != "-" else []))
-
-
 def _types(node: Node) -> tuple[str, ...]:
     if isinstance(node, Word):
         return (node.folded(),)

@@ -32,11 +32,21 @@ RECORDS = [
     record(6, "rule", rule="slipped: pick, retry", state="clear/execute/step_1"),
     record(7, "plan.none", kind="timed_out", reason="no plan within 5 s"),
     record(8, "plan.broken", reason="(on cup) is false", author="somebody", step=1),
-    record(9, "end", finished=False, problem="nobody handles 'x'"),
+    record(9, "plan.resumed", plot="plan_2", after="plan_1", step="(pick cup)", why="no_path"),
+    record(10, "plan.skipped", plot="plan_3", steps=["(pick cup)", "(put cup)"], why="the goal holds"),
+    record(11, "plan.excluded", step="(pick cup)", seconds=120.0, why="no_path"),
+    record(12, "plan.readmitted", steps=["(pick cup)"]),
+    record(13, "plan.rejected", step="(pick cup)", reason="(pick cup) ends in gone: gone", engine="fake"),
+    record(14, "plan.gave_up", plot="plan_3", reason="the budget of 2 new plans is used up: no_path"),
+    record(15, "end", finished=False, problem="nobody handles 'x'"),
 ]
 LINES = [
     "look", "plan with 1 steps (fake)", "step   1  (pick cup)", "rule  slipped: pick, retry",
     "no plan, timed_out: no plan within 5 s", "the plan no longer holds: (on cup) is false",
+    "the plan goes on at (pick cup): no_path", "left out (pick cup), (put cup): the goal holds",
+    "for 120 s no plan with (pick cup): no_path", "no plan without (pick cup)",
+    "a plan fails in the simulation: (pick cup) ends in gone: gone",
+    "gave up: the budget of 2 new plans is used up: no_path",
     "ended early: nobody handles 'x'",
 ]  # fmt: skip
 
@@ -55,7 +65,7 @@ def test_on_a_terminal_a_status_line_stands_below_the_same_lines(skill):
     console = Console(file=screen, force_terminal=True, width=100)
     tally = Tally()
     with LiveProgress(console, lambda: 4, tally) as progress:
-        for one in [*RECORDS, record(10, "action", action="start", id="a1", skill=skill, arguments={"item": "[cup]"})]:
+        for one in [*RECORDS, record(16, "action", action="start", id="a1", skill=skill, arguments={"item": "[cup]"})]:
             tally(one)
             progress(one)
     shown = screen.getvalue()

@@ -1,0 +1,226 @@
+"""The monitor by itself: what breaks a plan, what shortens it, whose doing counts when, and what costs nothing."""
+
+import pytest
+
+from knowledge_base import Delta, KnowledgeBase, fact
+from knowledge_base.language.parser import parse_condition
+from planning import PlanningDomain, PlanStep
+from planning.course import Course, shortest_end, thinned
+from planning.monitor import Broken, Monitor, Reached, Shorter
+
+DOMAIN = PlanningDomain.parse("""
+(define (domain parcels)
+  (:types room parcel robot)
+  (:predicates (at ?r - robot ?where - room) (in ?p - parcel ?where - room) (open ?r - room) (holding ?r - robot ?p - parcel)
+    (painted ?r - room) (urgent ?p - parcel))
+  (:functions (weight ?p - parcel))
+  (:action go :parameters (?r - robot ?from ?to - room) :precondition (and (at ?r ?from) (open ?to))
+    :effect (and (not (at ?r ?from)) (at ?r ?to)))
+  (:action take :parameters (?r - robot ?p - parcel ?where - room) :precondition (and (at ?r ?where) (in ?p ?where))
+    :effect (and (not (in ?p ?where)) (holding ?r ?p)))
+  (:action give :parameters (?r - robot ?p - parcel ?where - room) :precondition (and (at ?r ?where) (holding ?r ?p))
+    :effect (and (not (holding ?r ?p)) (in ?p ?where)))
+  (:action grow :parameters () :effect (forall (?p - parcel) (increase (weight ?p) (weight ?p)))))
+""")
+GOAL = parse_condition("(and (in p1 office) (in p2 office) (forall (?p - parcel) (imply (urgent ?p) (in ?p office))))")
+
+
+def step(text):
+    action, *args = text.split()
+    return PlanStep(action, tuple(args))
+
+
+STEPS = [
+    step(text)
+    for text in (
+        "take bob p1 store", "go bob store office", "give bob p1 office",
+        "go bob office store", "take bob p2 store", "go bob store office", "give bob p2 office",
+    )
+]  # fmt: skip
+
+
+class Watched:
+    """A plan with its monitor; `begin` says that a step begins, `change` that somebody changes the world."""
+
+    def __init__(self, steps=STEPS, goal=GOAL, before=None, facts=()):
+        self.kb = KnowledgeBase(DOMAIN.schema)
+        nodes = {"store": "room", "office": "room", "hall": "room", "p1": "parcel", "p2": "parcel", "p3": "parcel"}
+        known = "at bob store, in p1 store, in p2 store, in p3 store, open store, open office, open hall"
+        told = tuple(fact(*one.split()) for one in known.split(", "))
+        self.kb.apply(Delta(nodes={**nodes, "bob": "robot", "eve": "robot"}, added=(*told, *facts)), "test")
+        self.course = Course(steps, DOMAIN, goal, before)
+        self.news = []
+        self.monitor = Monitor(self.course, DOMAIN, self.kb, lambda author: author == "bob", self.news.append)
+        self.monitor.look("earlier")
+
+    def begin(self, number):
+        self.course.begin(number)
+        self.monitor.look("the steps before")
+
+    def change(self, author, *, gone="", now="", **more):
+        facts = [tuple(fact(*one.split()) for one in text.split(", ") if one) for text in (gone, now)]
+        return self.kb.apply(Delta(removed=facts[0], added=facts[1], **more), author)
+
+    def do(self, number):
+        """The robot carries out the step, as planned."""
+        self.kb.apply(DOMAIN.effects(self.course.steps[number - 1], self.kb), "bob")
+
+
+def test_what_a_late_step_needs_is_watched_from_the_beginning():
+    plan = Watched()
+    plan.begin(1)
+    change = plan.change("eve", gone="in p2 store")
+    (broken,) = plan.news
+    assert broken == Broken("(in p2 store) is false", "(in p2 store)", 5, "eve", change.version)
+
+
+def test_what_a_step_will_bring_is_not_missed_before():
+    plan = Watched()
+    plan.begin(1)
+    plan.change("eve", now="at bob office")
+    plan.change("eve", gone="at bob office")  # step 2 will bring it
+    assert plan.news == []
+
+
+@pytest.mark.parametrize(("author", "heard"), [("bob", 0), ("eve", 1)])
+def test_the_running_steps_own_doing_is_judged_when_it_has_ended(author, heard):
+    plan = Watched()
+    plan.begin(1)
+    plan.change(author, gone="open office")
+    assert len(plan.news) == heard
+    plan.change("bob", gone="in p1 store", now="holding bob p1")
+    plan.begin(2)
+    assert plan.news[0].needed == "(open office)"
+    assert plan.news[0].author == ("eve" if heard else "the steps before")
+
+
+def test_a_step_may_be_half_done_when_somebody_else_changes_something():
+    plan = Watched()
+    plan.begin(1)
+    plan.do(1)
+    plan.change("eve", gone="in p3 store", now="painted hall")
+    assert plan.news == []
+    plan.change("eve", gone="holding bob p1")  # what the step has brought already, for a later one
+    (broken,) = plan.news
+    assert (broken.needed, broken.user) == ("(holding bob p1)", 3)
+
+
+def test_a_thing_that_was_not_known_can_break_a_goal_about_all():
+    plan = Watched()
+    plan.begin(1)
+    plan.change("eve", now="urgent p4", nodes={"p4": "parcel"})
+    (broken,) = plan.news
+    assert (broken.user, broken.why) == (8, "(in p4 office) is false")
+
+
+def test_a_thing_that_is_gone_breaks_the_plan():
+    plan = Watched()
+    plan.begin(1)
+    plan.kb.apply(Delta(removed_nodes=("p2",)), "eve")
+    assert [type(one) for one in plan.news] == [Broken] * len(plan.news) != []
+
+
+def test_what_touches_no_link_is_not_looked_at(monkeypatch):
+    plan = Watched()
+    plan.begin(1)
+    looked = []
+    monkeypatch.setattr("planning.monitor.shortest_end", lambda *args: looked.append(args))
+    monkeypatch.setattr(Course, "stands", lambda *args: looked.append(args))
+    plan.change("eve", now="painted hall, painted office, in p3 hall", values={fact("weight", "p1"): 3.0})
+    assert looked == []
+    assert plan.news == []
+
+
+def test_the_goal_reached_by_somebody_else_is_heard_at_once():
+    plan = Watched()
+    plan.begin(1)
+    plan.change("eve", gone="in p1 store, in p2 store", now="in p1 office, in p2 office")
+    assert plan.news[-1] == Reached("eve")
+
+
+def test_what_somebody_else_did_already_is_skipped_when_the_next_step_begins():
+    plan = Watched()
+    plan.begin(1)
+    plan.do(1)
+    plan.change("eve", now="in p2 office")  # whoever is in two rooms at once: what counts is that the goal's part holds
+    assert plan.news == []
+    plan.begin(2)
+    assert plan.news == [Shorter((STEPS[1], STEPS[2]))]
+
+
+def test_steps_at_the_beginning_that_are_of_no_use_any_more_are_skipped():
+    plan = Watched()
+    plan.begin(1)
+    plan.do(1)
+    plan.begin(2)
+    plan.do(2)
+    plan.change("bob", gone="holding bob p1", now="in p1 office")
+    plan.begin(3)
+    assert plan.news == [Shorter(tuple(STEPS[3:]))]
+
+
+def test_a_plan_whose_numbers_cannot_be_taken_back_is_judged_at_every_change():
+    goal = parse_condition("(and (> (weight p1) 3) (open hall))")
+    plan = Watched([step("grow"), step("grow")], goal)
+    plan.news.clear()
+    plan.change("eve", values={fact("weight", "p1"): 1.0})
+    plan.change("bob", gone="open hall")
+    assert [one.author for one in plan.news] == []
+    plan.change("eve", now="painted hall")
+    assert [one.author for one in plan.news] == ["eve"]
+
+
+TWO = [
+    step(text)
+    for text in (
+        "take bob p1 store", "take eve p2 hall", "go bob store office", "go eve hall office", "give bob p1 office", "give eve p2 office",
+    )
+]  # fmt: skip
+SIDE_BY_SIDE = frozenset({(1, 3), (3, 5), (2, 4), (4, 6)})
+
+
+def test_steps_at_work_at_once_may_each_be_done_or_not():
+    plan = Watched(TWO, parse_condition("(and (in p1 office) (in p2 office))"), SIDE_BY_SIDE, (fact("at", "eve", "hall"), fact("in", "p2", "hall")))
+    plan.begin(1)
+    plan.begin(2)
+    assert plan.course.at_work == (1, 2)
+    plan.do(2)
+    plan.begin(4)
+    assert (plan.course.at_work, plan.course.left) == ((1, 4), (1, 3, 4, 5, 6))
+    plan.change("somebody", now="painted office")
+    assert plan.news == []
+    plan.change("somebody", gone="in p1 store")
+    assert [one.needed for one in plan.news] == ["(in p1 store)"]
+
+
+def test_the_shortest_end_and_what_can_be_left_out_of_a_plan():
+    plan = Watched(facts=[fact("in", "p1", "office")])
+    assert shortest_end(STEPS, DOMAIN, plan.kb, GOAL) == tuple(STEPS[4:])
+    assert thinned(STEPS, DOMAIN, plan.kb, GOAL) == tuple(STEPS[4:])
+    plan = Watched(facts=[fact("in", "p2", "office")])
+    assert shortest_end(STEPS, DOMAIN, plan.kb, GOAL) == tuple(STEPS)
+    assert thinned(STEPS, DOMAIN, plan.kb, GOAL) == tuple(STEPS[:3])
+    assert shortest_end(STEPS[1:], DOMAIN, Watched().kb, GOAL) is None
+
+
+def test_a_step_that_is_of_no_use_any_more_since_somebody_else_did_it_is_interrupted():
+    plan = Watched()
+    plan.begin(1)
+    plan.change("eve", gone="in p1 store", now="in p1 office")
+    assert plan.news == [Shorter(tuple(STEPS[4:]))]
+
+
+def test_steps_at_work_at_once_are_left_out_of_what_is_left_when_they_are_done():
+    plan = Watched(TWO, parse_condition("(and (in p1 office) (in p2 office))"), SIDE_BY_SIDE, (fact("at", "eve", "hall"), fact("in", "p2", "hall")))
+    plan.begin(1)
+    plan.begin(2)
+    assert plan.course.shortest_end(plan.kb) == tuple(TWO)
+    plan.do(2)
+    assert plan.course.shortest_end(plan.kb) == (TWO[0], *TWO[2:])
+
+
+def test_a_closed_monitor_says_nothing():
+    plan = Watched()
+    plan.monitor.close()
+    plan.change("eve", gone="in p2 store")
+    assert plan.news == []
