@@ -315,7 +315,7 @@ def test_a_stop_while_a_real_planner_process_hangs_leaves_no_process_behind():
     async def stop_when_it_works(sequencer):
         while planner._process is None or not planner._process.alive:  # noqa: ASYNC110  a process tells nobody that it is there
             await asyncio.sleep(0)
-        alive.append(planner._process._popen.pid)
+        alive.append(planner._process._pid)
         sequencer.post(Event("stop"))
 
     run = Run("(at c)", planner=planner, prepare=prepare)

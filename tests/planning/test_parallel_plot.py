@@ -267,13 +267,14 @@ def test_an_over_all_condition_that_is_lost_ends_the_step_at_once():
     assert entered[0] == (0.0, "step_1")
     assert entered[1] == (2.0, "replan")
     assert end.emitted[-1].name == "gave_up"
-    assert end.emitted[-1].attributes["reason"] == "lost during (screw-in a): (power)"
+    assert end.emitted[-1].attributes["reason"].endswith("lost during (screw-in a): (power)")
 
 
-def test_a_step_that_takes_too_long_leads_to_a_new_plan():
+def test_a_step_that_takes_too_long_is_ended_and_tried_again_a_bounded_number_of_times():
     entered, end = executed(SCREWING, "(on a)", (fact("free", "a"), fact("power")), Worker("worker", 50.0))
-    assert entered == [(0.0, "step_1"), (6.0, "replan")]
-    assert end.emitted[-1].attributes["reason"] == "too slow: (screw-in a)"
+    assert entered[:3] == [(0.0, "step_1"), (6.0, "replan"), (6.0, "step_1")]
+    assert end.emitted[-1].name == "gave_up"
+    assert end.emitted[-1].attributes["reason"].endswith("too slow: (screw-in a)")
 
 
 def test_a_component_says_whether_it_can_do_several_things_at_once():
