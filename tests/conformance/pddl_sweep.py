@@ -33,8 +33,8 @@ from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
-from planning.planner import PlannerProcess
 from planning.problem import pose
+from planning.race import PlannerRace
 
 PAGE = Path(__file__).parents[2] / "docs" / "pddl.md"
 TEST_FOLDER = Path(unified_planning.test.__path__[0])
@@ -133,7 +133,7 @@ def tried(pair: Pair, seconds: float) -> Result:
     """What becomes of one pair of files."""
     try:
         domain, problem = read(pair)
-        posed = pose(domain, world_of(domain, problem), problem.goal)
+        posed = pose(domain, world_of(domain, problem), problem.goal, problem.metric)
     except InputError as error:
         verdicts = [verdict for kind, verdict in REFUSED.items() if isinstance(error, kind)]
         said = str(error).replace(f"{pair.problem.parent}/", "")
@@ -175,7 +175,12 @@ def judged(pair: Pair, plan: Plan, domain: PlanningDomain, problem: ProblemText)
 def _timed(
     plan: Plan, instances: list[ActionInstance], domain: PlanningDomain, problem: ProblemText
 ) -> Iterator[tuple[Fraction, ActionInstance, Fraction | None]]:
-    """One step after the other, each as short as it may be."""
+    """As the engine says; if it does not, one step after the other, each as short as it may be."""
+    for timing, step, instance in zip(plan.schedule, plan.steps, instances, strict=bool(plan.schedule)):
+        lasts = domain.action(step).duration is not None
+        yield Fraction(str(timing.start)), instance, Fraction(str(timing.duration)) if lasts else None
+    if plan.schedule:
+        return
     world, now = world_of(domain, problem), PAUSE
     for step, instance in zip(plan.steps, instances, strict=True):
         duration = domain.action(step).duration
@@ -191,7 +196,7 @@ def _durative(domain: PlanningDomain) -> bool:
 
 
 async def _solved(posed: Any, seconds: float) -> PlanningOutcome:
-    planner = PlannerProcess()
+    planner = PlannerRace()
     try:
         return await planner.solve(posed, seconds)
     finally:
