@@ -34,6 +34,10 @@ _EXHAUSTED = (
 )
 
 
+_NO_MEMORY = ("OutOfMemoryError", "insufficient memory")
+"""What Java says."""
+
+
 class Pyperplan(EngineImpl):  # type: ignore[misc]  # the package has no types
     """pyperplan, with greedy best-first search and h_FF, giving the same plan for the same problem.
 
@@ -77,7 +81,8 @@ def _actions(result: PlanGenerationResult) -> list[int] | None:
     """Indices into the problem's actions, or `None` if it is proven that there is no plan.
 
     Raises:
-        RuntimeError: the engine ended without saying either.
+        MemoryError: the engine says that it ran out of it.
+        RuntimeError: it ended without saying anything of this.
     """
     if isinstance(result.plan, TimeTriggeredPlan):
         timed = sorted(result.plan.timed_actions, key=_start)
@@ -86,8 +91,10 @@ def _actions(result: PlanGenerationResult) -> list[int] | None:
         return [int(step.action.name[1:]) for step in result.plan.actions]
     if result.status in _EXHAUSTED:
         return None
-    said = " ".join(str(message.message) for message in result.log_messages or ()).split()
-    raise RuntimeError(f"it ended with status {result.status.name} {' '.join(said)[-200:]}".rstrip())
+    said = " ".join(str(message.message) for message in result.log_messages or ())
+    if any(words in said for words in _NO_MEMORY):
+        raise MemoryError
+    raise RuntimeError(f"it ended with status {result.status.name} {' '.join(said.split())[-200:]}".rstrip())
 
 
 def _start(timed: Any) -> Any:

@@ -14,6 +14,7 @@ standard input does, and the search with it: a planner never outlives who asked.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import gc
 import json
 import os
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
     from planning.strips import Problem
 
+_PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
+
 MEGABYTES = 2048
 """Memory that a search may take, each of its processes by itself, if nobody says otherwise."""
 
@@ -39,6 +42,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one who asked
     name, megabytes = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else MEGABYTES
     out = _claim_stdout()
+    _adopt_orphans()
     search = _loaded(name)
     gc.freeze()  # what is there now is shared by all searches
     _say(out, {"ready": True})
@@ -51,6 +55,12 @@ def _claim_stdout() -> int:
     out = os.dup(1)
     os.dup2(2, 1)
     return out
+
+
+def _adopt_orphans() -> None:
+    """What a search has started and left is ours to bury (Linux); in a container often nobody else does."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 def _say(out: int, said: dict[str, Any]) -> None:
@@ -129,7 +139,11 @@ def _reaped(child: int) -> int:
     """Its exit status, negative for a signal; what it has left running is gone."""
     os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)  # while it is a zombie, its group's number is taken
     _kill_group(child)
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    with contextlib.suppress(ChildProcessError):  # that was the last of the group
+        while True:
+            os.waitpid(-child, 0)
+    return status
 
 
 def _kill_group(group: int) -> None:
@@ -169,7 +183,9 @@ def _limit_memory(megabytes: int) -> None:
     """
     allowed = megabytes << 20
     resource.setrlimit(resource.RLIMIT_DATA, (allowed, allowed))
-    os.environ["JAVA_TOOL_OPTIONS"] = f"-Xmx{max(16, megabytes * 3 // 4)}m"  # an honest error before the limit's
+    # Half of it as heap, so that Java says itself that it has no more; should it crash, it writes no files for that.
+    unwritten = "-XX:ErrorFile=/dev/null -XX:ReplayDataFile=/dev/null"
+    os.environ["JAVA_TOOL_OPTIONS"] = f"-Xmx{max(16, megabytes // 2)}m {unwritten}"
 
 
 def _answer(line: bytes, search: Callable[[Problem], Iterator[list[int] | None]], said: int) -> None:

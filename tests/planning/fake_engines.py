@@ -68,15 +68,18 @@ def descendants(pid):
     return found
 
 
-def session(pid):
-    """All processes of the session that this one leads or led, also those whose parents are gone."""
+def session(pid, dead=""):
+    """All processes of the session that this one leads or led, also those whose parents are gone.
+
+    `dead` is the states of those that do not count: `ZX` for all that are not alive.
+    """
     found = set()
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             state, _, _, leader = stat.read_text().rpartition(")")[2].split()[:4]
         except OSError:
             continue
-        if int(leader) == pid and state not in "ZX":
+        if int(leader) == pid and state not in dead:
             found.add(int(stat.parent.name))
     return found
 

@@ -209,4 +209,4 @@ def test_however_two_engines_behave_there_is_an_outcome_a_plan_is_valid_and_noth
     else:
         assert isinstance(found, EngineFailed | TimedOut)
         assert FIRST.name in found.engine or SECOND.name in found.engine
-    assert all(gone(session(pid)) for pid in workers)
+    assert all(gone(session(pid, dead="ZX")) for pid in workers)

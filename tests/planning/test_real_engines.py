@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from fake_engines import PROBLEM, descendants, gone, lights_out
+from fake_engines import PROBLEM, descendants, gone, lights_out, session
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.parser import parse_condition
@@ -130,6 +130,19 @@ def test_a_search_that_is_ended_leaves_nothing_behind(process_of, name):
     assert family
     assert gone(family)
     assert process.alive
+    assert session(process._pid) == {process._pid}  # nor is anything left unburied
+
+
+def test_java_without_enough_memory_fails_and_leaves_no_files(tmp_path, monkeypatch):
+    if lacks := BY_NAME["enhsp"].lacks():
+        pytest.skip(f"enhsp: {lacks}")
+    monkeypatch.chdir(tmp_path)
+    process = EngineProcess(worker("enhsp", megabytes=180))
+    process.start(60)
+    (answer,) = answers(process, lights_out(40))
+    assert "failed" in answer  # in which of its parts Java notices first differs
+    process.kill()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", NAMES)
