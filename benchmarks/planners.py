@@ -25,13 +25,13 @@ from typing import Any
 
 import set_table
 
+from planning.engines.planner import PlannerProcess
+from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, installed
-from planning.order import deordered
+from planning.generation.plot import plot_from_plan
+from planning.ordering.order import deordered
 from planning.plan import Plan, PlanFound
-from planning.planner import PlannerProcess
-from planning.plot import plot_from_plan
-from planning.problem import Poser, pose
-from planning.race import PlannerRace
+from planning.posing.problem import Poser, pose
 from planning.strips import Problem
 from planning.validation import validate
 

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from knowledge_base.exchange.pddl import ProblemText
     from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
-    from planning.order import PartialOrder
+    from planning.engines.planner import PlannerProcess
+    from planning.engines.race import PlannerRace
+    from planning.ordering.order import PartialOrder
     from planning.plan import Plan, PlanningOutcome
-    from planning.planner import PlannerProcess
-    from planning.race import PlannerRace
     from planning.strips import Problem
 
 FOUND, UNSOLVABLE, TIMED_OUT, FAILED = 0, 1, 3, 4
@@ -53,10 +53,10 @@ def plan_command(
 
     Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
     """
-    from planning.explain import why_unsolvable
-    from planning.order import deordered
+    from planning.ordering.order import deordered
     from planning.plan import PlanFound, ProvenUnsolvable
-    from planning.problem import pose
+    from planning.posing.problem import pose
+    from planning.posing.unsolvable import why_unsolvable
 
     domain, read, world = _read(files)
     problem = pose(domain, world, read.goal, read.metric)
@@ -78,7 +78,7 @@ def doctor_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Show which planning engines there are, what each can do, and how to install what is missing."""
-    from planning.doctor import findings
+    from planning.engines.doctor import findings
 
     found = findings()
     if as_json:
@@ -135,9 +135,9 @@ def _solve(problem: Problem, seconds: float, engine: str | None) -> PlanningOutc
 def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRace:
     """The named engine, if it can do the problem and is installed; else a race."""
     from knowledge_base.errors import InputError, UnknownNameError
+    from planning.engines.planner import PlannerProcess
+    from planning.engines.race import PlannerRace
     from planning.engines.registry import ENGINES, able
-    from planning.planner import PlannerProcess
-    from planning.race import PlannerRace
 
     if engine is None:
         return PlannerRace()
@@ -183,7 +183,7 @@ def _answer(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
 
 def _ordered(order: PartialOrder) -> dict[str, Any]:
     """The chains that can go side by side, and what each step waits for; steps are numbered from 1."""
-    from planning.chains import chains
+    from planning.ordering.chains import chains
 
     linked = {(link.provider, link.user) for link in order.links}
     found = chains(order.earlier, lambda one, other: (one, other) in linked)
@@ -206,7 +206,7 @@ def _purposes(order: PartialOrder) -> dict[str, Any]:
 def _write_plot(file: Path, plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> None:
     from dsc.text.plots import plot_to_yaml
     from knowledge_base.errors import InputError
-    from planning.plot import plot_from_plan
+    from planning.generation.plot import plot_from_plan
 
     text = plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))
     try:

@@ -27,7 +27,7 @@ from knowledge_base.language.expression import (
 from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.schema import ROOT_TYPE, Schema
 from planning.fragments import merged_text, searched, text_of
-from planning.relevance import effect_leaves
+from planning.posing.relevance import effect_leaves
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -22,15 +22,15 @@ from knowledge_base.compatibility import require_extension
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
-from planning.cache import CachingPlanner
-from planning.component import PlanningComponent
 from planning.domain import PlanningDomain
-from planning.foresight import Foresight
+from planning.engines.cache import CachingPlanner
+from planning.engines.planner import Planner, PlannerProcess
+from planning.engines.race import PlannerRace
+from planning.execution.component import PlanningComponent
+from planning.execution.foresight import Foresight
 from planning.fragments import shipped_by
 from planning.implementations import check_implementations
-from planning.planner import Planner, PlannerProcess
-from planning.problem import check_goal
-from planning.race import PlannerRace
+from planning.posing.problem import check_goal
 
 Prepare = Callable[[Sequencer], None]
 """Called before a run starts, e.g. to post events or to keep the sequencer at hand."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from knowledge_base.facts import Fact
 from planning.plan import Plan, PlanStep
-from planning.quantities import Assignment, Bound, Numbers, from_json, to_json
+from planning.posing.quantities import Assignment, Bound, Numbers, from_json, to_json
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -78,7 +78,7 @@ class GroundAction:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What an engine is asked; made by `planning.problem.pose`.
+    """What an engine is asked; made by `planning.posing.problem.pose`.
 
     Attributes:
         domain: the planning domain's name.

@@ -9,8 +9,8 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation import World, explain, holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
-from planning.derived import derivation
 from planning.plan import Plan
+from planning.posing.derived import derivation
 
 if TYPE_CHECKING:
     from planning.domain import PlanningDomain

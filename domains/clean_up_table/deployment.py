@@ -23,8 +23,8 @@ from dsc.text.plots import load_library
 from dsc.trace import Listener, Record
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
+from planning.engines.planner import Planner
 from planning.executive import Executive
-from planning.planner import Planner
 
 HOME = Path(str(files("domains.clean_up_table")))
 MAIN_PLOT = "clean_up_table"

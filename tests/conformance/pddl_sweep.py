@@ -31,10 +31,10 @@ from knowledge_base.exchange.pddl import ProblemText, read_problem
 from knowledge_base.language.evaluation import evaluate_term
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
+from planning.engines.race import PlannerRace
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
-from planning.problem import pose
-from planning.race import PlannerRace
+from planning.posing.problem import pose
 
 PAGE = Path(__file__).parents[2] / "docs" / "pddl.md"
 TEST_FOLDER = Path(unified_planning.test.__path__[0])

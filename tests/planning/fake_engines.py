@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 from knowledge_base.facts import Fact
+from planning.engines.planner import PlannerProcess
 from planning.plan import PlanStep
-from planning.planner import PlannerProcess
 from planning.strips import GroundAction, Problem
 
 READY = "import json, sys, time, os, signal\nprint('{\"ready\": true}', flush=True)\n"

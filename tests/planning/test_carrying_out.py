@@ -11,8 +11,8 @@ from obedient_robot import FAILED, ObedientRobot, plots
 from dsc import Event, parse_plot
 from knowledge_base import Delta, fact
 from planning import Executive, Plan, PlannerProcess, PlanningDomain, PlanStep
+from planning.execution.telling import why_broken
 from planning.plan import EngineFailed, PlanFound
-from planning.telling import why_broken
 from planning.validation import Validation
 
 DOMAIN = PlanningDomain.parse("""
@@ -288,7 +288,7 @@ class Bad:
 )  # fmt: skip
 def test_a_planner_that_misbehaves_ends_in_no_plan_and_is_named(how, said, monkeypatch):
     if how == "hangs":
-        monkeypatch.setattr("planning.search.PATIENCE", -5.0)  # so that its five seconds of real time are over at once
+        monkeypatch.setattr("planning.execution.search.PATIENCE", -5.0)  # so that its five seconds of real time are over at once
     planner = Bad(how)
     run = Run("(at c)", planner=planner)
     assert run.end.finished

@@ -12,7 +12,7 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from planning import Executive, PlanningDomain, PlanStep
 from planning.plan import PlanFound
-from planning.problem import pose
+from planning.posing.problem import pose
 
 THINGS = ("x", "y", "z")
 PREDICATES = ("p", "q", "r", "s")

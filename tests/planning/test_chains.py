@@ -5,8 +5,8 @@ from itertools import combinations, pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planning.chains import chains
-from planning.order import PartialOrder
+from planning.ordering.chains import chains
+from planning.ordering.order import PartialOrder
 from planning.plan import PlanStep
 
 

@@ -200,7 +200,7 @@ def test_a_failed_engine_has_a_status_of_its_own(run, monkeypatch):
         async def close(self):
             pass
 
-    monkeypatch.setattr("planning.race.PlannerRace", Broken)
+    monkeypatch.setattr("planning.engines.race.PlannerRace", Broken)
     result = run()
     assert result.exit_code == 4
     assert "it fell over" in result.stderr

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from knowledge_base.language.parser import parse_condition
-from planning.constructs import numeric_constructs, why_no_engine
 from planning.domain import PlanningDomain
+from planning.posing.constructs import numeric_constructs, why_no_engine
 
 JARS = """(define (domain jars) (:types jar)
   (:predicates (sealed ?j - jar) (full ?j - jar) (washed ?j - jar))

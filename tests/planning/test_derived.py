@@ -12,12 +12,12 @@ from knowledge_base.facts import Delta, fact
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
-from planning.derived import derivation
 from planning.domain import PlanningDomain
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
-from planning.explain import why_unsolvable
 from planning.plan import Plan, PlanStep
-from planning.problem import pose
+from planning.posing.derived import derivation
+from planning.posing.problem import pose
+from planning.posing.unsolvable import why_unsolvable
 from planning.validation import validate
 
 ROOMS = """(define (domain rooms) (:types room robot thing)

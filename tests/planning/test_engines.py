@@ -16,7 +16,7 @@ from knowledge_base.facts import Fact
 from knowledge_base.language.parser import parse_condition
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.plan import PlanStep
-from planning.problem import pose
+from planning.posing.problem import pose
 from planning.strips import GroundAction, Problem
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")

@@ -14,7 +14,7 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.overlay import Overlay
 from planning.plan import PlanStep
-from planning.problem import Poser, pose
+from planning.posing.problem import Poser, pose
 from planning.validation import validate
 
 

@@ -5,7 +5,7 @@ import pytest
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.parser import parse_condition
-from planning.explain import why_unsolvable
+from planning.posing.unsolvable import why_unsolvable
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
 

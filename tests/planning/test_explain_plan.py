@@ -4,7 +4,7 @@ import pytest
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.parser import parse_condition
-from planning.explain_plan import purposes
+from planning.ordering.purposes import purposes
 from planning.plan import Plan, PlanStep
 
 GOAL = parse_condition("(and (tidy cup1) (hand-free))")

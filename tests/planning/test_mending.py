@@ -6,7 +6,7 @@ from breadth_first import BreadthFirst
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.parser import parse_condition
 from planning import Plan, PlanningDomain, PlanStep, validate
-from planning.mending import mending
+from planning.execution.mending import mending
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain shopping)

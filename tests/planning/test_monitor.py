@@ -5,8 +5,8 @@ import pytest
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.parser import parse_condition
 from planning import PlanningDomain, PlanStep
-from planning.course import Course, shortest_end, thinned
-from planning.monitor import Broken, Monitor, Reached, Shorter
+from planning.execution.course import Course, shortest_end, thinned
+from planning.execution.monitor import Broken, Monitor, Reached, Shorter
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain parcels)
@@ -124,7 +124,7 @@ def test_what_touches_no_link_is_not_looked_at(monkeypatch):
     plan = Watched()
     plan.begin(1)
     looked = []
-    monkeypatch.setattr("planning.monitor.shortest_end", lambda *args: looked.append(args))
+    monkeypatch.setattr("planning.execution.monitor.shortest_end", lambda *args: looked.append(args))
     monkeypatch.setattr(Course, "stands", lambda *args: looked.append(args))
     plan.change("eve", now="painted hall, painted office, in p3 hall", values={fact("weight", "p1"): 3.0})
     assert looked == []

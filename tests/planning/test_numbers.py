@@ -14,10 +14,10 @@ from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
-from planning.explain import why_unsolvable
 from planning.plan import PlanStep
-from planning.problem import pose
-from planning.quantities import Assignment, Bound, Operation, linear, text
+from planning.posing.problem import pose
+from planning.posing.quantities import Assignment, Bound, Operation, linear, text
+from planning.posing.unsolvable import why_unsolvable
 from planning.strips import Problem
 from planning.validation import validate
 

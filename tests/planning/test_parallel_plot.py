@@ -11,9 +11,9 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.printer import to_text
 from planning import Executive, Plan, PlanningDomain, PlanStep, plot_from_plan
-from planning.order import PartialOrder, deordered
+from planning.generation.usage import fitting, usage
+from planning.ordering.order import PartialOrder, deordered
 from planning.plan import PlanFound, Timing
-from planning.usage import fitting, usage
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain lamps)

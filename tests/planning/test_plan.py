@@ -92,7 +92,7 @@ def oracle(domain_file, clean_up):
 
 def _applicable(domain, world):
     """All applicable steps, found by trying every choice of arguments."""
-    from planning.conditions import Grounder
+    from planning.posing.conditions import Grounder
 
     grounder = Grounder(world, frozenset())
     found = []

@@ -18,7 +18,7 @@ from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.errors import UnsupportedActionError
 from planning.plan import PlanStep
-from planning.problem import Poser, pose
+from planning.posing.problem import Poser, pose
 from planning.strips import Problem
 from planning.validation import validate
 

@@ -12,9 +12,9 @@ from fake_engines import SECOND as B
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, able, chosen, engine
 from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
-from planning.race import PlannerRace
 
 FIRST, SECOND = ENGINES[:2]
 

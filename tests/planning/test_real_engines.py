@@ -13,7 +13,7 @@ from planning.domain import PlanningDomain
 from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, worker
 from planning.engines.registry import ENGINES
 from planning.plan import PlanStep
-from planning.problem import pose
+from planning.posing.problem import pose
 from planning.strips import GroundAction, Problem
 
 NAMES = [

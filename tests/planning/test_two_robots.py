@@ -8,7 +8,7 @@ from trace_replay import Replay
 
 from domains.simulation import uniform
 from knowledge_base.overlay import Overlay
-from planning.planner import PlannerProcess
+from planning.engines.planner import PlannerProcess
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "two_tables.py"
 

@@ -13,7 +13,7 @@ from searching import solution
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.printer import to_text
 from planning.plan import Plan, PlanStep
-from planning.problem import pose
+from planning.posing.problem import pose
 from planning.validation import validate
 
 

@@ -1,0 +1,159 @@
+"""Several engines at once, for real time: the first valid plan wins, and a cheaper one may follow.
+
+In simulated time one named engine plans (`planning.engines.planner.PlannerProcess`), so that a run can be repeated;
+who wins a race depends on the machine.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import aclosing
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from planning.engines.planner import PlannerProcess
+from planning.engines.registry import able, chosen, installed
+from planning.plan import EngineFailed, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.strips import Problem
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
+
+    from planning.engines.registry import Engine
+
+_PLAIN = Problem("", {}, (), (), ())
+
+_Answer = tuple[str, PlanningOutcome | None]
+"""Who says it, and what; nothing when it has said everything."""
+
+
+class PlannerRace:
+    """A planner that lets the engines race that suit a problem: at most two, by its features and size.
+
+    Each engine is kept warm in a process of its own. A new problem ends the search for a better plan for the one
+    before; where no plan was found yet, it waits.
+
+    Args:
+        choose: the engines for a problem, the preferred one first.
+        make: the planner for an engine.
+    """
+
+    def __init__(
+        self,
+        *,
+        choose: Callable[[Problem], Sequence[Engine]] = chosen,
+        make: Callable[[str], PlannerProcess] = PlannerProcess,
+    ) -> None:
+        self._choose = choose
+        self._make = make
+        self._planners: dict[str, PlannerProcess] = {}
+        self._improving: set[asyncio.Task[None]] = set()
+
+    async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
+        """The first valid plan within `seconds` of real time, or what all engines together have to say.
+
+        `failures` of the outcome has those that failed, whoever won. If all failed, so does the race; its
+        `engine` and `message` name each.
+        """
+        async with aclosing(self.plans(problem, seconds)) as plans:
+            return await anext(plans)
+
+    async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+        """As `solve`, and then each cheaper plan that one of the engines finds in the rest of the time.
+
+        Closing it ends all searches: `async with contextlib.aclosing(...)`.
+        """
+        engines = self._choose(problem)
+        if not engines:
+            yield _nobody(problem)
+            return
+        for task in self._improving:
+            task.cancel()
+        answers: asyncio.Queue[_Answer] = asyncio.Queue()
+        tasks = {asyncio.create_task(_run(self._planner(one.name), problem, seconds, answers)) for one in engines}
+        try:
+            async with aclosing(_better_and_better(answers, len(tasks), seconds)) as outcomes:
+                async for outcome in outcomes:
+                    self._improving |= tasks
+                    yield outcome
+        finally:
+            self._improving -= tasks
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def warm_up(self, problem: Problem | None = None) -> None:
+        """Start the engines for a problem (one of plain STRIPS if none is given), so that the first does not wait."""
+        engines = self._choose(problem or _PLAIN)
+        await asyncio.gather(*(self._planner(one.name).warm_up() for one in engines))
+
+    async def close(self) -> None:
+        """End all processes; a later `solve` would start new ones."""
+        self.kill()
+
+    def kill(self) -> None:
+        """As `close`, without a loop."""
+        for planner in self._planners.values():
+            planner.kill()
+
+    def _planner(self, name: str) -> PlannerProcess:
+        if name not in self._planners:
+            self._planners[name] = self._make(name)
+        return self._planners[name]
+
+
+async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answers: asyncio.Queue[_Answer]) -> None:
+    try:
+        async with aclosing(planner.plans(problem, seconds)) as plans:
+            async for outcome in plans:
+                answers.put_nowait((planner.engine, outcome))
+    except Exception as error:  # noqa: BLE001  whatever one engine's planner does, the other goes on
+        answers.put_nowait((planner.engine, EngineFailed(planner.engine, f"{type(error).__name__}: {error}")))
+    finally:
+        answers.put_nowait((planner.engine, None))
+
+
+async def _better_and_better(
+    answers: asyncio.Queue[_Answer], running: int, seconds: float
+) -> AsyncGenerator[PlanningOutcome, None]:
+    """The first plan or proof, then each cheaper plan; if there is neither, what became of everybody."""
+    best: PlanFound | None = None
+    failures: list[EngineFailed] = []
+    late: list[str] = []
+    while running:
+        name, outcome = await answers.get()
+        match outcome:
+            case None:
+                running -= 1
+            case PlanFound() if best is None or outcome.cost < best.cost:
+                best = replace(outcome, failures=tuple(failures))
+                yield best
+            case ProvenUnsolvable() if best is None:
+                yield replace(outcome, failures=tuple(failures))
+                return
+            case EngineFailed():
+                failures.append(outcome)
+            case TimedOut():
+                late.append(name)
+    if best is None and late:
+        yield TimedOut(_names(late), seconds, tuple(failures))
+    elif best is None:
+        yield _all_failed(failures)
+
+
+def _all_failed(failures: Sequence[EngineFailed]) -> EngineFailed:
+    if len(failures) == 1:
+        return failures[0]
+    said = "; ".join(f"{one.engine}: {one.message}" for one in failures)
+    return EngineFailed(_names(one.engine for one in failures), said)
+
+
+def _nobody(problem: Problem) -> EngineFailed:
+    needed = ", ".join(sorted(problem.features)) or "STRIPS"
+    ways = [f"{one.name} ({one.lacks()})" for one in able(problem.features) if one.races and not installed(one)]
+    could = f"; these could: {', '.join(ways)}" if ways else "; nor is there one that could be"
+    return EngineFailed("none", f"no engine that can do {needed} is installed{could}")
+
+
+def _names(names: Iterable[str]) -> str:
+    return ", ".join(sorted(names))

@@ -1,0 +1,1 @@
+"""Carrying plans out: watched, mended, replaced, given up."""

@@ -1,0 +1,164 @@
+"""A plan being carried out: what is done, at work and left, and whether what is left still leads to the goal."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+
+from knowledge_base.errors import InputError
+from knowledge_base.language.evaluation import World, holds
+from knowledge_base.language.expression import Expression
+from knowledge_base.overlay import Overlay
+from planning.domain import PlanningDomain
+from planning.execution.needs import Needs
+from planning.plan import PlanStep
+
+_MOST_AT_WORK = 3
+"""Of so many steps at work, each is looked at as not begun and as done; of more, only all of them."""
+
+
+def leads_to(steps: Iterable[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> bool:
+    """Whether the steps, taken in this order from `world`, reach the goal; `world` stays as it is."""
+    ahead = Overlay(world)
+    try:
+        for step in steps:
+            if not domain.applicable(step, ahead):
+                return False
+            ahead.apply(domain.effects(step, ahead))
+        return holds(goal, ahead)
+    except InputError:  # something is not there any more, or cannot be computed
+        return False
+
+
+def shortest_end(
+    steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
+) -> tuple[PlanStep, ...] | None:
+    """The fewest last steps that lead to the goal from `world`; `None` if not even all of them do."""
+    ends = (tuple(steps[first:]) for first in range(len(steps), -1, -1))
+    return next((end for end in ends if leads_to(end, domain, world, goal)), None)
+
+
+def thinned(steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> tuple[PlanStep, ...]:
+    """A plan without steps that are of no use: each is left out, with what then cannot be done, if the goal is reached.
+
+    Action elimination (Nakhost & Müller 2010); the result is a plan whenever `steps` are one.
+    """
+    kept, number = tuple(steps), 0
+    while number < len(kept):
+        without = (*kept[:number], *_possible(kept[:number], kept[number + 1 :], domain, world))
+        if leads_to(without, domain, world, goal):
+            kept = without
+        else:
+            number += 1
+    return kept
+
+
+def _possible(
+    first: Iterable[PlanStep], then: Iterable[PlanStep], domain: PlanningDomain, world: World
+) -> Iterator[PlanStep]:
+    """Those of `then` that can be taken after `first`, the others left out."""
+    ahead = Overlay(world)
+    for step in first:
+        ahead.apply(domain.effects(step, ahead))
+    for step in then:
+        if domain.applicable(step, ahead):
+            ahead.apply(domain.effects(step, ahead))
+            yield step
+
+
+class Course:
+    """How far a plan is; steps are spoken of by their number, from 1.
+
+    A step is done when one that has to come after it has begun: nobody begins a step too early.
+
+    Args:
+        steps: the plan's steps.
+        domain: has their conditions and effects.
+        goal: what they are for.
+        before: pairs of steps of which the first has to be done when the second begins; each pair of the
+            sequence if left out.
+    """
+
+    def __init__(
+        self,
+        steps: Sequence[PlanStep],
+        domain: PlanningDomain,
+        goal: Expression,
+        before: AbstractSet[tuple[int, int]] | None = None,
+    ) -> None:
+        self.steps = tuple(steps)
+        self.goal = goal
+        self._domain = domain
+        self._needs = Needs(self.steps, domain, goal)
+        self._before = before
+        self._begun: set[int] = set()
+        self._done: set[int] = set()
+
+    def begin(self, number: int) -> None:
+        """A step has begun."""
+        self._begun.add(number)
+        agenda = [number]
+        while agenda:
+            later = agenda.pop()
+            earlier = self._earlier(later) - self._done
+            self._done |= earlier
+            agenda += earlier
+
+    def _earlier(self, later: int) -> set[int]:
+        if self._before is None:
+            return set(range(1, later))
+        return {first for first, second in self._before if second == later}
+
+    @property
+    def at_work(self) -> tuple[int, ...]:
+        """The steps that have begun and are not known to be done."""
+        return tuple(sorted(self._begun - self._done))
+
+    @property
+    def left(self) -> tuple[int, ...]:
+        """The steps that are not done, those at work among them, in an order in which they can be taken."""
+        return tuple(number for number in range(1, len(self.steps) + 1) if number not in self._done)
+
+    @property
+    def left_steps(self) -> tuple[PlanStep, ...]:
+        """The steps with the numbers of `left`."""
+        return self._of(self.left)
+
+    def needed(self) -> Mapping[Expression, int] | None:
+        """What must hold now, with who needs it first; `None` if that cannot be written as conditions.
+
+        A step at work may have done its part already, so that what later steps need of it counts as well.
+        """
+        return self._needs.before(self.left)
+
+    def needed_later(self) -> Mapping[Expression, int] | None:
+        """As `needed`, as if everything at work were done."""
+        return self._needs.before(self._after(self.at_work))
+
+    def stands(self, world: World) -> bool:
+        """Whether the goal is reached from `world`; each step at work may not have begun or be done."""
+        return any(leads_to(steps, self._domain, world, self.goal) for steps in self._ways_on())
+
+    def shortest_end(self, world: World) -> tuple[PlanStep, ...] | None:
+        """The fewest last steps that lead to the goal from `world`, each step at work among them or not."""
+        ends = (shortest_end(steps, self._domain, world, self.goal) for steps in self._ways_on())
+        return min((end for end in ends if end is not None), key=len, default=None)
+
+    def coming(self) -> tuple[PlanStep, ...]:
+        """The steps that have not begun."""
+        return self._of(self._after(self.at_work))
+
+    def _ways_on(self) -> Iterator[tuple[PlanStep, ...]]:
+        """What may be left to do."""
+        at_work = self.at_work
+        sizes = range(len(at_work) + 1) if len(at_work) <= _MOST_AT_WORK else (0, len(at_work))
+        finished = itertools.chain.from_iterable(itertools.combinations(at_work, size) for size in sizes)
+        return (self._of(self._after(done)) for done in finished)
+
+    def _after(self, done: Iterable[int]) -> tuple[int, ...]:
+        gone = set(done)
+        return tuple(number for number in self.left if number not in gone)
+
+    def _of(self, numbers: Iterable[int]) -> tuple[PlanStep, ...]:
+        return tuple(self.steps[number - 1] for number in numbers)

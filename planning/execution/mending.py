@@ -1,0 +1,89 @@
+"""A plan that does not hold any more is mended where that takes little: what comes next stays as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+
+from knowledge_base.errors import InputError
+from knowledge_base.language.evaluation import World, holds
+from knowledge_base.language.expression import And, Expression
+from planning.domain import PlanningDomain
+from planning.execution.needs import Needs
+from planning.plan import Plan, PlanStep
+from planning.posing.problem import pose
+from planning.strips import Problem
+from planning.validation import validate
+
+MOST_LONGER = 2
+"""A mended plan is taken if it has at most so many steps more than what was left."""
+_MOST_UNMET = 3
+"""An end of a plan that lacks more than so many conditions is not worth asking about."""
+_MOST_LEFT_OUT = 2
+"""So many of the first steps may be done in another way than planned."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mending:
+    """The end of a plan to be kept, and the problem of making it possible again."""
+
+    end: tuple[PlanStep, ...]
+    problem: Problem
+
+    def mended(
+        self, first: Plan, before: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
+    ) -> Plan | None:
+        """The plan that begins with the solution `first`, if it leads to the goal and is not much longer."""
+        plan = Plan((*first.steps, *self.end))
+        short = len(plan.steps) <= len(before) + MOST_LONGER
+        return plan if short and validate(plan, domain, world, goal).valid else None
+
+
+def mending(
+    before: Sequence[PlanStep],
+    excluded: AbstractSet[PlanStep],
+    domain: PlanningDomain,
+    world: World,
+    goal: Expression,
+) -> Mending | None:
+    """How to mend what is left of a plan, if that promises to take little.
+
+    Of the ends of the plan the one that is nearest to being possible is kept; the problem is to reach what it needs.
+
+    Args:
+        before: the steps that are left of the plan.
+        excluded: steps that shall not be taken.
+        domain: has the steps' conditions and effects.
+        world: the present.
+        goal: what the plan is for.
+    """
+    ends = [(end, _needed(end, domain, goal)) for end in _ends(before) if not excluded & set(end)]
+    near = [
+        (unmet + len(end), end, needed)
+        for end, needed in ends
+        if needed is not None and (unmet := sum(not _true(one, world) for one in needed)) <= _MOST_UNMET
+    ]
+    if not near:
+        return None
+    _, end, needed = min(near, key=lambda one: one[0])
+    try:
+        problem = pose(domain, world, And(tuple(needed)))
+    except InputError:  # what the end needs cannot be asked for
+        return None
+    return None if problem.unreachable else Mending(end, problem)
+
+
+def _ends(steps: Sequence[PlanStep]) -> list[tuple[PlanStep, ...]]:
+    return [tuple(steps[first:]) for first in range(min(_MOST_LEFT_OUT + 1, len(steps)))]
+
+
+def _needed(end: tuple[PlanStep, ...], domain: PlanningDomain, goal: Expression) -> Iterable[Expression] | None:
+    return Needs(end, domain, goal).before(tuple(range(1, len(end) + 1)))
+
+
+def _true(condition: Expression, world: World) -> bool:
+    try:
+        return holds(condition, world)
+    except InputError:
+        return False

@@ -1,0 +1,208 @@
+"""Watching a plan that is carried out: what its steps need of the world is installed in the knowledge base.
+
+A change that touches nothing of it costs nothing. What the running step or a rule changes is judged when the step has
+ended, that is when the next one begins; what anybody else changes is judged at once (S4.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from knowledge_base.conditions.condition import Condition, Firing
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Change
+from knowledge_base.language.evaluation import holds
+from knowledge_base.language.expression import Atom, Expression
+from knowledge_base.language.printer import to_text
+from knowledge_base.store import KnowledgeBase
+from planning.domain import PlanningDomain
+from planning.execution.course import Course, shortest_end, thinned
+from planning.execution.regression import conjuncts
+from planning.generation.steps import expectation
+from planning.plan import Plan, PlanStep
+from planning.validation import validate
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """What is left of the plan does not lead to the goal any more.
+
+    Attributes:
+        why: what does not hold when its turn comes, in PDDL.
+        needed: the condition on the present that is broken, as text; empty if it has no single one.
+        user: number of the first step that needs it; one more than the plan has for the goal.
+        author: who changed it.
+        version: the knowledge base's version since when.
+    """
+
+    why: str
+    needed: str
+    user: int
+    author: str
+    version: int
+
+
+@dataclass(frozen=True, slots=True)
+class Shorter:
+    """Fewer steps than are left lead to the goal."""
+
+    steps: tuple[PlanStep, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """The goal holds, and steps are left."""
+
+    author: str
+
+
+News = Broken | Shorter | Reached
+
+
+class Monitor:
+    """Watches one plan until it is closed.
+
+    Args:
+        course: how far the plan is; whoever begins a step there calls `look` then.
+        domain, knowledge: as everywhere.
+        is_own: whether a change by this author is the running step's own doing.
+        hear: is told what is new, in the moment in which it becomes so.
+    """
+
+    def __init__(
+        self,
+        course: Course,
+        domain: PlanningDomain,
+        knowledge: KnowledgeBase,
+        is_own: Callable[[str], bool],
+        hear: Callable[[News], None],
+    ) -> None:
+        self._course = course
+        self._domain = domain
+        self._knowledge = knowledge
+        self._is_own = is_own
+        self._hear = hear
+        self._links: dict[Expression, Condition] = {}
+        self._to_come: dict[Expression, Condition] = {}
+        self._early = False
+        self._whole: Callable[[], None] = lambda: None
+        self._goal = self._install(course.goal, self._goal_fired)
+
+    def look(self, author: str) -> None:
+        """Judge the plan as a whole, whoever changed the world (`author`, as far as that is known)."""
+        self._renew()
+        course, world = self._course, self._knowledge
+        if _true(course.goal, world):
+            self._hear(Reached(author))
+        elif len(course.at_work) > 1:  # nobody is interrupted for the sake of a shorter plan
+            if not course.stands(world):
+                self._hear(self._broken(author, world.version))
+        else:
+            end = shortest_end(course.left_steps, self._domain, world, course.goal)
+            if end is None:
+                self._hear(self._broken(author, world.version))
+                return
+            if self._early:
+                self._early = False
+                end = thinned(end, self._domain, world, course.goal)
+            if len(end) < len(course.left):
+                self._hear(Shorter(end))
+
+    def close(self) -> None:
+        """Watch no longer."""
+        self._whole()
+        for condition in (*self._links.values(), *self._to_come.values(), self._goal):
+            if condition is not None:
+                condition.cancel()
+        self._links, self._to_come, self._goal = {}, {}, None
+
+    def _renew(self) -> None:
+        """Watch what is needed now, and what later steps will bring in case that somebody else does."""
+        course = self._course
+        needed, later = course.needed(), course.needed_later()
+        self._whole()
+        if needed is None or later is None:
+            self._whole = self._knowledge.subscribe(self._changed)
+            needed = later = {}
+        self._keep(self._links, {**later, **needed}, self._link_fired)
+        bring = (part for step in course.coming() for part in _brought(step, self._domain))
+        fresh = [fact for fact in bring if fact not in self._links and not _true(fact, self._knowledge)]
+        self._keep(self._to_come, dict.fromkeys(fresh), self._came)
+
+    def _keep(
+        self,
+        kept: dict[Expression, Condition],
+        wanted: dict[Expression, int] | dict[Expression, None],
+        fired: Callable[[Expression, Firing], None],
+    ) -> None:
+        for condition in [one for one in kept if one not in wanted]:
+            kept.pop(condition).cancel()
+        for condition in wanted:
+            if condition not in kept:
+                installed = self._install(condition, fired)
+                if installed is not None:
+                    kept[condition] = installed
+
+    def _install(self, e: Expression, fired: Callable[[Expression, Firing], None]) -> Condition | None:
+        try:
+            condition = self._knowledge.install(e)
+        except InputError:  # it is about something that is not there, so that it is false and cannot become true
+            return None
+        condition.subscribe(lambda firing: fired(e, firing), falls=True)
+        return condition
+
+    def _foreign(self, firing: Firing) -> str | None:
+        """Who made the change, if it was somebody else."""
+        (change,) = self._knowledge.changes(since=firing.version - 1, until=firing.version)
+        return None if self._is_own(change.author) else change.author
+
+    def _goal_fired(self, _: Expression, firing: Firing) -> None:
+        author = self._foreign(firing) if firing.truth else None
+        if author is not None:
+            self._hear(Reached(author))
+
+    def _came(self, _: Expression, firing: Firing) -> None:
+        if firing.truth and self._foreign(firing) is not None:
+            self._early = True
+
+    def _link_fired(self, e: Expression, firing: Firing) -> None:
+        author = None if firing.truth else self._foreign(firing)
+        if author is None or _true(self._course.goal, self._knowledge):  # that the goal is reached is heard by itself
+            return
+        course, world = self._course, self._knowledge
+        if e in (course.needed() or {}) and e in (course.needed_later() or {}):
+            # Whatever the step at work has done by now; if a later step can be the next one, it will be.
+            if shortest_end(course.coming(), self._domain, world, course.goal) is None:
+                self._hear(self._broken(author, firing.version, e))
+        elif not course.stands(world):  # the step at work itself is hit
+            end = shortest_end(course.coming(), self._domain, world, course.goal)
+            self._hear(self._broken(author, firing.version, e) if end is None else Shorter(end))
+
+    def _changed(self, change: Change) -> None:
+        if not self._is_own(change.author) and not self._course.stands(self._knowledge):
+            self._hear(self._broken(change.author, change.version))
+
+    def _broken(self, author: str, version: int, fallen: Expression | None = None) -> Broken:
+        course = self._course
+        now, later = course.needed() or {}, course.needed_later() or {}
+        needed = {**now, **{one: user for one, user in later.items() if one not in now}}
+        if fallen is None:
+            fallen = next((one for one in needed if not _true(one, self._knowledge)), None)
+        why = validate(Plan(course.left_steps), self._domain, self._knowledge, course.goal).why
+        if fallen is None:
+            return Broken(why, "", len(course.steps) + 1, author, version)
+        return Broken(why, to_text(fallen), needed[fallen], author, version)
+
+
+def _brought(step: PlanStep, domain: PlanningDomain) -> list[Expression]:
+    """The facts that a step adds, as far as that does not depend on the world."""
+    expected = conjuncts(expectation(domain.action(step).effect, domain.bindings(step)))
+    return [part for part in expected if isinstance(part, Atom)]
+
+
+def _true(e: Expression, world: KnowledgeBase) -> bool:
+    try:
+        return holds(e, world)
+    except InputError:
+        return False

@@ -1,0 +1,262 @@
+"""Asking for a plan until there is one that holds: for the world as it is, without what failed, with what was planned.
+
+However a planner behaves, the answer comes within a bound of real time, and only a plan that leads to the goal counts.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from planning.engines.improving import Improving
+from planning.execution.mending import mending
+from planning.execution.repair import EXCLUDED_SECONDS, without
+from planning.plan import EngineFailed, PlanFound, PlanningOutcome, PlanStep, ProvenUnsolvable, TimedOut
+from planning.posing.problem import pose
+from planning.posing.unsolvable import why_unsolvable
+from planning.validation import Validation, validate
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncGenerator, Awaitable, Collection
+
+    from dsc.sequencer.clock import LoopClock
+    from knowledge_base.language.expression import Expression
+    from knowledge_base.state import WorldState
+    from knowledge_base.store import KnowledgeBase
+    from planning.domain import PlanningDomain
+    from planning.engines.planner import Planner
+    from planning.execution.foresight import Foresight
+    from planning.execution.telling import Telling
+    from planning.strips import Problem
+
+MAX_ATTEMPTS = 3
+"""How often to plan anew because the world changed while the planner worked."""
+MAX_REJECTED = 5
+"""How many plans the simulation may reject."""
+PATIENCE = 90.0
+"""Seconds of real time beyond its own for a planner that does not keep to it; starting an engine may take a minute."""
+MENDING_SECONDS = 2.0
+"""Real time for finding out how to mend a plan, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A plan that leads to the goal from the present.
+
+    Attributes:
+        answer: the plan, and where it comes from.
+        kept: how many steps at the end of the plan before it keeps.
+        better: what comes of a planner that goes on; to be closed.
+    """
+
+    answer: PlanFound
+    kept: int = 0
+    better: AsyncGenerator[PlanningOutcome, None] | None = None
+
+    @property
+    def steps(self) -> tuple[PlanStep, ...]:
+        """The plan's steps."""
+        return self.answer.plan.steps
+
+    async def close(self) -> None:
+        """No better plan is wanted."""
+        if self.better is not None:
+            await self.better.aclose()
+
+
+@dataclass(frozen=True, slots=True)
+class NotFound:
+    """No plan: `kind` is `unsolvable`, `timed_out` or `failed`, `reason` says more."""
+
+    kind: str
+    reason: str
+
+
+_Answer = tuple[PlanningOutcome, "AsyncGenerator[PlanningOutcome, None] | None"]
+
+
+class Search:
+    """Finds plans for goals, and remembers which steps to do without for a while.
+
+    Args:
+        domain, knowledge, planner, clock: as everywhere.
+        telling: hears what is excluded, readmitted and rejected.
+        foresight: has to agree with a plan before it counts.
+    """
+
+    def __init__(
+        self,
+        domain: PlanningDomain,
+        knowledge: KnowledgeBase,
+        planner: Planner,
+        clock: LoopClock,
+        telling: Telling,
+        foresight: Foresight | None = None,
+    ) -> None:
+        self._domain = domain
+        self._knowledge = knowledge
+        self._planner = planner
+        self._clock = clock
+        self._telling = telling
+        self._foresight = foresight
+        self._excluded: dict[PlanStep, float] = {}
+
+    def exclude(self, step: PlanStep, why: str) -> None:
+        """Do without a step for a while."""
+        self._excluded[step] = self._clock.now() + EXCLUDED_SECONDS
+        self._telling.excluded(step, EXCLUDED_SECONDS, why)
+
+    async def plan(self, goal: Expression, seconds: float, before: Sequence[PlanStep] = ()) -> Found | NotFound:
+        """A plan for the goal from the world as it is when it is found.
+
+        Args:
+            goal: what shall hold.
+            seconds: real time for one search.
+            before: what was left of the plan that it takes the place of; it is mended if that takes little.
+
+        Raises:
+            InputError: the goal names what is not there, or uses what no engine can do.
+        """
+        rejected: dict[PlanStep, str] = {}
+        changed = 0
+        while True:
+            version, snapshot = self._knowledge.version, self._knowledge.snapshot()
+            found = await self._found(goal, seconds, before, rejected, snapshot)
+            if isinstance(found, NotFound):
+                return found
+            if self._clock.simulated:
+                await self._clock.sleep(found.answer.simulated_seconds)
+            verdict = validate(found.answer.plan, self._domain, self._knowledge, goal)
+            if verdict.valid:
+                verdict = await self._foreseen(found)
+                if verdict.valid:
+                    return found
+                await found.close()
+                before = ()
+                if verdict.failing_step is None or len(rejected) == MAX_REJECTED:
+                    return NotFound("failed", f"the simulation foresees that it fails: {verdict.why}")
+                rejected[found.steps[verdict.failing_step]] = verdict.why
+                continue
+            await found.close()
+            changed += 1
+            if version == self._knowledge.version:
+                wrong = f"the plan found does not lead to the goal: {verdict.why} ({found.answer.engine})"
+                return NotFound("failed", wrong)
+            if changed == MAX_ATTEMPTS:
+                return NotFound("failed", f"the world changes faster than plans are made: {verdict.why}")
+
+    async def _found(
+        self,
+        goal: Expression,
+        seconds: float,
+        before: Sequence[PlanStep],
+        rejected: dict[PlanStep, str],
+        snapshot: WorldState,
+    ) -> Found | NotFound:
+        """One plan for the world as it was."""
+        mended = await self._mended(goal, seconds, before, snapshot) if before else None
+        if isinstance(mended, Found):
+            return mended
+        with self._clock.hold():  # grounding takes its time as well: in a thread, so that a stop is obeyed
+            problem = await asyncio.to_thread(pose, self._domain, snapshot, goal)
+        answer, better = await self._answer(problem, seconds, rejected)
+        if isinstance(answer, PlanFound):
+            reproducible = answer.reproducible and mended is None
+            return Found(replace(answer, reproducible=reproducible), better=better)
+        if isinstance(answer, TimedOut):
+            return NotFound("timed_out", f"no plan within {answer.seconds:g} s ({answer.engine})")
+        if isinstance(answer, EngineFailed):
+            return NotFound("failed", f"{answer.engine}: {answer.message}")
+        if rejected:
+            reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
+            return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
+        with self._clock.hold():
+            missing = await asyncio.to_thread(why_unsolvable, self._domain, snapshot, goal)
+        return NotFound("unsolvable", "; ".join(missing) or answer.reason)
+
+    async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> _Answer:
+        """The planner's answer, without the excluded steps if there is a plan without them."""
+        excluded = self._excluded_now()
+        answer, better = await self._solve(without(problem, {*excluded, *rejected}), seconds)
+        if isinstance(answer, ProvenUnsolvable) and excluded and not problem.unreachable:
+            self._excluded.clear()
+            self._telling.readmitted(excluded)
+            return await self._solve(without(problem, rejected), seconds)
+        return answer, better
+
+    async def _mended(
+        self, goal: Expression, seconds: float, before: Sequence[PlanStep], snapshot: WorldState
+    ) -> Found | TimedOut | None:
+        """What was left of the plan before, mended; `TimedOut` if a limit of real time cut in."""
+        excluded = self._excluded_now()
+        with self._clock.hold():
+            how = await asyncio.to_thread(mending, before, excluded, self._domain, snapshot, goal)
+        if how is None:
+            return None
+        seconds = min(seconds / 4, MENDING_SECONDS)
+        answer, _ = await self._solve(without(how.problem, excluded), seconds, going_on=False)
+        if not isinstance(answer, PlanFound):
+            return answer if isinstance(answer, TimedOut) else None
+        plan = how.mended(answer.plan, before, self._domain, snapshot, goal)
+        return None if plan is None else Found(replace(answer, plan=plan), kept=len(how.end))
+
+    def _excluded_now(self) -> set[PlanStep]:
+        now = self._clock.now()
+        self._excluded = {step: until for step, until in self._excluded.items() if until > now}
+        return set(self._excluded)
+
+    async def _foreseen(self, found: Found) -> Validation:
+        if self._foresight is None:
+            return Validation(valid=True)
+        with self._clock.hold():
+            world, plan = self._knowledge.snapshot(), found.answer.plan
+            verdict = await asyncio.to_thread(self._foresight.foresee, plan, world)
+        if not verdict.valid:
+            step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
+            self._telling.rejected(step, verdict.why, found.answer.engine)
+        return verdict
+
+    async def _solve(self, problem: Problem, seconds: float, *, going_on: bool = True) -> _Answer:
+        """The planner's answer, and what may follow if it goes on (not in simulated time, which is the same twice)."""
+        if going_on and not self._clock.simulated and isinstance(self._planner, Improving):
+            better = self._planner.plans(problem, seconds)
+            answer = await self._bounded(anext(better), seconds)
+            if isinstance(answer, PlanFound):
+                return answer, better
+            await better.aclose()
+            return answer, None
+        return await self._bounded(self._planner.solve(problem, seconds), seconds), None
+
+    async def _bounded(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
+        """The answer, or that there was none in time or none at all; in real time, whatever the clock says."""
+        loop, engine = asyncio.get_running_loop(), type(self._planner).__name__
+        asked = asyncio.ensure_future(answering)
+        expired = threading.Event()
+
+        def expire() -> None:
+            expired.set()
+            loop.call_soon_threadsafe(asked.cancel)
+
+        timer = threading.Timer(seconds + PATIENCE, expire)
+        timer.daemon = True
+        timer.start()
+        try:
+            with self._clock.hold():
+                answer = await asked
+            return answer if isinstance(answer, PlanningOutcome) else EngineFailed(engine, f"no answer: {answer!r:.80}")
+        except asyncio.CancelledError:
+            if not expired.is_set() or _cancelled_from_outside():
+                raise
+            return TimedOut(engine, seconds)
+        except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
+            return EngineFailed(engine, f"{type(error).__name__}: {error}")
+        finally:
+            timer.cancel()
+
+
+def _cancelled_from_outside() -> bool:
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0

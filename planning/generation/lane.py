@@ -1,0 +1,141 @@
+r"""One control flow of a generated plot: steps one after the other, waiting for those of other flows where they must.
+
+    before_3 -> step_3 -> after_3 -> before_5 -> step_5 -> after_5 -> finished_1
+                                 \-> replan_1, if what a step needs does not hold
+
+`after_n` waits until the step's effects are observed. `before_n` waits for steps of other flows: they set the variables
+`done_n` and `begun_n`, so that nobody has to ask again and again. Then it looks at what the step needs, so that no step
+begins on a wrong premise. Where there is nobody to wait for, `after_n` does that as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dsc.dynamic.rules import REPLAN
+from dsc.events import GAVE_UP
+from knowledge_base.language.expression import And, Comparison, Constant, Expression, Not, Variable
+from knowledge_base.language.printer import to_text
+from planning.generation.steps import CarriedStep
+from planning.ordering.order import PartialOrder
+
+FINISHED = "finished"
+_DONE, _BEGUN = "done", "begun"
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """A chain of steps; `mark` stands behind the names of its ends, which are unique in the plot."""
+
+    numbers: tuple[int, ...]
+    mark: str = ""
+    name: str = ""
+
+    @property
+    def finished(self) -> str:
+        """Name of the state at its end."""
+        return FINISHED + self.mark
+
+
+class Writer:
+    """Writes the states of the lanes of one plot.
+
+    Args:
+        steps: all steps.
+        order: which of them wait for which.
+        lanes: how they are spread.
+        plan: name under which the planner's component hears which step begins; nobody hears of a plot without it.
+    """
+
+    def __init__(
+        self, steps: Sequence[CarriedStep], order: PartialOrder, lanes: Sequence[Lane], plan: str | None
+    ) -> None:
+        self._steps = dict(enumerate(steps, start=1))
+        self._plan = plan
+        lane_of = {number: lane for lane in lanes for number in lane.numbers}
+        self._waits: dict[int, list[tuple[str, int]]] = {number: [] for number in self._steps}
+        for kind, pairs in ((_DONE, order.before), (_BEGUN, order.begin_before)):
+            for first, second in sorted(pairs):
+                if lane_of[first] is not lane_of[second]:
+                    self._waits[second].append((kind, first))
+        self._flags = dict.fromkeys(f"{kind}_{first}" for waits in self._waits.values() for kind, first in waits)
+
+    @property
+    def variables(self) -> Mapping[str, Any]:
+        """What lanes tell each other."""
+        return {flag: {"type": "boolean", "initial": False} for flag in self._flags}
+
+    def states(self, lane: Lane) -> dict[str, Any]:
+        """The states of one lane, without the one at its end."""
+        first = lane.numbers[0] if lane.numbers else None
+        states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
+        for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
+            states[f"step_{number}"] = self._step(number, lane)
+            states[f"after_{number}"] = self._after(number, following, lane)
+            if following is not None and self._waits[following]:
+                states[f"before_{following}"] = self._before(following, lane)
+        for end in (REPLAN, GAVE_UP):
+            states[end + lane.mark] = {"final": True, "emit": end, "with": {"reason": "?reason"}}
+        return states
+
+    def _before(self, number: int | None, lane: Lane) -> dict[str, Any]:
+        if number is None:
+            return {"always": self._onward(number, lane, ())}
+        waits = self._waits[number]
+        told = {"about": "waits for " + ", ".join(self._steps[other].text for _, other in waits)} if waits else {}
+        return {**told, "always": self._onward(number, lane, [_is_set(flag, other) for flag, other in waits])}
+
+    def _step(self, number: int, lane: Lane) -> dict[str, Any]:
+        step = self._steps[number]
+        done = {"to": f"after_{number}", **({"tell": step.effect} if step.assumed else {})}
+        state: dict[str, Any] = {"about": step.text, **step.content, "on": {"done": done}}
+        if self._plan is not None:
+            state["entry"] = {"set": f"planner.{self._plan}", "to": number}
+        if step.over_all:
+            state["always"] = [
+                self._replan(lane, f"lost during {step.text}: {to_text(one)}", [Not(one)])
+                for one in step.over_all
+            ]
+        if step.seconds is not None:
+            state["after"] = {"seconds": step.seconds, **self._replan(lane, f"too slow: {step.text}")}
+        return state
+
+    def _after(self, number: int, following: int | None, lane: Lane) -> dict[str, Any]:
+        step, flag = self._steps[number], f"{_DONE}_{number}"
+        told = {"assign": {flag: True}} if flag in self._flags else {}
+        if following is not None and self._waits[following]:
+            onward = [_guarded({"to": f"before_{following}", **told}, step.expected)]
+        else:
+            onward = self._onward(following, lane, step.expected, told)
+        state: dict[str, Any] = {"always": onward}
+        if step.expected:
+            state["after"] = {"seconds": step.confirm, **self._replan(lane, f"not observed: {step.text}")}
+        return state
+
+    def _onward(
+        self, number: int | None, lane: Lane, first: Iterable[Expression], told: Mapping[str, Any] | None = None
+    ) -> list[dict[str, Any]]:
+        """To a step if it is applicable, else back to planning; both only once the `first` conditions hold."""
+        first, assigned = tuple(first), dict((told or {}).get("assign", {}))
+        if number is None:
+            return [_guarded({"to": lane.finished, **(told or {})}, first)]
+        step, flag = self._steps[number], f"{_BEGUN}_{number}"
+        if flag in self._flags:
+            assigned[flag] = True
+        begin = {"to": f"step_{number}", **({"assign": assigned} if assigned else {})}
+        needed = tuple(dict.fromkeys((*first, *step.needed)))
+        otherwise = [] if needed == first else [self._replan(lane, f"not applicable: {step.text}", first)]
+        return [_guarded(begin, needed), *otherwise]
+
+    def _replan(self, lane: Lane, reason: str, when: Iterable[Expression] = ()) -> dict[str, Any]:
+        return _guarded({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, tuple(when))
+
+
+def _guarded(transition: dict[str, Any], when: tuple[Expression, ...]) -> dict[str, Any]:
+    return {**transition, "when": when[0] if len(when) == 1 else And(when)} if when else transition
+
+
+def _is_set(kind: str, number: int) -> Expression:
+    return Comparison("=", Variable(f"{kind}_{number}"), Constant(value=True))

@@ -1,0 +1,113 @@
+r"""From plan to plot: every step a dynamic state over the plots that carry it out (S0.12, S1.5, S2.7).
+
+    before_1 -> step_1 -> after_1 -> step_2 -> after_2 -> ... -> finished
+                            \-> replan, if what a step needs does not hold
+
+Steps that need not wait for each other stand in regions side by side, see `planning.generation.lane`; a region is a
+chain of the plan's partial order, which is as a rule what one robot does. Outcomes that no inherited rule answers
+lead to `replan`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dsc.dynamic.rules import REPLAN
+from dsc.events import GAVE_UP
+from dsc.model.plot import ActionPlot, Rule
+from dsc.validation.structure import RESPONSES
+from planning.generation.lane import FINISHED, Lane, Writer
+from planning.generation.steps import CarriedStep, Carrier, sketched
+from planning.generation.usage import Usage
+from planning.ordering.chains import chains
+from planning.ordering.order import PartialOrder, in_sequence, scheduled
+from planning.posing.derived import derivation
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Sequence
+
+    from dsc.dynamic.library import Library
+    from planning.domain import PlanningDomain
+    from planning.plan import Plan
+
+WORK = "work"
+"""Name of the state that holds the regions."""
+
+
+def plot_from_plan(
+    plan: Plan,
+    domain: PlanningDomain,
+    library: Library | None,
+    rules: Sequence[Rule] = (),
+    name: str = "plan",
+    order: PartialOrder | None = None,
+    shared: Collection[str] = (),
+) -> ActionPlot:
+    """The action plot that carries out a plan.
+
+    Args:
+        plan: its steps; with a schedule they begin in its order, and side by side where it has them so.
+        domain: gives each step's precondition and effects.
+        library: has the plots that implement the planning actions. Without one, a sketch is made for somebody to
+            complete: every step uses a plot that is called like its action and takes all of its arguments.
+        rules: the contingency rules it inherits.
+        name: the plot's name.
+        order: which steps wait for which, e.g. from `ordering.order.deordered`; one after the other if left out.
+        shared: components that can carry out several skills at once. Steps that use any other one never overlap.
+
+    Raises:
+        UnknownNameError: no plot implements a step's action.
+    """
+    if order is None:
+        order = scheduled(plan) if plan.schedule else in_sequence(plan)
+    domain = derivation(domain).domain  # the knowledge base knows no derived predicates
+    rules = [rule for rule in rules if not rule.of and rule.do.then in RESPONSES]  # others are about their plot alone
+    writing = None if library is None else Carrier(domain, library, rules)
+    steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
+    order = order.restricted(_clashes([step.usage for step in steps], order, shared))
+    lanes = _lanes(order, steps)
+    writer = Writer(steps, order, lanes, None if library is None else name)
+    ends = {FINISHED: {"final": True}}
+    if len(lanes) == 1:
+        states = {**writer.states(lanes[0]), **ends}
+    else:
+        regions = {lane.name: {"states": {**writer.states(lane), lane.finished: {"final": True}}} for lane in lanes}
+        states = {WORK: {"regions": regions, "on": {"done": FINISHED}}, **ends}
+    return ActionPlot.model_validate(
+        {
+            "plot": name,
+            "about": f"made from a plan of {len(steps)} steps",
+            "variables": {"reason": {"type": "text", "initial": "unknown"}, **writer.variables},
+            "emits": {REPLAN: {"reason": "text"}, GAVE_UP: {"reason": "text"}},
+            "states": states,
+            "rules": [rule for rule in rules if any(rule.on in step.outcomes for step in steps)],
+            "generated": True,
+        }
+    )
+
+
+def _clashes(
+    used: Sequence[Usage], order: PartialOrder, shared: Collection[str]
+) -> Iterable[tuple[int, int]]:
+    """The pairs of steps that have nothing to do with each other but the components they use."""
+    for second, earlier in order.earlier.items():
+        for first in range(1, second):
+            if first not in earlier and used[first - 1].clashes(used[second - 1], shared):
+                yield first, second
+
+
+def _lanes(order: PartialOrder, steps: Sequence[CarriedStep]) -> list[Lane]:
+    linked = {(link.provider, link.user) for link in order.links}
+
+    def kin(first: int, second: int) -> bool:
+        one, other = steps[first - 1].usage.components, steps[second - 1].usage.components
+        return one == other if one and other else (first, second) in linked
+
+    found = chains(order.earlier, kin) or ((),)
+    if len(found) == 1:
+        return [Lane(found[0])]
+    names = ["_".join(sorted({name for n in chain for name in steps[n - 1].usage.components})) for chain in found]
+    return [
+        Lane(chain, f"_{number}", name if name and names.count(name) == 1 else f"lane_{number}")
+        for number, (chain, name) in enumerate(zip(found, names, strict=True), start=1)
+    ]

@@ -1,0 +1,176 @@
+"""A plan's step as it is carried out: what it needs and brings about, and the state in which it is done."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.model.plot import ActionPlot, Rule
+from knowledge_base.errors import UnknownNameError
+from knowledge_base.facts import Value
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, substitute_effect
+from knowledge_base.language.expression import (
+    And,
+    Arithmetic,
+    Atom,
+    Constant,
+    Expression,
+    Not,
+    Term,
+    substitute,
+    substitute_term,
+)
+from planning.domain import PlanningAction, PlanningDomain
+from planning.generation.usage import Usage, fitting, usage
+from planning.plan import PlanStep
+from planning.posing.relevance import changed, names_of
+
+PATIENCE = 2
+"""A step that takes so many times as long as its action says, or as its skills may take together, is broken off."""
+_CONFIRM = ActionPlot.model_fields["confirm"].default
+
+
+@dataclass(frozen=True, slots=True)
+class CarriedStep:
+    """A step of a plan, ready to become states.
+
+    Attributes:
+        text: the step as in PDDL.
+        needed: ground conditions that must hold when it begins.
+        over_all: those that must hold all the time, as far as it does not change them itself.
+        effect: what it changes.
+        expected: what is to be seen when it is done; nothing if its effects are assumed.
+        assumed: whether its effects are told when it is done.
+        confirm: seconds until they must have been seen.
+        seconds: how long it may take; `None` if nobody knows.
+        content: what stands in its state: the candidates, or the plot it uses.
+        outcomes: what it may end with besides being done.
+        usage: what it takes hold of.
+    """
+
+    text: str
+    needed: tuple[Expression, ...]
+    over_all: tuple[Expression, ...]
+    effect: Effect
+    expected: tuple[Expression, ...]
+    content: Mapping[str, Any]
+    assumed: bool = False
+    confirm: float = _CONFIRM
+    seconds: Term | None = None
+    outcomes: frozenset[str] = frozenset()
+    usage: Usage = field(default_factory=Usage)
+
+
+class Carrier:
+    """Knows how steps are carried out: by which plots, and what these take hold of.
+
+    Args:
+        domain: has the steps' actions.
+        library: has the plots that implement them.
+        rules: may use more plots for what those end with.
+    """
+
+    def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule] = ()) -> None:
+        self._domain = domain
+        self._library = library
+        self._rules = tuple(rules)
+        self._usage: dict[tuple[str, ...], Usage] = {}  # most steps have the candidates of others
+
+    def carried(self, step: PlanStep) -> CarriedStep:
+        """The step as a dynamic state over the plots that carry it out, if its arguments do not rule them out.
+
+        Raises:
+            UnknownNameError: no plot implements its action, or one uses a plot that is not there.
+        """
+        bindings = self._domain.bindings(step)
+        candidates = fitting(implementing(step, self._library), bindings)
+        names = tuple(plot.name for plot in candidates)
+        if names not in self._usage:
+            self._usage[names] = usage(candidates, self._library, self._rules)
+        used = self._usage[names]
+        taken = {name for plot in candidates for name in plot.parameters}
+        content = {"dynamic": names, "with": {name: value for name, value in bindings.items() if name in taken}}
+        return _step(
+            step, self._domain, content, None if used.anything else PATIENCE * used.seconds,
+            assumed=all(plot.effects == "assumed" for plot in candidates),
+            confirm=max(plot.confirm for plot in candidates),
+            outcomes=frozenset(event for plot in candidates for event in plot.emits), usage=used,
+        )  # fmt: skip
+
+
+def sketched(step: PlanStep, domain: PlanningDomain) -> CarriedStep:
+    """The step as a state that uses a plot called like its action, which is still to be written."""
+    return _step(step, domain, {"use": step.action, "with": domain.bindings(step)}, None)
+
+
+def implementing(step: PlanStep, library: Library) -> tuple[ActionPlot, ...]:
+    """The plots that carry out a step's action; raises `UnknownNameError` if there is none."""
+    found = library.implementing(step.action)
+    if not found:
+        known = [plot.implements for plot in library if plot.implements]
+        raise UnknownNameError(
+            f"no plot implements the planning action '{step.action}'", found=step.action, valid=known
+        )
+    return found
+
+
+def expectation(effect: Effect, bindings: Mapping[str, Value]) -> Expression:
+    """What holds after an effect, as far as that does not depend on what held before."""
+    ground = [(_ground(part.atom, bindings), isinstance(part, Add)) for part in _literals(effect)]
+    added = [atom for atom, adds in ground if adds]
+    return And((*added, *(Not(atom) for atom, adds in ground if not adds and atom not in added)))
+
+
+def parts(e: Expression) -> tuple[Expression, ...]:
+    """The conditions that a conjunction consists of."""
+    return tuple(chain.from_iterable(map(parts, e.parts))) if isinstance(e, And) else (e,)
+
+
+def _step(
+    step: PlanStep, domain: PlanningDomain, content: Mapping[str, Any], seconds: float | None, *,
+    assumed: bool = False, **more: Any,
+) -> CarriedStep:  # fmt: skip
+    action, bindings = domain.action(step), domain.bindings(step)
+    limit = _limit(action, bindings)
+    if limit is None and seconds:
+        limit = Constant(seconds)
+    return CarriedStep(
+        text=str(step),
+        needed=parts(substitute(action.precondition, bindings)),
+        over_all=tuple(substitute(one, bindings) for one in _watched(action)),
+        effect=substitute_effect(action.effect, bindings),
+        expected=() if assumed else parts(expectation(action.effect, bindings)),
+        content=content, assumed=assumed, seconds=limit, **more,
+    )  # fmt: skip
+
+
+def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None:
+    """How long the action may take, if it says so itself."""
+    if action.duration is None or action.duration.most == Constant(float("inf")):
+        return None
+    match substitute_term(action.duration.most, bindings):
+        case Constant(int() | float() as most):
+            return Constant(PATIENCE * most)
+        case most:
+            return Arithmetic("*", (Constant(PATIENCE), most))
+
+
+def _watched(action: PlanningAction) -> Iterator[Expression]:
+    """Over-all conditions that the action does not change itself: what it does when is its own affair."""
+    if action.timed is not None:
+        effects = (action.timed.start_effect, action.timed.end_effect)
+        own = {name for effect in effects for name in changed(effect)}
+        yield from (one for one in parts(action.timed.over_all) if not own.intersection(names_of(one)))
+
+
+def _literals(effect: Effect) -> list[Add | Delete]:
+    if isinstance(effect, AllOf):
+        return [literal for part in effect.parts for literal in _literals(part)]
+    return [effect] if isinstance(effect, Add | Delete) else []
+
+
+def _ground(atom: Atom, bindings: Mapping[str, Value]) -> Atom:
+    return Atom(atom.predicate, tuple(substitute_term(arg, bindings) for arg in atom.args))

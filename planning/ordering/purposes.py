@@ -1,0 +1,70 @@
+"""Why a step is in a plan: what it brings about, for whom, and which parts of the goal that serves in the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from knowledge_base.language.evaluation import World
+from knowledge_base.language.expression import Expression
+from knowledge_base.language.printer import to_text
+from planning.domain import PlanningDomain
+from planning.ordering.order import CausalLink, PartialOrder, deordered
+from planning.plan import Plan, PlanStep
+
+
+@dataclass(frozen=True, slots=True)
+class Purpose:
+    """Why a step is in a plan.
+
+    Attributes:
+        number: which step, counted from 1.
+        step: the step.
+        provides: what it brings about, with the later step that needs it; `None` is the goal.
+        serves: the conditions of the goal that it contributes to, directly or through later steps.
+    """
+
+    number: int
+    step: PlanStep
+    provides: tuple[tuple[Expression, int | None], ...]
+    serves: tuple[Expression, ...]
+
+    def __str__(self) -> str:
+        """`3 (pick-up cup1 table): (holding cup1) for step 4; serves (tidy cup1)`."""
+        if not self.provides:
+            return f"{self.number} {self.step}: nothing needs what it does"
+        users: dict[str, list[str]] = {}
+        for fact, user in self.provides:
+            users.setdefault("the goal" if user is None else f"step {user}", []).append(to_text(fact))
+        said = "; ".join(f"{' '.join(facts)} for {user}" for user, facts in users.items())
+        direct = {fact for fact, user in self.provides if user is None}
+        further = [to_text(fact) for fact in self.serves if fact not in direct]
+        return f"{self.number} {self.step}: {said}" + (f"; serves {' '.join(further)}" if further else "")
+
+
+def why(order: PartialOrder, number: int) -> Purpose:
+    """Why step `number` is in the plan, from its causal links."""
+    goal = len(order.steps) + 1
+    own = [link for link in order.links if link.provider == number]
+    provides = tuple((link.fact, None if link.user == goal else link.user) for link in own)
+    return Purpose(number, order.steps[number - 1], provides, _served(order.links, number, goal))
+
+
+def purposes(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> tuple[Purpose, ...]:
+    """Why each step is in the plan.
+
+    Raises:
+        InputError: the plan does not lead to the goal.
+    """
+    order = deordered(plan, domain, world, goal)
+    return tuple(why(order, number) for number in range(1, len(plan.steps) + 1))
+
+
+def _served(links: tuple[CausalLink, ...], number: int, goal: int) -> tuple[Expression, ...]:
+    reached = {number}
+    served: dict[Expression, None] = {}
+    for link in links:  # by user, so that who provides something was reached before
+        if link.provider in reached:
+            reached.add(link.user)
+            if link.user == goal:
+                served[link.fact] = None
+    return tuple(served)

@@ -1,0 +1,283 @@
+"""Derived predicates (PDDL 2.2 axioms): compiled away, or evaluated where no action changes what they follow from.
+
+A predicate that does not follow from itself is replaced by its condition wherever it is asked for. One that does
+(`above`: on it, or on something above it) becomes facts, if nothing it follows from is changed by an action: the
+least fixpoint, stratum by stratum as in Datalog. Otherwise it cannot be planned with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import networkx as nx
+
+from knowledge_base.errors import SchemaError
+from knowledge_base.facts import Delta, Fact
+from knowledge_base.language.effect import AllOf, Effect, ForEach, When
+from knowledge_base.language.evaluation import query
+from knowledge_base.language.expression import (
+    And,
+    Arithmetic,
+    Atom,
+    Call,
+    Comparison,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    TypedVariable,
+    Variable,
+    free_variables,
+    parts_of,
+)
+from knowledge_base.language.memory import IdentityCache
+from knowledge_base.overlay import Overlay
+from knowledge_base.schema import ROOT_TYPE, VALUE_TYPES
+from planning.errors import UnsupportedActionError, UnsupportedGoalError
+from planning.posing.relevance import changed, effect_conditions, names_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from knowledge_base.language.evaluation import World
+    from planning.domain import Axiom, PlanningAction, PlanningDomain
+
+
+def derivation(domain: PlanningDomain) -> Derivation:
+    """What the derived predicates of a domain stand for; worked out once.
+
+    Raises:
+        SchemaError: a predicate follows from its own negation.
+    """
+    return _known.find(domain, None) or _known.keep(domain, None, Derivation(domain))
+
+
+class Derivation:
+    """A domain without its derived predicates, and what replaces them.
+
+    Attributes:
+        domain: the domain with conditions in their place, as far as that can be.
+    """
+
+    def __init__(self, domain: PlanningDomain) -> None:
+        self._axioms: dict[str, list[Axiom]] = {}
+        for axiom in domain.axioms:
+            self._axioms.setdefault(axiom.predicate, []).append(axiom)
+        self._expanded: IdentityCache[Expression, Expression] = IdentityCache(size=256)
+        graph = self._dependencies(domain.axioms)
+        self._circles = [circle for circle in _strata(graph) if _is_circle(circle, graph)]
+        self._recursive = frozenset().union(*self._circles)
+        self._schema = domain.schema
+        changing = frozenset().union(*(changed(action.effect) for action in domain.actions.values()))
+        reached = {name: {name, *nx.descendants(graph, name)} for name in self._recursive}
+        self._unsupported = {name: changing & follows for name, follows in reached.items() if changing & follows}
+        if domain.axioms:
+            actions = {name: self._action(action) for name, action in domain.actions.items()}
+            domain = replace(domain, actions=actions, axioms=())
+        self.domain = domain
+
+    def expand(self, e: Expression) -> Expression:
+        """The condition with those of derived predicates in their place; recursive ones stay."""
+        if not self._axioms:
+            return e
+        # The same again for the same condition: what is known of a condition is known by its identity.
+        return self._expanded.find(e, None) or self._expanded.keep(e, None, self._expand(e))
+
+    def _expand(self, e: Expression) -> Expression:
+        match e:
+            case Atom(name) if name in self._axioms and name not in self._recursive:
+                cases = tuple(self._expand(self._instance(axiom, e)) for axiom in self._axioms[name])
+                return cases[0] if len(cases) == 1 else Or(cases)
+            case Not(body) | Exists(_, body) | Forall(_, body):
+                return replace(e, body=self._expand(body))
+            case And(parts) | Or(parts):
+                return replace(e, parts=tuple(map(self._expand, parts)))
+            case Imply(premise, conclusion):
+                return Imply(self._expand(premise), self._expand(conclusion), place=e.place)
+            case _:
+                return e
+
+    def world(self, world: World) -> World:
+        """The world with the facts of those recursive predicates that no action affects."""
+        supported = [circle for circle in self._circles if self._unsupported.keys().isdisjoint(circle)]
+        if not supported:
+            return world
+        closed = Overlay(world)
+        for circle in supported:  # each comes after those that it follows from
+            while facts := [fact for fact in self._consequences(circle, closed) if not _holds(fact, closed)]:
+                closed.apply(Delta(added=tuple(dict.fromkeys(facts))))
+        return closed
+
+    def require_supported(self, goal: Expression, actions: Iterable[PlanningAction]) -> None:
+        """Raise an error if the expanded goal or actions ask for a predicate that cannot be planned with.
+
+        Raises:
+            UnsupportedGoalError, UnsupportedActionError: which, why, and where it is asked for.
+        """
+        for atom in self._unsupported_in(goal):
+            raise UnsupportedGoalError(f"the goal asks for {self._why(atom.predicate)}", place=atom.place)
+        for action in actions:
+            for condition in (action.precondition, *effect_conditions(action.effect)):
+                for atom in self._unsupported_in(condition):
+                    raise UnsupportedActionError(
+                        f"the planning action '{action.name}' asks for {self._why(atom.predicate)}", place=atom.place
+                    )
+
+    def _why(self, name: str) -> str:
+        changing = ", ".join(f"'{one}'" for one in sorted(self._unsupported[name]))
+        return (
+            f"'{name}', a derived predicate that follows from itself (at {self._axioms[name][0].place}) and from what"
+            f" planning actions change ({changing}); no engine of unified-planning takes that"
+        )
+
+    def _unsupported_in(self, e: Expression | Term) -> Iterator[Atom]:
+        if isinstance(e, Atom) and e.predicate in self._unsupported:
+            yield e
+        for part in parts_of(e):
+            yield from self._unsupported_in(part)
+
+    def _dependencies(self, axioms: Iterable[Axiom]) -> nx.DiGraph[str]:
+        """Predicate -> what it follows from, derived or not."""
+        graph: nx.DiGraph[str] = nx.DiGraph()
+        for axiom in axioms:
+            graph.add_node(axiom.predicate)
+            graph.add_edges_from((axiom.predicate, name) for name in names_of(axiom.condition))
+        for axiom in axioms:
+            for atom in _denied(axiom.condition, wanted=True):
+                if atom.predicate in graph and nx.has_path(graph, atom.predicate, axiom.predicate):
+                    raise SchemaError(
+                        f"the derived predicate '{axiom.predicate}' follows from its own negation, through"
+                        f" '{atom.predicate}'",
+                        place=atom.place or axiom.place,
+                    )
+        return graph
+
+    def _action(self, action: PlanningAction) -> PlanningAction:
+        timed = action.timed and replace(
+            action.timed,
+            start=self.expand(action.timed.start),
+            over_all=self.expand(action.timed.over_all),
+            end=self.expand(action.timed.end),
+            start_effect=self._effect(action.timed.start_effect),
+            end_effect=self._effect(action.timed.end_effect),
+        )
+        return replace(
+            action, precondition=self.expand(action.precondition), effect=self._effect(action.effect), timed=timed
+        )
+
+    def _effect(self, effect: Effect) -> Effect:
+        match effect:
+            case AllOf(parts):
+                return replace(effect, parts=tuple(map(self._effect, parts)))
+            case ForEach(_, body):
+                return replace(effect, effect=self._effect(body))
+            case When(condition, body):
+                return replace(effect, condition=self.expand(condition), effect=self._effect(body))
+            case _:
+                return effect
+
+    def _instance(self, axiom: Axiom, atom: Atom) -> Expression:
+        """The axiom's condition for the atom's arguments, and their types where the axiom asks for narrower ones."""
+        declared = self._schema.predicates[axiom.predicate].parameters
+        tests = tuple(
+            _type_test(own, term)
+            for own, wide, term in zip(axiom.parameters, declared, atom.args, strict=True)
+            if own.types != wide.types
+        )
+        terms = dict(zip((p.name for p in axiom.parameters), atom.args, strict=True))
+        condition = _instantiated(axiom.condition, terms)
+        return And((*tests, condition)) if tests else condition
+
+    def _consequences(self, circle: Iterable[str], world: World) -> Iterator[Fact]:
+        """What the axioms for these predicates say in `world`."""
+        for name in sorted(circle):
+            for axiom in self._axioms[name]:
+                tests = (_type_test(p, Variable(p.name)) for p in axiom.parameters)
+                for found in query(And((*tests, self.expand(axiom.condition))), world):
+                    yield Fact(name, tuple(found[p.name] for p in axiom.parameters))
+
+
+_known: IdentityCache[PlanningDomain, Derivation] = IdentityCache(size=64)
+
+
+def _strata(graph: nx.DiGraph[str]) -> Iterator[frozenset[str]]:
+    """Predicates that follow from each other, after those that they follow from."""
+    components = nx.condensation(graph)
+    for number in reversed(list(nx.topological_sort(components))):
+        yield frozenset(components.nodes[number]["members"])
+
+
+def _is_circle(component: frozenset[str], graph: nx.DiGraph[str]) -> bool:
+    return len(component) > 1 or any(graph.has_edge(name, name) for name in component)
+
+
+def _holds(fact: Fact, world: World) -> bool:
+    return world.holds(fact.predicate, fact.args)
+
+
+def _denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
+    """The atoms that stand under an odd number of negations (`wanted`: seen from outside)."""
+    match e:
+        case Atom():
+            yield from () if wanted else (e,)
+        case Not(body):
+            yield from _denied(body, wanted=not wanted)
+        case Imply(premise, conclusion):
+            yield from _denied(premise, wanted=not wanted)
+            yield from _denied(conclusion, wanted=wanted)
+        case _:
+            for part in parts_of(e):
+                yield from _denied(part, wanted=wanted)
+
+
+def _type_test(parameter: TypedVariable, term: Term) -> Expression:
+    types = [one for one in parameter.types or (ROOT_TYPE,) if one not in VALUE_TYPES]
+    return Or(tuple(Atom(one, (term,)) for one in types)) if types else And(())
+
+
+def _instantiated(e: Expression, terms: Mapping[str, Term]) -> Expression:
+    """The condition with terms in the place of free variables; its own variables are renamed where they would clash."""
+    match e:
+        case Atom(_, args):
+            return replace(e, args=_all(args, terms))
+        case Not(body):
+            return replace(e, body=_instantiated(body, terms))
+        case And(parts) | Or(parts):
+            return replace(e, parts=tuple(_instantiated(part, terms) for part in parts))
+        case Imply(premise, conclusion):
+            return Imply(_instantiated(premise, terms), _instantiated(conclusion, terms), place=e.place)
+        case Comparison(operator, left, right):
+            return Comparison(operator, _term(left, terms), _term(right, terms), place=e.place)
+        case Exists(variables, body) | Forall(variables, body):
+            renamed = _renamed(variables, terms)
+            inner = {**terms, **{old.name: Variable(new.name) for old, new in zip(variables, renamed, strict=True)}}
+            return replace(e, variables=renamed, body=_instantiated(body, inner))
+
+
+def _renamed(variables: tuple[TypedVariable, ...], terms: Mapping[str, Term]) -> tuple[TypedVariable, ...]:
+    taken = frozenset().union(*map(free_variables, terms.values()))
+
+    def fresh(name: str) -> str:
+        while name in taken:
+            name += "'"
+        return name
+
+    return tuple(replace(variable, name=fresh(variable.name)) for variable in variables)
+
+
+def _all(args: tuple[Term, ...], terms: Mapping[str, Term]) -> tuple[Term, ...]:
+    return tuple(_term(arg, terms) for arg in args)
+
+
+def _term(term: Term, terms: Mapping[str, Term]) -> Term:
+    match term:
+        case Variable(name):
+            return terms.get(name, term)
+        case Call(_, args) | Arithmetic(_, args):
+            return replace(term, args=_all(args, terms))
+        case _:
+            return term

@@ -1,0 +1,214 @@
+"""The ground actions of a domain, found by relaxed reachability and kept from one problem to the next.
+
+A worklist (semi-naive, as in Helmert 2009, *Concise finite-domain representations*) joins each newly reached
+fact with those reached before, so that only argument tuples are met whose positive preconditions can all
+become true. What was reached stays reached: the next world only adds the facts that are new in it, and the
+actions that are out of reach there fall away later (`planning.posing.reduction`), as they must in any case.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact, Value
+from knowledge_base.language.effect import ForEach
+from knowledge_base.language.expression import Exists, Expression, Forall, Term, Variable, parts_of
+from knowledge_base.schema import ROOT_TYPE
+from planning.plan import PlanStep
+from planning.posing.conditions import Grounder
+from planning.posing.costs import Costs
+from planning.posing.grounding import Reached, Rule, Variant, joined_atoms, variants
+from planning.posing.numbering import Numbering
+from planning.posing.relevance import Relevant, effect_conditions, effect_parts
+from planning.posing.ways import Way, Ways
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from knowledge_base.language.evaluation import World
+    from knowledge_base.schema import Schema
+    from planning.domain import PlanningAction
+
+
+class Consulted:
+    """A world that remembers what it was asked, so that one can say later whether the answers would be the same.
+
+    Its things are all that there ever were.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._truths: dict[Fact, bool] = {}
+        self._numbers: dict[Fact, float] = {}
+        self.things = things_of(world)
+
+    def agrees(self, world: World) -> bool:
+        """Whether `world` gives all the answers that were given so far."""
+        return (
+            all(self.things.get(name, own) == own for name, own in things_of(world).items())
+            and all(world.holds(f.predicate, f.args) is truth for f, truth in self._truths.items())
+            and all(world.value(f.predicate, f.args) == number for f, number in self._numbers.items())
+        )
+
+    def follow(self, world: World) -> bool:
+        """Ask `world` from now on; whether there are things in it that were never there before."""
+        before, self._world = len(self.things), world
+        self.things.update(things_of(world))
+        return len(self.things) > before
+
+    @property
+    def schema(self) -> Schema:
+        """What may be said about it."""
+        return self._world.schema
+
+    def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
+        """Whether the fact is true."""
+        truth = self._truths[Fact(predicate, args)] = self._world.holds(predicate, args)
+        return truth
+
+    def value(self, function: str, args: tuple[Value, ...]) -> float:
+        """The numeric fluent's value."""
+        number = self._numbers[Fact(function, args)] = self._world.value(function, args)
+        return number
+
+    def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
+        """The facts that agree with the pattern; not remembered: grounding asks for one fact after the other."""
+        return self._world.match(predicate, pattern)
+
+    def objects(self, type_name: str) -> Iterable[str]:
+        """The things of that type."""
+        return [name for name, own in self.things.items() if self.schema.is_a(own, type_name)]
+
+    def type_of(self, name: str) -> str | None:
+        """The thing's type."""
+        return self.things.get(name)
+
+
+class Groundwork:
+    """Ground actions over all facts that were reached so far.
+
+    Attributes:
+        numbering: of all that they are about.
+        ways: all ways to take a step in one of the worlds so far; in an order that does not depend on them.
+
+    Args:
+        relevant: what of the domain matters.
+        metric: what plans shall have little of.
+        world: the first world it serves.
+    """
+
+    def __init__(self, relevant: Relevant, metric: Term | None, world: World) -> None:
+        self.numbering = Numbering()
+        self._world = Consulted(world)
+        self._grounder = Grounder(self._world, relevant.changing)
+        self._actions = relevant.actions
+        self._over_all = any(_ranges_over_all(action, world.schema) for action in relevant.actions)
+        self._order = {action.name: i for i, action in enumerate(relevant.actions)}
+        self._costs = Costs.of(metric, self._grounder)
+        self._rules: list[Rule] = []
+        self._reached = Reached()
+        self._met: set[Fact] = set()
+        self._queue: deque[Fact] = deque()
+        self._done: set[PlanStep] = set()
+        self.ways = Ways([])
+        self._found_so_far = 0
+
+    def serves(self, world: World) -> bool:
+        """Whether everything that was worked out is right for this world, too."""
+        same = not self._over_all or list(things_of(world)) == list(self._world.things)
+        return same and self._world.agrees(world)
+
+    def extend(self, world: World) -> None:
+        """Find the ways that are possible only in this world.
+
+        Raises:
+            UnsupportedActionError: see `planning.posing.grounding.variants`.
+        """
+        found = list(self._found(world, more=self._world.follow(world)))
+        if found:
+            self.ways = Ways(sorted([*self.ways.all, *found], key=self._key))
+
+    def _found(self, world: World, *, more: bool) -> Iterator[Way]:
+        first = not self._rules
+        if first or more:
+            self._rules = [Rule.of(action, self._grounder) for action in self._actions]
+        for rule in self._rules if first else ():
+            if not rule.atoms:
+                yield from self._take(rule, {})
+        triggers: dict[str, list[tuple[Rule, int]]] = {}
+        for rule in self._rules:
+            for position, atom in enumerate(rule.atoms):
+                triggers.setdefault(atom.predicate, []).append((rule, position))
+        for predicate in triggers:
+            arity = len(world.schema.predicates[predicate].parameters)
+            for args in world.match(predicate, (None,) * arity):
+                self._meet(Fact(predicate, args))
+        while self._queue:
+            fact = self._queue.popleft()
+            self._reached.add(fact)
+            for rule, position in triggers.get(fact.predicate, ()):
+                start = rule.unify(rule.atoms[position], fact, {})
+                rest = rule.atoms[:position] + rule.atoms[position + 1 :]
+                for bindings in rule.join(self._reached, rest, start) if start is not None else ():
+                    yield from self._take(rule, bindings)
+
+    def _meet(self, fact: Fact) -> None:
+        if fact not in self._met:
+            self._met.add(fact)
+            self._queue.append(fact)
+
+    def _take(self, rule: Rule, bindings: dict[str, Value]) -> Iterator[Way]:
+        open_parameters = [p for p in rule.action.parameters if p.name not in bindings]
+        for full in self._grounder.choices(open_parameters, bindings):
+            step = PlanStep(rule.action.name, tuple([str(full[p.name]) for p in rule.action.parameters]))
+            if step not in self._done:
+                self._done.add(step)
+                for variant in variants(rule.action, full, self._grounder):
+                    for effect in variant.effects:
+                        if effect.positive:
+                            self._meet(effect.fact)
+                    yield self._way(variant)
+
+    def _way(self, variant: Variant) -> Way:
+        cost = 1.0 if self._costs is None else self._costs.cost(variant.assignments)
+        self._found_so_far += 1
+        return numbered(variant, self.numbering, cost, self._found_so_far)
+
+    def _key(self, way: Way) -> tuple[int, tuple[str, ...]]:
+        """Independent of which world the way was found for; ways of one step are found together."""
+        return (self._order[way.step.action], way.step.args) if way.step else (len(self._order), ())
+
+
+def numbered(variant: Variant, numbering: Numbering, cost: float | None, number: int = -1) -> Way:
+    """The variant in numbers."""
+    made = [numbering.of(effect) for effect in variant.effects]
+    touched = [numbering.fluent(one.fluent) for one in variant.assignments]
+    return Way(
+        variant.step,
+        tuple([numbering.of(leaf) for leaf in variant.condition]),
+        (*made, *touched),
+        tuple([number ^ 1 for number in made]),
+        variant.assignments,
+        cost,
+        number,
+    )
+
+
+def things_of(world: World) -> dict[str, str]:
+    """All things with their types."""
+    return {name: world.type_of(name) or ROOT_TYPE for name in world.objects(ROOT_TYPE)}
+
+
+def _ranges_over_all(action: PlanningAction, schema: Schema) -> bool:
+    """Whether which ways there are depends on all things of a type, not only on those that facts name."""
+    bound = {term.name for atom in joined_atoms(action, schema) for term in atom.args if isinstance(term, Variable)}
+    return (
+        any(parameter.name not in bound for parameter in action.parameters)
+        or any(map(_quantified, (action.precondition, *effect_conditions(action.effect))))
+        or any(isinstance(part, ForEach) for part in effect_parts(action.effect))
+    )
+
+
+def _quantified(e: Expression | Term) -> bool:
+    return isinstance(e, Exists | Forall) or any(map(_quantified, parts_of(e)))

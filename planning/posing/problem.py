@@ -1,0 +1,224 @@
+"""Posing a problem: the slice of the world and of the domain that matters for a goal, ready for an engine.
+
+The steps of it: choose the relevant actions; ground them along what is reachable, evaluating what cannot
+change; turn a disjunctive goal into bookkeeping actions after the last real one; leave out what cannot matter;
+leave out objects that others can stand in for; make negative conditions positive.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact
+from knowledge_base.language.check import check
+from knowledge_base.language.evaluation import holds
+from knowledge_base.language.expression import Expression, Term
+from knowledge_base.language.memory import IdentityCache
+from knowledge_base.language.printer import to_text
+from planning.errors import UnsupportedActionError, UnsupportedGoalError
+from planning.posing.assembly import Assembly
+from planning.posing.conditions import Every, Grounder, Leaf, Literal, Residual, Some
+from planning.posing.costs import ignored, metric_of
+from planning.posing.derived import derivation
+from planning.posing.grounding import Variant
+from planning.posing.groundwork import Groundwork, numbered, things_of
+from planning.posing.interchange import spared
+from planning.posing.quantities import Bound
+from planning.posing.reduction import Task, pruned, reachable
+from planning.posing.relevance import Relevant, relevant
+from planning.posing.ways import Ways
+from planning.strips import Problem
+
+if TYPE_CHECKING:
+    from knowledge_base.exchange.problem_text import Metric
+    from knowledge_base.language.evaluation import World
+    from planning.domain import PlanningDomain
+    from planning.posing.numbering import Numbering
+
+# Names with blanks, which no declared name can clash with.
+_ACTING, _FINISHED = Literal(Fact("still acting")), Literal(Fact("finished acting"))
+_ONE_OF = "one of"
+_MOST_KEPT = 8  # goals of different kinds, each with its ground actions
+
+
+def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Metric | None = None) -> Problem:
+    """The problem of reaching `goal` from `world`, which stays as it is.
+
+    What the next problem of the same domain needs again is kept; see `Poser`.
+
+    Args:
+        domain: the planning actions.
+        world: the present.
+        goal: what shall hold.
+        metric: what makes a plan better than another; to minimize `(total-cost)` if the domain declares that.
+
+    Raises:
+        InputError: the goal has a free variable, or names something that is not declared or not known.
+        UnsupportedGoalError: the goal states a fact about a number that actions change, or asks for a derived
+            predicate that cannot be planned with.
+        UnsupportedActionError: so does an action that matters, or it has too many alternatives.
+    """
+    poser = _posers.find(domain, None) or _posers.keep(domain, None, Poser(domain))
+    return poser.pose(world, goal, metric)
+
+
+def check_goal(goal: Expression, world: World) -> None:
+    """Raise an `InputError` unless the goal says something about the things of this world."""
+    check(goal, world.schema, objects=things_of(world))
+
+
+@dataclass(frozen=True, slots=True)
+class Posing:
+    """A problem before anything that cannot contribute is left out.
+
+    Attributes:
+        relevant: what of the domain matters.
+        wanted: what is left of the goal; `False` if it can never hold.
+        task: the ground problem; `None` if the goal can never hold.
+        assembly: makes a `Problem` of the task.
+    """
+
+    relevant: Relevant
+    wanted: Residual
+    task: Task | None = None
+    assembly: Assembly | None = None
+
+
+class Poser:
+    """Poses one problem after the other for a domain, and keeps what the next one needs again.
+
+    The problem is the same as that of a new poser, only sooner. May be used by several threads.
+    """
+
+    def __init__(self, domain: PlanningDomain) -> None:
+        self._derivation = derivation(domain)
+        self._domain = self._derivation.domain
+        self._kept: dict[tuple[tuple[str, ...], frozenset[str], Term | None], tuple[Groundwork, Assembly]] = {}
+        self._lock = threading.Lock()
+
+    def pose(self, world: World, goal: Expression, metric: Metric | None = None) -> Problem:
+        """See `planning.posing.problem.pose`."""
+        check_goal(goal, world)
+        world = self._derivation.world(world)
+        if holds(self._derivation.expand(goal), world):
+            return self._nothing()
+        amount = metric_of(metric, world.schema)
+        with self._lock:
+            posing = self.posing(world, goal, amount)
+            if posing.task is None or posing.assembly is None:
+                return self._nothing(to_text(goal))
+            reach, numbering = reachable(posing.task), posing.task.numbering
+            missing = [said(numbering, one, goal) for one in posing.task.goal if one not in reach.facts]
+            if missing:
+                return self._nothing(*dict.fromkeys(missing))
+            task, notes = _priced(pruned(posing.task, reach), amount)
+            return self._sliced(task, posing.assembly, world, notes)
+
+    def posing(self, world: World, goal: Expression, metric: Term | None = None) -> Posing:
+        """The problem of reaching a checked goal, with everything evaluated that cannot change.
+
+        Args:
+            world: the present, with derived facts.
+            goal: what shall hold.
+            metric: what plans shall have little of.
+
+        Raises:
+            UnsupportedGoalError, UnsupportedActionError: as for `pose`.
+        """
+        goal = self._derivation.expand(goal)
+        matters = relevant(goal, metric, self._domain.actions.values())
+        self._derivation.require_supported(goal, matters.actions)
+        grounder = Grounder(world, matters.changing, keep_false=True)
+        try:
+            wanted = grounder.residual(goal, {})
+        except UnsupportedActionError as error:
+            raise UnsupportedGoalError(error.message, place=error.place) from None
+        if wanted is False:
+            return Posing(matters, wanted)
+        groundwork, assembly = self._prepared(matters, metric, world)
+        numbering = groundwork.numbering
+        ways, goal_numbers = _with_conjunctive_goal(groundwork.ways, wanted, numbering)
+        init = (numbering.present(world) - {numbering.of(_ACTING.negated)}) | {numbering.of(_ACTING)}
+        task = Task(numbering, init, goal_numbers, ways)
+        return Posing(matters, wanted, task, assembly)
+
+    def _prepared(self, matters: Relevant, metric: Term | None, world: World) -> tuple[Groundwork, Assembly]:
+        """The ground actions that may matter, those of an earlier problem if they serve."""
+        key = (tuple(action.name for action in matters.actions), matters.changing, metric)
+        known = self._kept.pop(key, None)  # taken out, so that an error on the way leaves nothing half done
+        if known is None or not known[0].serves(world):
+            groundwork = Groundwork(matters, metric, world)
+            known = groundwork, Assembly(groundwork.numbering)
+        known[0].extend(world)
+        while len(self._kept) >= _MOST_KEPT:
+            del self._kept[next(iter(self._kept))]
+        self._kept[key] = known
+        return known
+
+    def _sliced(self, task: Task, assembly: Assembly, world: World, notes: tuple[str, ...]) -> Problem:
+        name = self._domain.name
+        whole = assembly.problem(name, task, world, notes)
+        left = spared(task)
+        if left is None:
+            return whole
+        slice_ = replace(task, ways=left)
+        reach = reachable(slice_)
+        if not reach.facts.issuperset(task.goal):
+            return whole
+        return replace(assembly.problem(name, pruned(slice_, reach), world, notes), whole=whole)
+
+    def _nothing(self, *unreachable: str) -> Problem:
+        """A problem that needs no engine: the goal holds, or cannot be reached."""
+        return Problem(self._domain.name, {}, (), (), (), unreachable)
+
+
+def _priced(task: Task, metric: Term | None) -> tuple[Task, tuple[str, ...]]:
+    """The task with costs; all the same, and a note why, if the metric is no cost of actions."""
+    if metric is None or all(way.cost is not None for way in task.ways.all):
+        return task, ()
+    ways = Ways([way._replace(cost=None if way.step is None else 1.0) for way in task.ways.all])
+    return replace(task, ways=ways), (ignored(metric),)
+
+
+def _with_conjunctive_goal(ways: Ways, goal: Residual, numbering: Numbering) -> tuple[Ways, tuple[int, ...]]:
+    """The goal as literals and bounds; a disjunction in it becomes a fact that bookkeeping actions can add.
+
+    They can be taken only after the last real action: a disjunct that held once might be undone later.
+    """
+    bookkeeping: list[Variant] = []
+    wanted = tuple(map(numbering.of, _conjunction(goal, bookkeeping)))
+    if not bookkeeping:
+        return ways, wanted
+    finish = Variant(None, (_ACTING,), (_ACTING.negated, _FINISHED))
+    closing = [Variant(None, (*way.condition, _FINISHED), way.effects) for way in bookkeeping]
+    acting = numbering.of(_ACTING)
+    real = [way._replace(needs=(*way.needs, acting)) for way in ways.all]
+    return Ways([*real, *(numbered(variant, numbering, 0.0) for variant in (finish, *closing))]), wanted
+
+
+def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Leaf, ...]:
+    match goal:
+        case Literal() | Bound():
+            return (goal,)
+        case Every(parts):
+            return tuple(leaf for part in parts for leaf in _conjunction(part, bookkeeping))
+        case Some(parts):
+            choices = [_conjunction(part, bookkeeping) for part in parts]
+            chosen = Literal(Fact(_ONE_OF, (len(bookkeeping),)))
+            bookkeeping.extend(Variant(None, choice, (chosen,)) for choice in choices)
+            return (chosen,)
+        case _:
+            return ()
+
+
+_posers: IdentityCache[PlanningDomain, Poser] = IdentityCache(size=8)
+
+
+def said(numbering: Numbering, missing: int, goal: Expression) -> str:
+    """A part of the goal as its reader knows it."""
+    what = numbering.named(missing)
+    if isinstance(what, Fact) and what.predicate == _ONE_OF:
+        return to_text(goal)
+    return f"(not {what})" if missing & 1 else str(what)

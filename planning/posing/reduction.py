@@ -1,0 +1,158 @@
+"""What of a ground problem can matter (S1.5): what can ever happen, and what can contribute to the goal.
+
+Everything here is exact: there is a plan for what is kept if and only if there is one for the whole, and it
+costs the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from planning.posing.quantities import fluents
+from planning.posing.ways import Way, Ways
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    from planning.posing.numbering import Numbering
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A ground problem in numbers.
+
+    Attributes:
+        numbering: what they stand for.
+        init: literals and bounds that hold.
+        goal: literals and bounds that shall hold.
+        ways: what may be done.
+    """
+
+    numbering: Numbering
+    init: Collection[int]
+    goal: tuple[int, ...]
+    ways: Ways
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """What is possible when nothing ever becomes false (the delete relaxation).
+
+    Attributes:
+        facts: the literals, bounds and fluents reached.
+        taken: by position, whether a way is possible (1) or not (0).
+    """
+
+    facts: set[int]
+    taken: bytearray
+
+
+def reachable(task: Task) -> Reach:
+    """What can hold and happen; a bound counts as possible as soon as one of its numbers can change."""
+    ways, users, supports = task.ways.all, task.ways.users, task.numbering.supports
+    reached, agenda = set(task.init), list(task.init)
+    missing = list(task.ways.counts)
+    taken = bytearray(len(ways))
+    ready = [i for i, count in enumerate(missing) if not count]
+    while ready or agenda:
+        if ready:
+            i = ready.pop()
+            taken[i] = 1
+            for one in ways[i].adds:
+                if one not in reached:
+                    fresh = [one, *(bound for bound in supports.get(one, ()) if bound not in reached)]
+                    reached.update(fresh)
+                    agenda += fresh
+        else:
+            for i in users.get(agenda.pop(), ()):
+                missing[i] -= 1
+                if not missing[i]:
+                    ready.append(i)
+    return Reach(reached, taken)
+
+
+def pruned(task: Task, reach: Reach) -> Task:
+    """The task with everything left out that cannot matter.
+
+    Left out are ways that can never be taken or cannot contribute to the goal, literals that no kept way or goal
+    asks for, and literals and bounds that hold now and can never cease to (they hold whenever asked for).
+    """
+    # From one problem to the next mostly other facts hold, but the same is possible, and the same can cease to hold.
+    key = (bytes(reach.taken), task.goal)
+    contribution = task.ways.known(key, lambda: _contributing(task, reach))
+    settled = contribution.lasting.intersection(task.init)
+    ways = task.ways.known((key, settled), lambda: Ways(_restricted(contribution, settled, task.numbering)))
+    goal = tuple([one for one in task.goal if one not in settled])
+    present = set(task.init)
+    init = tuple([one for one in dict.fromkeys((*ways.asked, *goal)) if one in present])
+    return Task(task.numbering, init, goal, ways)
+
+
+@dataclass(frozen=True, slots=True)
+class _Contribution:
+    """What contributes to a goal.
+
+    Attributes:
+        wanted: what the goal and the ways ask for.
+        ways: those that add something of it, or change a number that it depends on.
+        lasting: what of it can never cease to hold, if it does: no way deletes it or changes its numbers.
+    """
+
+    wanted: set[int]
+    ways: Sequence[Way]
+    lasting: frozenset[int]
+
+
+def _contributing(task: Task, reach: Reach) -> _Contribution:
+    ways, adders, wants = task.ways.all, task.ways.adders, task.numbering.wants
+    open_, inputs = bytearray(reach.taken), _inputs(ways, task.numbering)
+    wanted, agenda = set(task.goal), list(task.goal)
+    found: list[int] = []
+    while agenda:
+        here = agenda.pop()
+        fresh = [one for one in (*wants.get(here, ()), *inputs.get(here, ())) if one not in wanted]
+        wanted.update(fresh)
+        agenda += fresh
+        for i in adders.get(here, ()):
+            if open_[i]:
+                open_[i] = 0
+                found.append(i)
+                for need in ways[i].needs:
+                    if need not in wanted:
+                        wanted.add(need)
+                        agenda.append(need)
+    kept = [ways[i] for i in sorted(found)]
+    made = {one for way in kept for one in way.deletes}
+    made.update(one for way in kept for one in way.adds if one in task.numbering.fluents)
+    lasting = frozenset(one for one in wanted if one not in made and made.isdisjoint(wants.get(one, ())))
+    return _Contribution(wanted, kept, lasting)
+
+
+def _inputs(ways: Iterable[Way], numbering: Numbering) -> Mapping[int, Iterable[int]]:
+    """Fluent -> the fluents that amounts assigned to it depend on."""
+    found: dict[int, set[int]] = {}
+    for way in ways if numbering.fluents else ():
+        for one in way.assignments:
+            found.setdefault(numbering.fluent(one.fluent), set()).update(map(numbering.fluent, fluents(one.amount)))
+    return found
+
+
+def _restricted(contribution: _Contribution, settled: frozenset[int], numbering: Numbering) -> list[Way]:
+    """The ways without what nobody asks for."""
+    asked = contribution.wanted - settled
+    clean = [_clean(way, asked, settled, numbering) for way in contribution.ways]
+    return [way for way in clean if way.adds]
+
+
+def _clean(way: Way, asked: set[int], settled: frozenset[int], numbering: Numbering) -> Way:
+    needs = tuple([one for one in way.needs if one not in settled])
+    return Way(
+        way.step,
+        needs,
+        tuple([one for one in way.adds if one in asked and one not in needs]),
+        tuple([one for one in way.deletes if one in asked]),
+        tuple([a for a in way.assignments if numbering.fluent(a.fluent) in asked]) if way.assignments else (),
+        way.cost,
+        way.number,
+    )

@@ -1,0 +1,241 @@
+"""Why there is no plan: which goal facts are out of reach, and what is missing for the nearest action."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact, Value
+from knowledge_base.language.effect import Add, AllOf, Effect, ForEach, When
+from knowledge_base.language.evaluation import World, explain
+from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
+from knowledge_base.language.printer import to_text
+from planning.plan import PlanStep
+from planning.posing.conditions import Every, Grounder, Literal, Residual, Some
+from planning.posing.derived import derivation
+from planning.posing.grounding import Reached, Rule
+from planning.posing.numbering import as_fact
+from planning.posing.problem import Poser, check_goal
+from planning.posing.quantities import Bound
+from planning.posing.reduction import Task, reachable
+from planning.posing.relevance import effect_leaves
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from planning.domain import PlanningAction, PlanningDomain
+
+_LONGEST_CHAIN = 6
+
+
+def why_unsolvable(domain: PlanningDomain, world: World, goal: Expression) -> tuple[str, ...]:
+    """One sentence for each goal fact that no action sequence can reach even if nothing became false.
+
+    Each follows the nearest action back to what is missing in the end. If every fact is reachable alone,
+    the one sentence says so: then it is the deletions that stand in the way.
+
+    Raises:
+        InputError: as for `planning.posing.problem.pose`.
+    """
+    check_goal(goal, world)
+    derived = derivation(domain)
+    domain, world, goal = derived.domain, derived.world(world), derived.expand(goal)
+    posing = Poser(domain).posing(world, goal)
+    if posing.task is None:
+        return (f"{explain(goal, world).deciding} and no planning action changes that",)
+    grounder = Grounder(world, posing.relevant.changing)
+    rules = tuple(Rule.of(case, grounder) for action in posing.relevant.actions for case in _cases(action))
+    reach = _Reach.of(posing.task, world)
+    known = dict.fromkeys([*_present(rules, world), *sorted(reach.facts, key=str)])
+    causes = _Causes(domain, rules, grounder, reach, frozenset(known), Reached(known))
+    return tuple(dict.fromkeys(causes.of(posing.wanted))) or (
+        "each goal fact can be reached by itself, but not all of them together",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Reach:
+    """What can hold if nothing ever became false.
+
+    Attributes:
+        facts: in positive normal form.
+        fluents: the numbers that can change.
+        world: the present.
+    """
+
+    facts: frozenset[Fact]
+    fluents: frozenset[Fact]
+    world: World
+
+    @staticmethod
+    def of(task: Task, world: World) -> _Reach:
+        reached, numbering = reachable(task).facts, task.numbering
+        named = [one for one in reached if isinstance(numbering.named(one), Fact)]
+        fluents = frozenset(numbering.fact(one) for one in named if one in numbering.fluents)
+        return _Reach(frozenset(map(numbering.fact, named)) - fluents, fluents, world)
+
+    def allows(self, condition: Residual) -> bool:
+        """Whether the condition holds, or may hold: each of its leaves by itself."""
+        match condition:
+            case bool():
+                return condition
+            case Literal(fact, positive):
+                present = self.world.holds(fact.predicate, fact.args) is positive
+                return present or as_fact(condition) in self.facts
+            case Bound():
+                asked = set(condition.fluents())
+                numbers = {one: self.world.value(one.predicate, one.args) for one in asked}
+                return condition.holds(numbers) or not self.fluents.isdisjoint(asked)
+            case Every(parts):
+                return all(map(self.allows, parts))
+            case Some(parts):
+                return any(map(self.allows, parts))
+
+
+@dataclass(frozen=True, slots=True)
+class _Nearest:
+    """A step that would add a fact, with what it lacks: facts, conditions, and how many are unchangeable."""
+
+    step: PlanStep
+    facts: tuple[Fact, ...]
+    conditions: tuple[str, ...]
+
+    fixed: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Causes:
+    domain: PlanningDomain
+    rules: tuple[Rule, ...]
+    grounder: Grounder
+    reach: _Reach
+    reached: frozenset[Fact]
+    index: Reached
+
+    def of(self, wanted: Residual) -> Iterator[str]:
+        """A sentence for each literal that is out of reach."""
+        match wanted:
+            case Literal():
+                if as_fact(wanted) not in self.reached:
+                    yield self.chain(wanted.fact) if wanted.positive else _stays(wanted.fact)
+            case Bound():
+                if not self.reach.allows(wanted):
+                    yield f"{wanted} does not hold, and no planning action that can be taken changes that"
+            case Every(parts):
+                for part in parts:
+                    yield from self.of(part)
+            case Some(parts):
+                causes = [tuple(self.of(part)) for part in parts]
+                if all(causes):
+                    yield from itertools.chain.from_iterable(causes)
+
+    def chain(self, fact: Fact) -> str:
+        """From the fact through the nearest actions to what cannot be had."""
+        said: list[str] = []
+        agenda, seen = [fact], {fact}
+        while agenda and len(said) < _LONGEST_CHAIN:
+            here = agenda.pop(0)
+            nearest = self.nearest(here)
+            if nearest is None:
+                said.append(f"{here} does not hold, and no planning action makes it true")
+                continue
+            said.append(f"{here} needs {nearest.step}, which needs {_listed(nearest)}")
+            fresh = [missing for missing in nearest.facts if missing not in seen]
+            seen.update(fresh)
+            agenda.extend(fresh)
+        return "; ".join(said)
+
+    def nearest(self, fact: Fact) -> _Nearest | None:
+        """The action that lacks least for adding the fact; the first of the domain among equals."""
+        found = [near for rule in self.rules for near in self.ways(rule, fact)]
+        return min(found, key=_distance, default=None)
+
+    def ways(self, rule: Rule, fact: Fact) -> Iterator[_Nearest]:
+        """For each effect of the action that can be the fact, the arguments that lack least."""
+        for leaf in effect_leaves(rule.action.effect):
+            if isinstance(leaf, Add) and leaf.atom.predicate == fact.predicate:
+                start = rule.unify(leaf.atom, fact, {})
+                closest = None if start is None else self.closest(rule, start)
+                if closest is not None:
+                    yield closest
+
+    def closest(self, rule: Rule, start: dict[str, Value]) -> _Nearest | None:
+        """Give up ever more of the positive preconditions until arguments are found for the others."""
+        for given_up in range(len(rule.atoms) + 1):
+            found = [
+                self.lacking(rule, full)
+                for kept in itertools.combinations(rule.atoms, len(rule.atoms) - given_up)
+                for bindings in itertools.islice(rule.join(self.index, kept, start), 1)
+                if (full := self.completed(rule, bindings)) is not None
+            ]
+            if found:
+                return min(found, key=_distance)
+        return None
+
+    def completed(self, rule: Rule, bindings: dict[str, Value]) -> dict[str, Value] | None:
+        """Parameters that nothing decides stand for the first object of their type."""
+        first = {name: next(iter(objects), None) for name, objects in rule.allowed.items()}
+        full = {name: bindings.get(name, value) for name, value in first.items()}
+        return {k: v for k, v in full.items() if v is not None} if None not in full.values() else None
+
+    def lacking(self, rule: Rule, bindings: dict[str, Value]) -> _Nearest:
+        parameters = self.domain.actions[rule.action.name].parameters
+        step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in parameters))
+        needed = [self.grounder.fact(atom, bindings) for atom in rule.atoms]
+        others = _parts(rule.action.precondition)
+        unmet = [
+            c for c in others if c not in rule.atoms and not self.reach.allows(self.grounder.residual(c, bindings))
+        ]
+        missing = tuple(fact for fact in needed if fact not in self.reached)
+        fixed = len(unmet) + sum(fact.predicate not in self.grounder.changing for fact in missing)
+        return _Nearest(step, missing, tuple(to_text(substitute(c, bindings)) for c in unmet), fixed)
+
+
+def _cases(action: PlanningAction) -> Iterator[PlanningAction]:
+    """One action for each effect, with what the effect depends on as parameters and precondition."""
+    for leaf, variables, conditions in _effects(action.effect):
+        needed = (*_parts(action.precondition), *(part for one in conditions for part in _parts(one)))
+        yield replace(
+            action, parameters=(*action.parameters, *variables), precondition=And(needed), effect=leaf
+        )
+
+
+def _effects(
+    effect: Effect, variables: tuple[TypedVariable, ...] = (), conditions: tuple[Expression, ...] = ()
+) -> Iterator[tuple[Effect, tuple[TypedVariable, ...], tuple[Expression, ...]]]:
+    """The changes an effect consists of, each with the variables and conditions around it."""
+    match effect:
+        case AllOf(parts):
+            for part in parts:
+                yield from _effects(part, variables, conditions)
+        case ForEach(more, body):
+            yield from _effects(body, (*variables, *more), conditions)
+        case When(condition, body):
+            yield from _effects(body, variables, (*conditions, condition))
+        case _:
+            yield effect, variables, conditions
+
+
+def _parts(e: Expression) -> tuple[Expression, ...]:
+    return e.parts if isinstance(e, And) else (e,)
+
+
+def _present(rules: Iterable[Rule], world: World) -> Iterator[Fact]:
+    """The facts that hold now, of all predicates that the actions ask for."""
+    for predicate in dict.fromkeys(atom.predicate for rule in rules for atom in rule.atoms):
+        arity = len(world.schema.predicates[predicate].parameters)
+        for args in world.match(predicate, (None,) * arity):
+            yield Fact(predicate, tuple(args))
+
+
+def _distance(near: _Nearest) -> tuple[int, int]:
+    return len(near.facts) + len(near.conditions), near.fixed
+
+
+def _listed(nearest: _Nearest) -> str:
+    return " and ".join([*map(str, nearest.facts), *nearest.conditions]) or "more than can hold together"
+
+
+def _stays(fact: Fact) -> str:
+    return f"{fact} holds, and no planning action makes it false"

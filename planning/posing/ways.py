@@ -1,0 +1,82 @@
+"""Ground actions in numbers (see `planning.posing.numbering`), and an index of what they need and add."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from planning.plan import PlanStep
+from planning.posing.quantities import Assignment
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Mapping, Sequence
+
+_T = TypeVar("_T")
+_MOST_KNOWN = 16
+
+
+class Way(NamedTuple):
+    """One way to take a step; a tuple, for thousands are made for each problem.
+
+    Attributes:
+        step: the step; `None` for bookkeeping.
+        needs: literals and bounds that must hold before.
+        adds: literals that hold afterwards and fluents that it changes.
+        deletes: literals that hold no longer.
+        assignments: how it changes them.
+        cost: `None` if what it does to the metric is no cost.
+        number: the same for what is left of a way when parts that do not matter are left out.
+    """
+
+    step: PlanStep | None
+    needs: tuple[int, ...]
+    adds: tuple[int, ...]
+    deletes: tuple[int, ...]
+    assignments: tuple[Assignment, ...] = ()
+    cost: float | None = 1.0
+    number: int = -1
+
+
+class Ways:
+    """Ways in order, indexed when that is first asked for; referred to by position."""
+
+    def __init__(self, ways: Sequence[Way]) -> None:
+        self.all = ways
+        self._known: dict[Hashable, Any] = {}
+
+    def known(self, key: Hashable, work_out: Callable[[], _T]) -> _T:
+        """What follows from these ways and `key`; worked out unless that was done lately."""
+        if key not in self._known:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = work_out()
+        found: _T = self._known[key]
+        return found
+
+    @cached_property
+    def counts(self) -> Sequence[int]:
+        """How much each way needs."""
+        return [len(way.needs) for way in self.all]
+
+    @cached_property
+    def asked(self) -> Sequence[int]:
+        """All that they need, in the order of the ways."""
+        return tuple(dict.fromkeys([one for way in self.all for one in way.needs]))
+
+    @cached_property
+    def users(self) -> Mapping[int, Sequence[int]]:
+        """Literal or bound -> the ways that need it."""
+        users: dict[int, list[int]] = {}
+        for i, way in enumerate(self.all):
+            for one in way.needs:
+                users.setdefault(one, []).append(i)
+        return users
+
+    @cached_property
+    def adders(self) -> Mapping[int, Sequence[int]]:
+        """Literal or fluent -> the ways that add or change it."""
+        adders: dict[int, list[int]] = {}
+        for i, way in enumerate(self.all):
+            for one in way.adds:
+                adders.setdefault(one, []).append(i)
+        return adders
