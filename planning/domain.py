@@ -10,7 +10,7 @@ from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameErr
 from knowledge_base.exchange.action_text import ActionText
 from knowledge_base.exchange.domain_text import AxiomText, DomainText, parse_domain, read_domain
 from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
-from knowledge_base.language.effect import Add, Delete
+from knowledge_base.language.effect import Add, Delete, effect_leaves
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
 from knowledge_base.language.expression import (
     And,
@@ -27,7 +27,6 @@ from knowledge_base.language.expression import (
 from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.schema import ROOT_TYPE, Schema
 from planning.fragments import merged_text, searched, text_of
-from planning.posing.relevance import effect_leaves
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from knowledge_base.facts import Fact
 from planning.plan import Plan, PlanStep
-from planning.posing.quantities import Assignment, Bound, Numbers, from_json, to_json
+from planning.quantities import Assignment, Bound, Numbers, from_json, to_json
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from knowledge_base.facts import Value
@@ -104,3 +104,24 @@ def mentioned(part: Expression | Term | Effect) -> frozenset[str]:
     if isinstance(part, Assign):
         return free_variables(part.call) | free_variables(part.value)
     return free_variables(part)
+
+
+def effect_parts(effect: Effect) -> Iterator[Effect]:
+    """The effect and all effects inside it."""
+    yield effect
+    match effect:
+        case AllOf(parts):
+            for part in parts:
+                yield from effect_parts(part)
+        case ForEach(_, body) | When(_, body):
+            yield from effect_parts(body)
+
+
+def effect_leaves(effect: Effect) -> Iterator[Add | Delete | Assign]:
+    """The changes an effect consists of."""
+    return (part for part in effect_parts(effect) if isinstance(part, Add | Delete | Assign))
+
+
+def effect_conditions(effect: Effect) -> Iterator[Expression]:
+    """The conditions of all conditional effects."""
+    return (part.condition for part in effect_parts(effect) if isinstance(part, When))

@@ -16,7 +16,7 @@ from unified_planning.model import Problem as UpProblem
 from unified_planning.model.metrics import MinimizeActionCosts
 
 from knowledge_base.facts import Fact
-from planning.posing.quantities import Assignment, Bound, Operation, Quantity
+from planning.quantities import Assignment, Bound, Operation, Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

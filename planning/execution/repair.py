@@ -12,11 +12,12 @@ from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from knowledge_base.language.effect import effect_conditions
 from knowledge_base.language.expression import Expression
 from knowledge_base.view import View
 from planning.domain import PlanningDomain
 from planning.plan import PlanStep
-from planning.posing.relevance import effect_conditions, names_of, relevant
+from planning.posing.relevance import names_of, relevant
 from planning.strips import Problem
 
 MOST_RESUMED = 3

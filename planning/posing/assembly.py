@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from planning.posing.quantities import Bound, fluents
+from planning.quantities import Bound, fluents
 from planning.strips import GroundAction, Problem
 
 if TYPE_CHECKING:

@@ -35,7 +35,7 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.printer import to_text
 from planning.errors import UnsupportedActionError
-from planning.posing.quantities import OPPOSITE, Assignment, Bound, Quantity, combined
+from planning.quantities import OPPOSITE, Assignment, Bound, Quantity, combined
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from knowledge_base.language.effect import effect_conditions
 from knowledge_base.language.expression import Comparison, Expression, Term, parts_of
 from knowledge_base.language.printer import to_text
 from planning.posing.derived import derivation
-from planning.posing.relevance import effect_conditions, names_of, relevant
+from planning.posing.relevance import names_of, relevant
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.language.expression import Arithmetic, Call, Term
 from knowledge_base.language.printer import to_text
-from planning.posing.quantities import Assignment, linear
 from planning.posing.relevance import names_of
+from planning.quantities import Assignment, linear
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

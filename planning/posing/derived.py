@@ -14,7 +14,7 @@ import networkx as nx
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.effect import AllOf, Effect, ForEach, When
+from knowledge_base.language.effect import AllOf, Effect, ForEach, When, effect_conditions
 from knowledge_base.language.evaluation import query
 from knowledge_base.language.expression import (
     And,
@@ -38,7 +38,7 @@ from knowledge_base.language.memory import IdentityCache
 from knowledge_base.overlay import Overlay
 from knowledge_base.schema import ROOT_TYPE, VALUE_TYPES
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
-from planning.posing.relevance import changed, effect_conditions, names_of
+from planning.posing.relevance import changed, names_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

@@ -11,7 +11,7 @@ from knowledge_base.language.expression import And, Atom, Constant, Expression, 
 from planning.errors import UnsupportedActionError
 from planning.plan import PlanStep
 from planning.posing.conditions import Grounder, Leaf, Literal, Residual, alternatives, every, negation
-from planning.posing.quantities import Assignment, combined, fluents
+from planning.quantities import Assignment, combined, fluents
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

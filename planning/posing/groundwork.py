@@ -12,7 +12,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.effect import ForEach
+from knowledge_base.language.effect import ForEach, effect_conditions, effect_parts
 from knowledge_base.language.expression import Exists, Expression, Forall, Term, Variable, parts_of
 from knowledge_base.schema import ROOT_TYPE
 from planning.plan import PlanStep
@@ -20,7 +20,7 @@ from planning.posing.conditions import Grounder
 from planning.posing.costs import Costs
 from planning.posing.grounding import Reached, Rule, Variant, joined_atoms, variants
 from planning.posing.numbering import Numbering
-from planning.posing.relevance import Relevant, effect_conditions, effect_parts
+from planning.posing.relevance import Relevant
 from planning.posing.ways import Way, Ways
 
 if TYPE_CHECKING:

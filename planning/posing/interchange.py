@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from planning.posing.quantities import Bound, fluents
 from planning.posing.ways import Way, Ways
+from planning.quantities import Bound, fluents
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

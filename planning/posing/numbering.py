@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
 from planning.posing.conditions import Leaf, Literal
-from planning.posing.quantities import Bound
+from planning.quantities import Bound
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

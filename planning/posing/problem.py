@@ -25,10 +25,10 @@ from planning.posing.derived import derivation
 from planning.posing.grounding import Variant
 from planning.posing.groundwork import Groundwork, numbered, things_of
 from planning.posing.interchange import spared
-from planning.posing.quantities import Bound
 from planning.posing.reduction import Task, pruned, reachable
 from planning.posing.relevance import Relevant, relevant
 from planning.posing.ways import Ways
+from planning.quantities import Bound
 from planning.strips import Problem
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
+from knowledge_base.language.effect import Add, Assign, Delete, Effect, effect_conditions, effect_leaves
 from knowledge_base.language.expression import Atom, Call, Expression, Term, parts_of
 
 if TYPE_CHECKING:
@@ -82,24 +82,3 @@ def name_of(leaf: Add | Delete | Assign) -> str:
 def changed(effect: Effect) -> frozenset[str]:
     """The predicates and functions an effect changes."""
     return frozenset(map(name_of, effect_leaves(effect)))
-
-
-def effect_parts(effect: Effect) -> Iterator[Effect]:
-    """The effect and all effects inside it."""
-    yield effect
-    match effect:
-        case AllOf(parts):
-            for part in parts:
-                yield from effect_parts(part)
-        case ForEach(_, body) | When(_, body):
-            yield from effect_parts(body)
-
-
-def effect_leaves(effect: Effect) -> Iterator[Add | Delete | Assign]:
-    """The changes an effect consists of."""
-    return (part for part in effect_parts(effect) if isinstance(part, Add | Delete | Assign))
-
-
-def effect_conditions(effect: Effect) -> Iterator[Expression]:
-    """The conditions of all conditional effects."""
-    return (part.condition for part in effect_parts(effect) if isinstance(part, When))

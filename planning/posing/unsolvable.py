@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.effect import Add, AllOf, Effect, ForEach, When
+from knowledge_base.language.effect import Add, AllOf, Effect, ForEach, When, effect_leaves
 from knowledge_base.language.evaluation import World, explain
 from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
 from knowledge_base.language.printer import to_text
@@ -17,9 +17,8 @@ from planning.posing.derived import derivation
 from planning.posing.grounding import Reached, Rule
 from planning.posing.numbering import as_fact
 from planning.posing.problem import Poser, check_goal
-from planning.posing.quantities import Bound
 from planning.posing.reduction import Task, reachable
-from planning.posing.relevance import effect_leaves
+from planning.quantities import Bound
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

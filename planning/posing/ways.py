@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from planning.plan import PlanStep
-from planning.posing.quantities import Assignment
+from planning.quantities import Assignment
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence

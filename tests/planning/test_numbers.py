@@ -16,8 +16,8 @@ from planning.domain import PlanningDomain
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep
 from planning.posing.problem import pose
-from planning.posing.quantities import Assignment, Bound, Operation, linear, text
 from planning.posing.unsolvable import why_unsolvable
+from planning.quantities import Assignment, Bound, Operation, linear, text
 from planning.strips import Problem
 from planning.validation import validate
 
