@@ -299,11 +299,18 @@ def test_a_planner_that_misbehaves_ends_in_no_plan_and_is_named(how, said, monke
     assert planner.cancelled == (how == "hangs")
 
 
-HANGING = "import json, sys, time; print(json.dumps({'ready': True}), flush=True); sys.stdin.readline(); time.sleep(1000)"
+HANGING = """
+import json, pathlib, sys, time
+print(json.dumps({"ready": True}), flush=True)
+sys.stdin.readline()
+pathlib.Path(sys.argv[1]).touch()
+time.sleep(1000)
+"""
 
 
-def test_a_stop_while_a_real_planner_process_hangs_leaves_no_process_behind():
-    planner = PlannerProcess(command=(sys.executable, "-c", HANGING))
+def test_a_stop_while_a_real_planner_process_hangs_leaves_no_process_behind(tmp_path):
+    asked = tmp_path / "asked"
+    planner = PlannerProcess(command=(sys.executable, "-c", HANGING, str(asked)))
     alive = []
 
     def prepare(sequencer):
@@ -314,7 +321,7 @@ def test_a_stop_while_a_real_planner_process_hangs_leaves_no_process_behind():
         sequencer.trace.listen(look)
 
     async def stop_when_it_works(sequencer):
-        while planner._process is None or not planner._process.alive:  # noqa: ASYNC110  a process tells nobody that it is there
+        while not asked.exists():  # noqa: ASYNC110  a process that hangs tells nobody
             await asyncio.sleep(0)
         alive.append(planner._process._pid)
         sequencer.post(Event("stop"))
