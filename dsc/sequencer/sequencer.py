@@ -147,6 +147,7 @@ class Sequencer:
         # Before anybody who is started by the run subscribes: what follows from a change is recorded after it.
         unsubscribe = self.knowledge.subscribe(self._tracer.knowledge)
         try:
+            self._tracer.world(self.knowledge)
             self._start(plot, arguments or {}, progress)
             while not self.machine.state.finished and progress.problem is None:
                 if self._idle():
