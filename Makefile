@@ -60,6 +60,7 @@ pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg
 	$(BIN)/dsc plot show domains/clean_up_table/plots/search.yaml --svg docs/pictures/search.svg
 	$(BIN)/dsc plot show planning/plots/achieve.yaml --svg docs/pictures/achieve.svg
+	$(BIN)/dsc kb draw examples/kitchen/problem.pddl --to docs/pictures/kitchen.svg
 
 clean:   ## forget the environment and caches
 	rm -rf $(VENV) $(BENCH) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -28,9 +28,7 @@ NO = 1
 """Exit status of an answer `no`; 2 is a mistake, as for every command."""
 
 
-def query(
-    source: Source, expression: Expr, domain: Domain = None, param: Params = None, json: Json = False
-) -> None:
+def query(source: Source, expression: Expr, domain: Domain = None, param: Params = None, json: Json = False) -> None:
     """List the values of EXPR's variables that make it true, e.g. '(and (on ?o table1) (cup ?o))'."""
     with opened(source, domain) as (kb, _):
         _answer(kb, expression, _params(param), as_json=json)

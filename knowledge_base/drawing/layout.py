@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import dist
 
 import networkx as nx
 
@@ -16,7 +17,7 @@ PADDING = 10.0
 GAP = 46.0
 """Room that is left between two cards, for arrows and what they say."""
 HOP = 170.0
-"""How far apart neighbours are before cards are pushed apart."""
+"""How far apart the middles of neighbours are on average, before cards are pushed apart."""
 ROW = 1400.0
 """How wide a picture gets before parts that nothing joins go into another row."""
 FINE = 60
@@ -67,8 +68,9 @@ def _part(graph: nx.Graph[str], cards: list[Card]) -> list[Placed]:
     own: nx.Graph[str] = nx.Graph()  # in the order of the cards, on which the positions depend
     own.add_nodes_from(card.key for card in cards)
     own.add_edges_from(sorted(graph.subgraph([card.key for card in cards]).edges))
-    scale = HOP * max(1.0, len(cards) ** 0.5) / 1.6
     positions = _positions(own)
+    lengths = [dist(positions[one], positions[other]) for one, other in own.edges if one != other]
+    scale = HOP * len(lengths) / sum(lengths) if lengths else 1.0
     placed = [_placed(card, positions[card.key], scale) for card in cards]
     _push_apart(placed)
     left = min(one.x - one.width / 2 for one in placed)
