@@ -11,11 +11,13 @@ import typer
 
 from dsc.cli import app as plot_app
 from knowledge_base.cli import app as kb_app
+from knowledge_base.cli import readers
 from planning.cli import plan_command
 
 if TYPE_CHECKING:
     from domains.clean_up_table.deployment import CleanUpTable
     from domains.clean_up_table.report import Report
+    from knowledge_base.store import KnowledgeBase
 
 app = typer.Typer(
     name="dsc",
@@ -30,6 +32,17 @@ app.add_typer(kb_app, name="kb")
 app.command("plan")(plan_command)
 
 WORLDS = ("clean-up-table",)
+
+
+def _scenario(path: Path) -> KnowledgeBase:
+    """What the robot knows when it starts into the scenario: `dsc kb` looks into it."""
+    from domains.clean_up_table.deployment import deploy
+    from domains.clean_up_table.scenario import Scenario
+
+    return deploy(Scenario.load(path)).executive.knowledge
+
+
+readers.update(dict.fromkeys((".yaml", ".yml"), _scenario))
 
 
 def _show_version(wanted: bool) -> None:

@@ -202,6 +202,11 @@ class KnowledgeBase(Observable):
         self._require_reached(version)
         return View(self._history.state(version, self._present), version)
 
+    @property
+    def oldest(self) -> int:
+        """The first version that can still be asked for (`at`), and since which changes are known."""
+        return self._history.oldest()
+
     def changes(self, since: int = 0, until: int | None = None) -> list[Change]:
         """The changes after version `since`, up to that which made version `until` (default: all).
 

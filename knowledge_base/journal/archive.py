@@ -74,10 +74,14 @@ class Archive:
     def changes(self, since: int, until: int) -> list[Change]:
         """The changes after version `since`, up to that which made version `until`."""
         with self._reading() as connection:
-            oldest = connection.execute("SELECT min(version) FROM snapshots").fetchone()[0]
-            if since < oldest:
+            if since < (oldest := _oldest(connection)):
                 raise gone(since, oldest, self._place)
             return list(self._changes(connection, since, until))
+
+    def oldest(self) -> int:
+        """The first version that is still kept."""
+        with self._reading() as connection:
+            return _oldest(connection)
 
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:  # noqa: ARG002  the file knows
         """The world of that version: a snapshot and the changes after it."""
@@ -129,7 +133,7 @@ class Archive:
             "SELECT version, time, world FROM snapshots WHERE version <= ? ORDER BY version DESC LIMIT 1", (version,)
         ).fetchone()
         if snapshot is None:
-            raise gone(version, connection.execute("SELECT min(version) FROM snapshots").fetchone()[0], self._place)
+            raise gone(version, _oldest(connection), self._place)
         reached, time, text = snapshot
         try:
             state = world_of(json.loads(text), self._schema)
@@ -166,3 +170,7 @@ class Archive:
 
     def _unreadable(self, what: str, error: Exception) -> NoReturn:
         raise StoreError(f"the store is damaged: {what} cannot be read", place=self._place) from error
+
+
+def _oldest(connection: sqlite3.Connection) -> int:
+    return int(connection.execute("SELECT min(version) FROM snapshots").fetchone()[0])

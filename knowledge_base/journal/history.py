@@ -58,6 +58,10 @@ class History(Protocol):
         """
         ...
 
+    def oldest(self) -> int:
+        """The first version that is still kept."""
+        ...
+
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
         """The world of that version, as a copy; `newest` tells the present one to those who go back from it.
 

@@ -86,6 +86,11 @@ class MemoryHistory:
             self._require(since)
             return [k.change for k in self._kept if since < k.change.version <= until]
 
+    def oldest(self) -> int:
+        """The first version that is still kept."""
+        with self._lock:
+            return self._oldest[0]
+
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
         """The world of that version: the newest with all later changes undone."""
         present = newest()
