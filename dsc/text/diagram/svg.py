@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from itertools import pairwise
 from math import hypot
+from types import MappingProxyType
 
 from dsc.text.diagram.layout import Box, BoxKind, Edge, Point, Text
 from dsc.text.diagram.measure import BOLD, FONT_SIZES
@@ -15,6 +16,8 @@ MARGIN = 12.0
 RADIUS = 7.0
 ARROW = (9.0, 3.6)
 """Length and half width of an arrowhead."""
+
+NO_MARKS: Mapping[str, str] = MappingProxyType({})
 
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _INK, _SOFT = "#1f2937", "#64748b"
@@ -34,10 +37,14 @@ _LOOKS: dict[BoxKind, tuple[str, str]] = {
 _RECOVERY = ("#fbe8f1", _RULE)
 
 
-def to_svg(root: Box) -> str:
-    """The drawing as one SVG document with a background of its own."""
+MARKS = {"active": "#d55e00", "added": "#0072b2", "removed": "#a3195b", "changed": "#b8860b"}
+"""What can be said of a state beyond what it is, each with its colour."""
+
+
+def to_svg(root: Box, marks: Mapping[str, str] = NO_MARKS) -> str:
+    """The drawing as one SVG document with a background of its own; `marks` are by names of states."""
     width, height = _n(root.width + 2 * MARGIN), _n(root.height + 2 * MARGIN)
-    body = "\n".join(_box(root.moved(MARGIN, MARGIN), "#ffffff"))
+    body = "\n".join((*_box(root.moved(MARGIN, MARGIN), "#ffffff"), *_marked(root.moved(MARGIN, MARGIN), marks)))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
         f'viewBox="0 0 {width} {height}" role="img">\n'
@@ -85,6 +92,17 @@ def _box(box: Box, around: str) -> Iterator[str]:
         yield from _edge(edge)
     for edge in over:
         yield from _label(edge, fill)
+
+
+def _marked(box: Box, marks: Mapping[str, str]) -> Iterator[str]:
+    """A thick border around each marked state, over everything else."""
+    for inner in box.boxes:
+        mark = marks.get(inner.name)
+        if mark is not None:
+            size = f'x="{_n(inner.x - 3)}" y="{_n(inner.y - 3)}" width="{_n(inner.width + 6)}"'
+            border = f'fill="none" stroke="{MARKS[mark]}" stroke-width="3.5"'
+            yield f'<rect class="{mark}" {size} height="{_n(inner.height + 6)}" rx="12" {border}/>'
+        yield from _marked(inner, marks)
 
 
 def _shape(box: Box, fill: str, stroke: str) -> Iterator[str]:
