@@ -17,6 +17,7 @@ RADIUS = 7.0
 ARROW = (9.0, 3.6)
 """Length and half width of an arrowhead."""
 
+_SIZE = re.compile(r'width="([\d.]+)" height="([\d.]+)"')
 NO_MARKS: Mapping[str, str] = MappingProxyType({})
 
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
@@ -51,6 +52,14 @@ def to_svg(root: Box, marks: Mapping[str, str] = NO_MARKS) -> str:
         f"<title>{_x(root.name)}</title>\n<style>{_css()}</style>\n"
         f'<rect width="{width}" height="{height}" rx="10" fill="#ffffff"/>\n{body}\n</svg>\n'
     )
+
+
+def above(upper: str, lower: str) -> str:
+    """Two drawings in one, one above the other."""
+    sizes = [tuple(map(float, _SIZE.search(svg).groups())) for svg in (upper, lower)]  # type: ignore[union-attr]
+    width, height = max(w for w, _ in sizes), sizes[0][1] + MARGIN + sizes[1][1]
+    moved = lower.replace("<svg ", f'<svg y="{_n(sizes[0][1] + MARGIN)}" ', 1)
+    return f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}">\n{upper}{moved}</svg>\n'
 
 
 def _css() -> str:
