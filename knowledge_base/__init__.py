@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from knowledge_base.errors import StoreError as StoreError
     from knowledge_base.errors import UnknownNameError as UnknownNameError
     from knowledge_base.facts import Change as Change
+    from knowledge_base.facts import Content as Content
     from knowledge_base.facts import Delta as Delta
     from knowledge_base.facts import Fact as Fact
     from knowledge_base.facts import Value as Value
@@ -45,6 +46,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Condition": "conditions.condition",
         "ConditionCancelledError": "errors",
         "ConflictError": "errors",
+        "Content": "facts",
         "Delta": "facts",
         "Fact": "facts",
         "Firing": "conditions.condition",

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 
+from knowledge_base.content import require_content, require_finite
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.check import check_arity, value_fits
@@ -31,9 +31,9 @@ def check_delta(delta: Delta, world: World) -> None:
         admission.fact(fact, world.schema.predicate(fact.predicate))
     for fact in delta.removed:
         before.fact(fact, world.schema.predicate(fact.predicate))
-    for fluent, number in delta.values.items():
+    for fluent, content in delta.values.items():
         admission.fact(fluent, world.schema.function(fluent.predicate))
-        admission.number(fluent, number)
+        require_content(content, world.schema.result(fluent.predicate), str(fluent))
     for name in delta.removed_nodes:
         if name in world.schema.constants and name not in delta.nodes:
             raise SchemaError(f"'{name}' is a constant of the domain and cannot be removed")
@@ -65,7 +65,7 @@ class _Admission:
             return
         if value_fits(value, wanted):
             if not isinstance(value, str):
-                _require_finite(value, f"the argument '?{parameter.name}' of {fact.predicate}")
+                require_finite(value, f"the argument '?{parameter.name}' of {fact.predicate}")
             return
         expected = f"the argument '?{parameter.name}' of {fact} is of type {' or '.join(wanted)}"
         if known is not None:
@@ -85,17 +85,3 @@ class _Admission:
     def things(self, types: Iterable[str]) -> set[str]:
         known = {t for t in types if t not in VALUE_TYPES}
         return {name for t in known for name in self.world.objects(t)} | self.delta.nodes.keys()
-
-    def number(self, fluent: Fact, number: float) -> None:
-        if isinstance(number, bool) or not isinstance(number, int | float):
-            raise SchemaError(f"{fluent} is a number, not {number!r}")
-        _require_finite(number, str(fluent))
-
-
-def _require_finite(number: float, what: str) -> None:
-    try:
-        if math.isfinite(number):
-            return
-    except OverflowError:
-        raise InputError(f"{what} is a number of at most 1e308") from None
-    raise InputError(f"{what} is a finite number, not {number}")

@@ -55,8 +55,9 @@ def _differences(kind: str, written: Mapping[str, str | None], given: Mapping[st
 
 
 def _shapes(signatures: Mapping[str, Signature]) -> dict[str, str | None]:
-    """What a declaration means, in words: the types of its arguments."""
+    """What a declaration means, in words: the types of its arguments, and of a function's content."""
     return {
         name: " ".join([name, *("/".join(p.types or (ROOT_TYPE,)) for p in signature.parameters)])
+        + ("" if signature.result in (None, "number") else f" - {signature.result}")
         for name, signature in signatures.items()
     }

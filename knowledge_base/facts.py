@@ -9,6 +9,11 @@ Value = str | int | float | bool
 VALUE_TYPES = frozenset({str, int, float, bool})
 """What a fact's argument or a bound variable may be: an object's name, a number, a truth value."""
 
+Geometry = tuple[float, ...]
+"""A position, a pose, a matrix: finite numbers whose meaning the function's name says; `()` is unknown."""
+Content = Value | Geometry
+"""What a function may be worth: the symbolic or geometric content of an arc (S4.3)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Fact:
@@ -37,15 +42,15 @@ class Delta:
         nodes: things that are there now, name -> type; naming a known one again with its type is fine.
         removed: facts that hold no longer; one that did not hold is fine.
         added: facts that hold now.
-        values: numeric fluents' new values, by function and arguments.
-        removed_nodes: things that are there no longer, nor any fact or number about them; this comes first
+        values: what functions are worth now, by function and arguments.
+        removed_nodes: things that are there no longer, nor any fact or value about them; this comes first
             of all, so that a thing in `nodes` too begins anew. One that was not there is fine.
     """
 
     nodes: Mapping[str, str] = field(default_factory=dict)
     removed: tuple[Fact, ...] = ()
     added: tuple[Fact, ...] = ()
-    values: Mapping[Fact, float] = field(default_factory=dict)
+    values: Mapping[Fact, Content] = field(default_factory=dict)
     removed_nodes: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
@@ -53,7 +58,7 @@ class Delta:
         return bool(self.nodes or self.removed or self.added or self.values or self.removed_nodes)
 
     def __len__(self) -> int:
-        """How many things, facts and numbers it names."""
+        """How many things, facts and values it names."""
         return len(self.nodes) + len(self.removed) + len(self.added) + len(self.values) + len(self.removed_nodes)
 
     def then(self, later: Delta) -> Delta:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from knowledge_base.content import GEOMETRY, UNSET
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.domain_text import DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.facts import Content
 from knowledge_base.language.expression import KEYWORDS, TypedVariable
 from knowledge_base.language.typed_list import TypedName
 
@@ -18,10 +20,14 @@ VALUE_TYPES = ("number", "text", "boolean")
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """A predicate's or function's name and the parameters it takes, in order."""
+    """A predicate's or function's name and the parameters it takes, in order.
+
+    `result` is what a function is worth, one of `UNSET`; a predicate has none.
+    """
 
     name: str
     parameters: tuple[TypedVariable, ...] = ()
+    result: str | None = None
     place: Place | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -30,13 +36,15 @@ class Signature:
         return len(self.parameters)
 
     def __str__(self) -> str:
-        """As declared: `(on ?a - item ?b - place)`."""
+        """As declared: `(on ?a - item ?b - place)`, `(label ?a - item) - text`."""
         typed = (f"?{p.name} - {' or '.join(p.types or (ROOT_TYPE,))}" for p in self.parameters)
-        return "(" + " ".join([self.name, *typed]) + ")"
+        result = "" if self.result in (None, "number") else f" - {self.result}"
+        return "(" + " ".join([self.name, *typed]) + ")" + result
 
     def means(self, other: Signature) -> bool:
-        """Whether both take the same types in the same order, whatever the parameters are called."""
-        return [p.types for p in self.parameters] == [p.types for p in other.parameters]
+        """Whether both take the same types in the same order and are worth the same, whatever the parameters' names."""
+        mine, others = ([p.types for p in s.parameters] for s in (self, other))
+        return mine == others and self.result == other.result
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +55,7 @@ class Schema:
         types: each type's parent; `object` is always there and has none.
         constants: things that every world of this schema has, with their types.
         predicates: by name.
-        functions: numeric fluents, by name.
+        functions: by name; one without a result is numeric.
         places: where types and constants are declared, for messages.
 
     Raises:
@@ -69,7 +77,7 @@ class Schema:
             "types": {t: p or (None if t == ROOT_TYPE else ROOT_TYPE) for t, p in parents.items()},
             "constants": dict(self.constants),
             "predicates": dict(self.predicates),
-            "functions": dict(self.functions),
+            "functions": {n: f if f.result else replace(f, result="number") for n, f in self.functions.items()},
             "places": dict(self.places),
         }
         for name, copy in copies.items():
@@ -171,15 +179,19 @@ class Schema:
 
         Raises:
             UnknownNameError: there is none; predicates, types and keywords are suggested.
+            SchemaError: it is a function.
         """
         found = self.predicates.get(name)
         if found is None:
+            if name in self.functions:
+                hint = f"compare what it is worth: (= ({name} ...) VALUE)"
+                raise SchemaError(f"'{name}' is a function; {hint}", place=place)
             valid = (*self.predicates, *self.types, *KEYWORDS)
             raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
         return found
 
     def function(self, name: str, place: Place | None = None) -> Signature:
-        """The numeric fluent of that name.
+        """The function of that name.
 
         Raises:
             UnknownNameError: there is none.
@@ -188,6 +200,14 @@ class Schema:
         if found is None:
             raise UnknownNameError(f"there is no function '{name}'", place=place, found=name, valid=self.functions)
         return found
+
+    def result(self, function: str, place: Place | None = None) -> str:
+        """The type of what the function is worth; raises `UnknownNameError` as `function`."""
+        return self.function(function, place).result or "number"
+
+    def unset(self, function: str) -> Content:
+        """What the function is worth where it was not set; raises `UnknownNameError` as `function`."""
+        return UNSET[self.result(function)]
 
     def _lineage(self, type_name: str) -> Iterator[str]:
         seen: dict[str, None] = {}
@@ -208,7 +228,7 @@ class Schema:
             here = self.types[here]
 
     def _check_names(self) -> None:
-        for name in VALUE_TYPES:
+        for name in UNSET:
             if name in self.types:
                 raise SchemaError(f"'{name}' is a type of values, not of things", place=self.places.get(name))
         for name, signature in self.predicates.items():
@@ -227,6 +247,12 @@ class Schema:
     def _check_types(self) -> None:
         for name, type_name in self.constants.items():
             self._known(type_name, f"the constant '{name}'", self.places.get(name), values=False)
+        for function in self.functions.values():
+            if function.result not in UNSET:
+                raise SchemaError(
+                    f"the function '{function.name}' has an unknown type of result",
+                    place=function.place, found=function.result, valid=UNSET,
+                )  # fmt: skip
         for signature in (*self.predicates.values(), *self.functions.values()):
             for parameter in signature.parameters:
                 for type_name in parameter.types:
@@ -236,6 +262,8 @@ class Schema:
     def _known(self, type_name: str, owner: str, place: Place | None, *, values: bool) -> None:
         if type_name in self.types or (values and type_name in VALUE_TYPES):
             return
+        if type_name == GEOMETRY:
+            raise SchemaError(f"{owner} cannot be a geometry; only what a function is worth can", place=place)
         raise SchemaError(f"{owner} has an unknown type '{type_name}'", place=place, found=type_name, valid=self.types)
 
 
@@ -260,7 +288,7 @@ def _typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
 
 
 def _signatures(declarations: Iterable[DeclarationText], kind: str) -> dict[str, Signature]:
-    return _united((Signature(d.name, d.parameters, d.place) for d in declarations), kind)
+    return _united((Signature(d.name, d.parameters, d.result, d.place) for d in declarations), kind)
 
 
 def _united(signatures: Iterable[Signature], kind: str) -> dict[str, Signature]:

@@ -1,10 +1,10 @@
-"""One state of the world in memory: things with their types, facts, and numbers."""
+"""One state of the world in memory: things with their types, facts, and what functions are worth."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.index import FactIndex
 from knowledge_base.schema import Schema
 
@@ -15,7 +15,7 @@ class WorldState:
     def __init__(self, schema: Schema) -> None:
         self._schema = schema
         self._facts = FactIndex()
-        self._values: dict[Fact, float] = {}
+        self._values: dict[Fact, Content] = {}
         self._types: dict[str, str] = {}
         self._members: dict[str, dict[str, None]] = {t: {} for t in schema.types}
         for name, type_name in schema.constants.items():
@@ -23,9 +23,9 @@ class WorldState:
 
     @classmethod
     def of(
-        cls, schema: Schema, nodes: Mapping[str, str], facts: Iterable[Fact], values: Mapping[Fact, float]
+        cls, schema: Schema, nodes: Mapping[str, str], facts: Iterable[Fact], values: Mapping[Fact, Content]
     ) -> WorldState:
-        """The state with exactly these things (constants too), facts and numbers, which fit the schema.
+        """The state with exactly these things (constants too), facts and values, which fit the schema.
 
         Their order is the order of insertion.
         """
@@ -40,7 +40,7 @@ class WorldState:
         return state
 
     def __len__(self) -> int:
-        """How many things, facts and numbers it holds."""
+        """How many things, facts and values it holds."""
         return len(self._types) + len(self._facts) + len(self._values)
 
     @property
@@ -59,8 +59,8 @@ class WorldState:
         return self._facts
 
     @property
-    def values(self) -> Mapping[Fact, float]:
-        """The numbers that were set."""
+    def values(self) -> Mapping[Fact, Content]:
+        """What functions were set to."""
         return self._values
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
@@ -75,9 +75,14 @@ class WorldState:
         """At most how many facts agree with `pattern`."""
         return self._facts.estimate(predicate, pattern)
 
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value; 0 until it is set."""
-        return self._values.get(Fact(function, args), 0)
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth; until it is set, what `content.UNSET` says.
+
+        Raises:
+            UnknownNameError: there is no such function.
+        """
+        found = self._values.get(Fact(function, args))
+        return self._schema.unset(function) if found is None else found
 
     def objects(self, type_name: str) -> list[str]:
         """The things of that type or a subtype.
@@ -120,7 +125,7 @@ class WorldState:
             self._members[ancestor][name] = None
 
     def _remove_node(self, name: str) -> None:
-        """Its facts are among the change's removed ones; its numbers are found here."""
+        """Its facts are among the change's removed ones; its values are found here."""
         for ancestor in self._schema.ancestors(self._types.pop(name)):
             del self._members[ancestor][name]
         self._values = {f: v for f, v in self._values.items() if name not in f.args}

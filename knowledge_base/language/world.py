@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol
 
-from knowledge_base.facts import Value
+from knowledge_base.facts import Content, Value
 from knowledge_base.schema import Schema
 
 
@@ -30,8 +30,8 @@ class World(Protocol):
         """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
         ...
 
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value; 0 until it is set."""
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth; until it is set, what `content.UNSET` says."""
         ...
 
     def objects(self, type_name: str) -> Iterable[str]:

@@ -81,7 +81,7 @@ BAD = {
     "list": ("[]", "a world in JSON is an object with"),
     "too deep": ("[" * 100_000, "not JSON that can be read"),
     "too long a number": ("1" * 10_000, "not JSON that can be read"),
-    "other format": (world(format="x"), 'an object with "format": "dsc-knowledge/1"'),
+    "other format": (world(format="x"), 'an object with "format": "dsc-knowledge/2"'),
     "missing part": (world(facts=...), "the part 'facts' is missing"),
     "unknown part": (world(fact=[]), "no part 'fact'; did you mean 'facts'?"),
     "twice": ('{"format": 1, "format": 2}', "'format' is there twice in one object"),
@@ -103,7 +103,7 @@ BAD = {
     "predicate": (world(facts=[["onn", "cup1", "shelf"]]), "there is no predicate 'onn'; did you mean 'on'?"),
     "object": (world(facts=[["on", "cup9", "shelf"]]), "there is no object 'cup9', used in (on cup9 shelf); did you mean 'cup"),
     "arity": (world(facts=[["on", "cup1"]]), "on"),
-    "value": (world(values=[["weight"]]), 'values[0] is of the form ["NAME", ARGUMENT..., NUMBER]'),
+    "value": (world(values=[["weight"]]), 'values[0] is of the form ["NAME", ARGUMENT..., CONTENT]'),
     "value is text": (world(values=[["weight", "cup1", "heavy"]]), "(weight cup1) is a number, not 'heavy'"),
     "function": (world(values=[["wait", "cup1", 1]]), "there is no function 'wait'"),
 }  # fmt: skip
