@@ -8,6 +8,7 @@ from dataclasses import replace
 from knowledge_base.content import require_content, require_finite
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.functional import require_single
 from knowledge_base.language.check import check_arity, value_fits
 from knowledge_base.language.expression import TypedVariable
 from knowledge_base.language.world import World
@@ -19,7 +20,8 @@ def check_delta(delta: Delta, world: World) -> None:
 
     Raises:
         UnknownNameError: an undeclared type, predicate or function, or a thing that is not there.
-        SchemaError: a wrong number of arguments, a wrong type, a second type for a thing.
+        SchemaError: a wrong number of arguments, a wrong type, a second type for a thing, a second fact of a
+            functional predicate.
         InputError: a number that is not finite, a name that is empty.
     """
     admission = _Admission(delta, world)
@@ -27,7 +29,7 @@ def check_delta(delta: Delta, world: World) -> None:
     before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission
     for name, type_name in delta.nodes.items():
         admission.node(name, type_name)
-    for fact in delta.added:
+    for fact in (*delta.added, *delta.replaced):
         admission.fact(fact, world.schema.predicate(fact.predicate))
     for fact in delta.removed:
         before.fact(fact, world.schema.predicate(fact.predicate))
@@ -37,6 +39,11 @@ def check_delta(delta: Delta, world: World) -> None:
     for name in delta.removed_nodes:
         if name in world.schema.constants and name not in delta.nodes:
             raise SchemaError(f"'{name}' is a constant of the domain and cannot be removed")
+    for fact in delta.replaced:
+        if not fact.args:
+            raise SchemaError(f"{fact} has no argument that could be replaced")
+    if delta.replaced or world.schema.functional:
+        require_single(delta, world)
 
 
 class _Admission:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from knowledge_base.admission import check_delta
 from knowledge_base.facts import Content, Delta, Fact, Value
+from knowledge_base.functional import rivals
 from knowledge_base.index import FactIndex
 from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
@@ -54,6 +55,10 @@ class Overlay:
         for name, type_name in delta.nodes.items():
             if self.type_of(name) is None:
                 self._nodes[name] = type_name
+        for fact in delta.replaced:
+            for rival in rivals(fact, self):
+                self._remove(rival)
+            self._add(fact)
         for fact in delta.removed:
             self._remove(fact)
         for fact in delta.added:

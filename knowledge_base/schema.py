@@ -57,6 +57,7 @@ class Schema:
         predicates: by name.
         functions: by name; one without a result is numeric.
         places: where types and constants are declared, for messages.
+        functional: the predicates whose last argument the others settle, see `with_functional`.
 
     Raises:
         SchemaError: an unknown parent, parameter or constant type, a cycle of types, or one name used twice.
@@ -67,6 +68,7 @@ class Schema:
     predicates: Mapping[str, Signature] = field(default_factory=dict)
     functions: Mapping[str, Signature] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict, repr=False)
+    functional: frozenset[str] = frozenset()
     _ancestors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -85,6 +87,7 @@ class Schema:
         object.__setattr__(self, "_ancestors", {t: tuple(self._lineage(t)) for t in self.types})
         self._check_names()
         self._check_types()
+        self._check_functional()
 
     @classmethod
     def from_pddl(cls, path: str | Path) -> Schema:
@@ -121,6 +124,17 @@ class Schema:
             places={name: declared.place for name, declared in {**types, **constants}.items()},
         )
 
+    def with_functional(self, *predicates: str) -> Schema:
+        """This schema, in which two facts of these predicates cannot differ in nothing but the last argument.
+
+        `schema.with_functional("robot-at", "at")`: a robot, and a thing, is at one place at a time.
+
+        Raises:
+            UnknownNameError: there is no such predicate.
+            SchemaError: it has no arguments.
+        """
+        return replace(self, functional=self.functional.union(predicates))
+
     def merged(self, other: Schema) -> Schema:
         """Everything that one of the two declares.
 
@@ -142,6 +156,7 @@ class Schema:
             predicates=_united(both, "predicate"),
             functions=_united(functions, "function"),
             places={**other.places, **self.places},
+            functional=self.functional | other.functional,
         )
 
     def is_a(self, type_name: str, ancestor: str) -> bool:
@@ -258,6 +273,12 @@ class Schema:
                 for type_name in parameter.types:
                     owner = f"the parameter '?{parameter.name}' of '{signature.name}'"
                     self._known(type_name, owner, parameter.place or signature.place, values=True)
+
+    def _check_functional(self) -> None:
+        for name in sorted(self.functional):
+            signature = self.predicate(name)
+            if not signature.arity:
+                raise SchemaError(f"'{name}' has no argument that others could settle", place=signature.place)
 
     def _known(self, type_name: str, owner: str, place: Place | None, *, values: bool) -> None:
         if type_name in self.types or (values and type_name in VALUE_TYPES):

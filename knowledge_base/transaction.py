@@ -59,13 +59,20 @@ class Transaction:
 
         Raises:
             UnknownNameError: an undeclared predicate, or a thing that is not there.
-            SchemaError: a wrong number of arguments or a wrong type.
+            SchemaError: a wrong number of arguments, a wrong type, or a second fact of a functional predicate.
         """
         self.apply(Delta(added=(Fact(predicate, args),)))
 
     def retract(self, predicate: str, *args: Value) -> None:
         """The fact holds no longer; errors as for `tell`."""
         self.apply(Delta(removed=(Fact(predicate, args),)))
+
+    def replace(self, predicate: str, *args: Value) -> None:
+        """The fact holds now, and none any more that differs in the last argument: `tx.replace("at", "cup1", "shelf")`.
+
+        Errors as for `tell`; a predicate without arguments is one.
+        """
+        self.apply(Delta(replaced=(Fact(predicate, args),)))
 
     def set(self, function: str, *args_and_content: Content) -> None:
         """The function is worth this now: `tx.set("failures", "cup1", 2)`, `tx.set("pose", "cup1", "map", (0.4, 0.1))`.

@@ -35,6 +35,7 @@ def delta_form(delta: Delta) -> Form:
         "removed": _fact_forms(delta.removed),
         "added": _fact_forms(delta.added),
         "values": _value_forms(delta.values),
+        "replaced": _fact_forms(delta.replaced),
     }
     return {part: said for part, said in form.items() if said}
 
@@ -47,6 +48,7 @@ def delta_of(form: Form) -> Delta:
         added=tuple(_facts(form.get("added", ()))),
         values=_values(form.get("values", ())),
         removed_nodes=tuple(form.get("removed_nodes", ())),
+        replaced=tuple(_facts(form.get("replaced", ()))),
     )
 
 
@@ -67,6 +69,7 @@ def schema_form(schema: Schema) -> Form:
         "constants": dict(schema.constants),
         "predicates": {name: _parameters(signature) for name, signature in schema.predicates.items()},
         "functions": {name: [f.result, *_parameters(f)] for name, f in schema.functions.items()},
+        "functional": sorted(schema.functional),
     }
 
 
@@ -81,6 +84,7 @@ def schema_of(form: Form) -> Schema:
         constants=form["constants"],
         predicates={name: _signature(name, parameters) for name, parameters in form["predicates"].items()},
         functions={name: _signature(name, rest, result) for name, (result, *rest) in form["functions"].items()},
+        functional=frozenset(form["functional"]),
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from knowledge_base.compatibility import missing_constants, require_extension
+from knowledge_base.compatibility import missing_constants, require_extension, require_functional
 from knowledge_base.errors import InputError, Place
 from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
@@ -141,6 +141,7 @@ class Journal(Archive):
         """Go on with more declarations; new constants come into the world by a change of their own."""
         require_extension(written, self._schema, self._place)
         last = self.newest()
+        require_functional(last.state, self._place)
         constants = missing_constants(last.state, self._place)
         with self._transaction() as connection:
             self._put_schema(last.version + bool(constants))

@@ -150,8 +150,9 @@ def deltas() -> st.SearchStrategy[Delta]:
     )
     some = st.lists(facts, max_size=6).map(tuple)
     return st.builds(
-        Delta, nodes=st.just(THINGS), removed=some, added=some, values=st.lists(values, max_size=3).map(dict)
-    )
+        Delta, nodes=st.just(THINGS), removed=some, added=some, values=st.lists(values, max_size=3).map(dict),
+        replaced=st.dictionaries(items, places, max_size=2).map(lambda at: tuple(Fact("on", pair) for pair in at.items())),
+    )  # fmt: skip
 
 
 def removals() -> st.SearchStrategy[Delta]:
