@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from knowledge_base.overlay import Overlay as Overlay
     from knowledge_base.schema import Schema as Schema
     from knowledge_base.schema import Signature as Signature
+    from knowledge_base.sources import Source as Source
     from knowledge_base.state import WorldState as WorldState
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
     from knowledge_base.transaction import Transaction as Transaction
@@ -61,6 +62,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",
         "Signature": "schema",
+        "Source": "sources",
         "StoreError": "errors",
         "Transaction": "transaction",
         "UnknownNameError": "errors",

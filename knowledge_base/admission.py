@@ -21,12 +21,13 @@ def check_delta(delta: Delta, world: World) -> None:
     Raises:
         UnknownNameError: an undeclared type, predicate or function, or a thing that is not there.
         SchemaError: a wrong number of arguments, a wrong type, a second type for a thing, a second fact of a
-            functional predicate.
+            functional predicate, a value that a source feeds.
         InputError: a number that is not finite, a name that is empty.
     """
     admission = _Admission(delta, world)
     # Facts may be removed together with the things they are about.
     before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission
+    reference = getattr(world, "reference", None)
     for name, type_name in delta.nodes.items():
         admission.node(name, type_name)
     for fact in (*delta.added, *delta.replaced):
@@ -36,6 +37,10 @@ def check_delta(delta: Delta, world: World) -> None:
     for fluent, content in delta.values.items():
         admission.fact(fluent, world.schema.function(fluent.predicate))
         require_content(content, world.schema.result(fluent.predicate), str(fluent))
+        if delta.removed_nodes and not set(delta.removed_nodes).isdisjoint(fluent.args):
+            continue  # it begins anew, without a source
+        if reference is not None and (source := reference(fluent.predicate, fluent.args)) is not None:
+            raise SchemaError(f"{fluent} is fed by '{source}' and cannot be set")
     for name in delta.removed_nodes:
         if name in world.schema.constants and name not in delta.nodes:
             raise SchemaError(f"'{name}' is a constant of the domain and cannot be removed")
@@ -44,6 +49,16 @@ def check_delta(delta: Delta, world: World) -> None:
             raise SchemaError(f"{fact} has no argument that could be replaced")
     if delta.replaced or world.schema.functional:
         require_single(delta, world)
+
+
+def check_fluent(fluent: Fact, world: World) -> None:
+    """Raise an error unless there is such a function and it takes such arguments.
+
+    Raises:
+        UnknownNameError: an undeclared function, or a thing that is not there.
+        SchemaError: a wrong number of arguments, a wrong type.
+    """
+    _Admission(Delta(), world).fact(fluent, world.schema.function(fluent.predicate))
 
 
 class _Admission:

@@ -51,21 +51,21 @@ def query(
 
 @app.command()
 def show(file: File, domain: Domain = None, json: Json = False) -> None:
-    """Show FILE's things, facts and numbers, and its goal."""
-    from knowledge_base.language.printer import to_text
+    """Show FILE's things, facts and what functions are worth, and its goal."""
+    from knowledge_base.language.printer import to_text, value_text
 
     kb, problem = _load(file, domain)
     facts, values, goal = kb.facts(), kb.values(), to_text(problem.goal)
     things = {name: kb.type_of(name) for name in kb.objects("object")}
     if json:
-        numbers = {str(fluent): number for fluent, number in values.items()}
-        said = {"objects": things, "facts": [str(f) for f in facts], "values": numbers, "goal": goal}
+        contents = {str(fluent): content for fluent, content in values.items()}
+        said = {"objects": things, "facts": [str(f) for f in facts], "values": contents, "goal": goal}
         _print_json({"problem": problem.name, "domain": problem.domain, **said})
         return
     _print_table(["thing", "type"], list(things.items()))
     _print_table(["fact"], [[f] for f in facts])
     if values:
-        _print_table(["number", "value"], list(values.items()))
+        _print_table(["function", "value"], [[f, value_text(v, quoted=isinstance(v, str))] for f, v in values.items()])
     typer.echo(f"goal: {goal}")
 
 

@@ -90,6 +90,12 @@ class Overlay:
         pending = self._values.get(Fact(function, args))
         return self._base_value(Fact(function, args)) if pending is None else pending
 
+    def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
+        """Where what the function is worth comes from, if a source of the base feeds it."""
+        below = getattr(self._base, "reference", None)
+        begins_anew = self._gone and not self._gone.keys().isdisjoint(args)
+        return below(function, args) if below and not begins_anew else None
+
     def objects(self, type_name: str) -> list[str]:
         """The things of that type or a subtype; those of the base come first."""
         kept = [name for name in self._base.objects(type_name) if name not in self._gone]

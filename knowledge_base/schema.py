@@ -70,6 +70,7 @@ class Schema:
     places: Mapping[str, Place] = field(default_factory=dict, repr=False)
     functional: frozenset[str] = frozenset()
     _ancestors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False)
+    _unset: Mapping[str, Content] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.types.get(ROOT_TYPE) not in (None, ROOT_TYPE):
@@ -88,6 +89,7 @@ class Schema:
         self._check_names()
         self._check_types()
         self._check_functional()
+        object.__setattr__(self, "_unset", {name: UNSET[self.result(name)] for name in self.functions})
 
     @classmethod
     def from_pddl(cls, path: str | Path) -> Schema:
@@ -222,7 +224,8 @@ class Schema:
 
     def unset(self, function: str) -> Content:
         """What the function is worth where it was not set; raises `UnknownNameError` as `function`."""
-        return UNSET[self.result(function)]
+        found = self._unset.get(function)
+        return UNSET[self.result(function)] if found is None else found
 
     def _lineage(self, type_name: str) -> Iterator[str]:
         seen: dict[str, None] = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.index import FactIndex
@@ -10,12 +10,18 @@ from knowledge_base.schema import Schema
 
 
 class WorldState:
-    """A `World` of its own. It begins with the schema's constants and nothing known about them."""
+    """A `World` of its own. It begins with the schema's constants and nothing known about them.
+
+    Functions may be fed by sources (`sources`): their latest values are read like any other, but they are no
+    part of `values`, of copies, and of what is committed.
+    """
 
     def __init__(self, schema: Schema) -> None:
         self._schema = schema
         self._facts = FactIndex()
         self._values: dict[Fact, Content] = {}
+        self._references: dict[Fact, str] = {}
+        self._latest: dict[Fact, Content] = {}
         self._types: dict[str, str] = {}
         self._members: dict[str, dict[str, None]] = {t: {} for t in schema.types}
         for name, type_name in schema.constants.items():
@@ -81,8 +87,33 @@ class WorldState:
         Raises:
             UnknownNameError: there is no such function.
         """
-        found = self._values.get(Fact(function, args))
+        fluent = Fact(function, args)
+        found = self._latest.get(fluent) if self._latest else None
+        if found is None:
+            found = self._values.get(fluent)
         return self._schema.unset(function) if found is None else found
+
+    def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
+        """Where what the function is worth comes from, if a source feeds it."""
+        return self._references.get(Fact(function, args))
+
+    def values_about(self, things: Collection[str]) -> list[Fact]:
+        """The fluents with one of these things in them that were set or fed."""
+        fluents = {**self._values, **self._latest} if self._latest else self._values
+        return [f for f in fluents if any(arg in things for arg in f.args)]
+
+    def bind(self, fluent: Fact, reference: str) -> None:
+        """From now on the fluent is fed; until the first time it reads as before."""
+        self._references[fluent] = reference
+
+    def feed(self, fluent: Fact, content: Content) -> None:
+        """A bound fluent is worth this now."""
+        self._latest[fluent] = content
+
+    def unbind(self, fluent: Fact) -> None:
+        """The fluent is not fed any more and reads as if it had never been."""
+        del self._references[fluent]
+        self._latest.pop(fluent, None)
 
     def objects(self, type_name: str) -> list[str]:
         """The things of that type or a subtype.
@@ -110,11 +141,11 @@ class WorldState:
             self._facts.add(fact)
         self._values.update(effective.values)
 
-    def copy(self) -> WorldState:
-        """An independent state that says the same."""
+    def copy(self, *, fed: bool = False) -> WorldState:
+        """An independent state that says the same, without sources; with `fed` their latest values are set in it."""
         twin = WorldState(self._schema)
         twin._facts = self._facts.copy()
-        twin._values = self._values.copy()
+        twin._values = {**self._values, **self._latest} if fed else self._values.copy()
         twin._types = self._types.copy()
         twin._members = {t: members.copy() for t, members in self._members.items()}
         return twin

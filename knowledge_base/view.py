@@ -88,9 +88,9 @@ class View:
         return Overlay(self)
 
     def snapshot(self) -> WorldState:
-        """The world as it is now, as a copy that nothing changes."""
+        """The world as it is now, latest values of sources included, as a copy that nothing changes."""
         with self._lock:
-            return self._state.copy()
+            return self._state.copy(fed=True)
 
     def to_json(self) -> str:
         """All of it as JSON, schema and version included; `KnowledgeBase.from_json` reads it back."""
@@ -150,6 +150,11 @@ class View:
         """
         with self._lock:
             return self._state.value(function, args)
+
+    def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
+        """Where what the function is worth comes from, if a source feeds it."""
+        with self._lock:
+            return self._state.reference(function, args)
 
     def objects(self, type_name: str) -> list[str]:
         """The things of that type or a subtype, in order of insertion.

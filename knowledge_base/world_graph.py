@@ -4,7 +4,8 @@ Things are nodes with a `type`. A fact about two things is an arc from the first
 the predicate; a fact about one thing is an arc from it to itself (S4.4). What a function of one or two things
 is worth is an arc likewise, with the content as `value` (S4.3: symbolic or geometric content). Facts and
 fluents with another number of arguments, or with values among them, are nodes of their own: the `Fact` itself
-with `relation` set to its name (and `value`), and an arc to each thing in it whose key is the position.
+with `relation` set to its name (and `value`), and an arc to each thing in it whose key is the position. What is
+fed by a source has its reference as `source` (S4.9).
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class WorldGraph:
     def commit(self, effective: Delta) -> None:
         """Make a change that lists exactly what becomes different."""
         for fact in effective.removed:
-            self._remove(fact)
+            self._remove(fact, self._schema.predicates[fact.predicate])
         for name in effective.removed_nodes:
             self._remove_node(name)
         for name, type_name in effective.nodes.items():
@@ -44,6 +45,17 @@ class WorldGraph:
         for fluent, content in effective.values.items():
             self._put(fluent, self._schema.functions[fluent.predicate], {"value": content})
 
+    def feed(self, fluent: Fact, reference: str, content: Content) -> None:
+        """A fluent is fed from outside and worth this now."""
+        self._put(fluent, self._schema.functions[fluent.predicate], {"value": content, "source": reference})
+
+    def unfeed(self, fluent: Fact, kept: Content | None) -> None:
+        """It is not fed any more; `kept` is what it was set to, if it was."""
+        signature = self._schema.functions[fluent.predicate]
+        self._remove(fluent, signature)
+        if kept is not None:
+            self._put(fluent, signature, {"value": kept})
+
     def _put(self, fact: Fact, signature: Signature, content: Mapping[str, Content]) -> None:
         if _is_arc(signature):
             self._graph.add_edge(fact.args[0], fact.args[-1], key=fact.predicate, **content)
@@ -52,8 +64,8 @@ class WorldGraph:
         for position in _thing_positions(signature):
             self._graph.add_edge(fact, fact.args[position], key=position)
 
-    def _remove(self, fact: Fact) -> None:
-        if _is_arc(self._schema.predicates[fact.predicate]):
+    def _remove(self, fact: Fact, signature: Signature) -> None:
+        if _is_arc(signature):
             self._graph.remove_edge(fact.args[0], fact.args[-1], key=fact.predicate)
         else:
             self._graph.remove_node(fact)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from knowledge_base.compatibility import missing_constants, require_extension, require_functional
-from knowledge_base.errors import InputError, Place
+from knowledge_base.errors import ConflictError, InputError, Place
 from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
 from knowledge_base.journal.archive import Archive
@@ -97,6 +97,14 @@ class Journal(Archive):
         _require_text(key)
         with reported(self._path, "read"):
             return self._by_key(self._connection, key)
+
+    def later(self, version: int) -> list[Change]:
+        """Refused.
+
+        Raises:
+            ConflictError: always.
+        """
+        raise ConflictError(f"{self._place}: version {version} is the newest, as this is the store's only writer")
 
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  the file knows
         """Make version `keep_since` the oldest: a snapshot of it takes the place of all before."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 from typing import NamedTuple
 
-from knowledge_base.errors import StoreError
+from knowledge_base.errors import ConflictError, StoreError
 from knowledge_base.facts import Change, Content, Delta, Fact
 from knowledge_base.journal.history import Version, Writer, gone, too_early
 from knowledge_base.state import WorldState
@@ -85,6 +85,14 @@ class MemoryHistory:
         with self._lock:
             self._require(since)
             return [k.change for k in self._kept if since < k.change.version <= until]
+
+    def later(self, version: int) -> list[Change]:
+        """Refused.
+
+        Raises:
+            ConflictError: always.
+        """
+        raise ConflictError(f"version {version} is the newest; in memory there is no other writer to follow")
 
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
         """The world of that version: the newest with all later changes undone."""

@@ -14,7 +14,8 @@ class World(Protocol):
 
     Predicates are the declared ones; types as predicates, quantifiers and comparisons are the language's
     affair and are built from these five answers. A world that also has `estimate(predicate, pattern) -> int`,
-    at most how many facts match, lets conjunctions begin with the rarest.
+    at most how many facts match, lets conjunctions begin with the rarest. One that has `reference(function, args) ->
+    str | None`, where what the function is worth comes from, refuses to have it set.
     """
 
     @property
