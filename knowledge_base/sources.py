@@ -139,8 +139,9 @@ class Sources:
     def close_about(self, things: Iterable[str]) -> None:
         """Things go, and with them what feeds values about them; conditions are told by whoever removes them."""
         gone = set(things)
-        for source in [s for s in self._open.values() if not gone.isdisjoint(s.fluent.args)]:
-            self._drop(source)
+        if gone:  # nearly every commit takes nothing away
+            for source in [s for s in self._open.values() if not gone.isdisjoint(s.fluent.args)]:
+                self._drop(source)
 
     def _drop(self, source: Source) -> None:
         source.end()

@@ -95,7 +95,7 @@ class WorldState:
 
     def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
         """Where what the function is worth comes from, if a source feeds it."""
-        return self._references.get(Fact(function, args))
+        return self._references.get(Fact(function, args)) if self._references else None
 
     def values_about(self, things: Collection[str]) -> list[Fact]:
         """The fluents with one of these things in them that were set or fed."""

@@ -172,6 +172,11 @@ def test_content_where_it_does_not_fit_is_a_static_error(kb, question, place, me
     assert str(caught.value.place) == f"<text>:{place}"
 
 
+def test_a_geometry_is_no_parameter(kb):
+    with pytest.raises(SchemaError, match=r"'\?p' cannot be a geometry; write it into the condition"):
+        kb.ask("(= (pose cup1 map) ?p)", {"p": POSE})
+
+
 def test_a_geometry_has_at_most_sixteen_numbers(kb):
     assert not kb.ask(f"(= (pose cup1 map) (geometry {'1 ' * 16}))")
     with pytest.raises(ParseError, match="at most 16 numbers; found 17"):
