@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import multiprocessing
 
+import kb_writer
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -142,6 +144,29 @@ def test_a_writer_with_a_longer_schema_is_not_followed(path):
         assert (replica.version, replica.nodes()) == (0, {})
     with KnowledgeBase.open(None, path, read_only=True) as again:
         assert again.nodes() == {"can1": "can"}
+
+
+def test_the_writer_may_be_another_process(path):
+    context = multiprocessing.get_context("forkserver")
+    asked, answers = context.Pipe()
+    process = context.Process(target=kb_writer.write_on_demand, args=(str(path), answers))
+    process.start()
+    answers.close()
+    assert asked.recv() == 0
+    told = []
+    with KnowledgeBase.open(None, path, read_only=True) as replica:
+        replica.subscribe(lambda change: told.append(change.version))
+        loud = heard(replica.install("(quiet)"))
+        for count in (1, 7, 30):
+            asked.send(count)
+            version = asked.recv()
+            assert replica.refresh() == version
+            assert replica.value("time", ()) == version
+    asked.send(0)
+    process.join()
+    assert process.exitcode == 0
+    assert told == list(range(1, 39))
+    assert loud == [(version, version % 2 == 1) for version in told]
 
 
 # --- closing
