@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from knowledge_base.errors import StoreError as StoreError
     from knowledge_base.errors import UnknownNameError as UnknownNameError
     from knowledge_base.facts import Change as Change
+    from knowledge_base.facts import Content as Content
     from knowledge_base.facts import Delta as Delta
     from knowledge_base.facts import Fact as Fact
     from knowledge_base.facts import Value as Value
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from knowledge_base.overlay import Overlay as Overlay
     from knowledge_base.schema import Schema as Schema
     from knowledge_base.schema import Signature as Signature
+    from knowledge_base.sources import Source as Source
     from knowledge_base.state import WorldState as WorldState
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
     from knowledge_base.transaction import Transaction as Transaction
@@ -45,6 +47,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Condition": "conditions.condition",
         "ConditionCancelledError": "errors",
         "ConflictError": "errors",
+        "Content": "facts",
         "Delta": "facts",
         "Fact": "facts",
         "Firing": "conditions.condition",
@@ -59,6 +62,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",
         "Signature": "schema",
+        "Source": "sources",
         "StoreError": "errors",
         "Transaction": "transaction",
         "UnknownNameError": "errors",

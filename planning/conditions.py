@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
-from knowledge_base.language.evaluation import World, evaluate_term, holds
+from knowledge_base.language.evaluation import World, evaluate_argument, holds
 from knowledge_base.language.expression import (
     And,
     Atom,
@@ -210,7 +210,7 @@ class Grounder:
             case Constant(value):
                 return value
             case _:
-                return evaluate_term(term, self.world, bindings)
+                return evaluate_argument(term, self.world, bindings)
 
     def _atom(self, atom: Atom, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:
         if atom.predicate not in self.world.schema.predicates:  # a type

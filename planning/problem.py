@@ -14,7 +14,7 @@ from knowledge_base.facts import Fact
 from knowledge_base.language.check import check
 from knowledge_base.language.effect import Assign
 from knowledge_base.language.evaluation import holds
-from knowledge_base.language.expression import Call, Comparison, Expression, Term, parts_of
+from knowledge_base.language.expression import Atom, Call, Comparison, Expression, Term, parts_of
 from knowledge_base.language.printer import to_text
 from knowledge_base.schema import ROOT_TYPE
 from planning.conditions import Every, Grounder, Literal, Residual, Some
@@ -211,7 +211,7 @@ def _refuse_numbers(goal: Expression, actions: Sequence[PlanningAction], domain:
     for comparison in _comparisons(goal):
         if _functions(comparison) & changed:
             raise UnsupportedGoalError(
-                f"the goal compares a number that planning actions change: {to_text(comparison)}",
+                f"the goal asks for a value that planning actions change: {to_text(comparison)}",
                 place=comparison.place,
             )
     for action in actions:
@@ -219,14 +219,15 @@ def _refuse_numbers(goal: Expression, actions: Sequence[PlanningAction], domain:
             for comparison in _comparisons(condition):
                 if _functions(comparison) & changed:
                     raise UnsupportedActionError(
-                        f"planning action '{action.name}' compares a number that planning actions change:"
+                        f"planning action '{action.name}' asks for a value that planning actions change:"
                         f" {to_text(comparison)}",
                         place=comparison.place,
                     )
 
 
-def _comparisons(e: Expression | Term) -> list[Comparison]:
-    own = [e] if isinstance(e, Comparison) else []
+def _comparisons(e: Expression | Term) -> list[Comparison | Atom]:
+    """The conditions in which what functions are worth can count: as a side, or as an argument."""
+    own = [e] if isinstance(e, Comparison | Atom) else []
     return own + [found for part in parts_of(e) for found in _comparisons(part)]
 
 

@@ -104,7 +104,7 @@ class Condition:
         self._waiters: Waiters[Firing] = Waiters()
         self._last: Firing | None = None
         self._fired = 0
-        self._since = self._now.version
+        self._rises = 0
         self._installed = True
         self._silent = False
         self._closed = False
@@ -227,7 +227,7 @@ class Condition:
     # --- firing: decided under the lock, told in order when it is released
 
     def _rise(self) -> None:
-        self._since = self._now.version
+        self._rises += 1
         if self._terms.hold is None:
             self._fire()
         else:
@@ -276,15 +276,15 @@ class Condition:
     def _hold(self) -> None:
         hold = self._terms.hold
         if hold is not None:
-            self._owner.later(partial(self._start_hold, hold, hold.due(), partial(self._held, self._since)))
+            self._owner.later(partial(self._start_hold, hold, hold.due(), partial(self._held, self._rises)))
 
     def _start_hold(self, hold: Hold, due: float, over: Callable[[], None]) -> None:
         if self._installed:
             hold.start(due, over)
 
-    def _held(self, since: int) -> None:
+    def _held(self, rises: int) -> None:
         """The clock says that it has been true for long enough, unless it has become true anew meanwhile."""
         with self._owner.lock:
-            if self._installed and self._now.truth and self._since == since:
+            if self._installed and self._now.truth and self._rises == rises:
                 self._fire()
         self._owner.deliver()

@@ -7,7 +7,7 @@ one look-up for each changed fact, number or type; shapes that do not read it ar
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from threading import RLock
 
 from knowledge_base.announcement import Announcer
@@ -21,7 +21,7 @@ from knowledge_base.conditions.rows import Row
 from knowledge_base.conditions.shape import Args, Shape, lifted
 from knowledge_base.conditions.trigger import Trigger
 from knowledge_base.errors import InputError
-from knowledge_base.facts import Delta, Value
+from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.expression import Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.schema import Schema
@@ -93,12 +93,17 @@ class Installed:
                 if not place.relation.rows:
                     self._forget(place.relation)
 
+    def conditions(self) -> list[Condition]:
+        """All that are installed, in the order of installation."""
+        rows = (row for relation in self._relations.values() for row in relation.rows.values())
+        return sorted({c for row in rows for c in row.conditions}, key=lambda c: c.number)
+
     def departures(self, effective: Delta) -> list[Event]:
         """The types and numbers that go with removed things; to be asked for before the change is made."""
         gone = set(effective.removed_nodes)
         if not (gone and self._relations):
             return []
-        numbers = [f for f in self._world.values if not gone.isdisjoint(f.args)]
+        numbers = self._world.values_about(gone)
         types = [(name, t) for name in gone if (t := self._world.type_of(name)) is not None]
         return [
             *(("said", f.predicate, f.args, BOTH) for f in numbers),
@@ -108,10 +113,16 @@ class Installed:
     def commit(self, effective: Delta, departures: list[Event], version: int) -> None:
         """Judge the change that the world has made, and queue what has to be told."""
         self.version = version
-        if not self._relations:
-            return
+        if self._relations:
+            self._judge((*departures, *self._events(effective)))
+
+    def refreshed(self, fluent: Fact) -> None:
+        """A fluent is worth something else, and no version was made: a source feeds it."""
+        self._judge([("said", fluent.predicate, fluent.args, BOTH)])
+
+    def _judge(self, events: Iterable[Event]) -> None:
         hits: dict[Relation, list[Hit]] = {}
-        for kind, name, args, sign in (*departures, *self._events(effective)):
+        for kind, name, args, sign in events:
             for trigger, relation in self._readers.get((kind, name), _NOBODY).items():
                 hits.setdefault(relation, []).append((trigger, args, sign))
         changed: dict[Row, None] = {}
@@ -119,7 +130,7 @@ class Installed:
             changed.update(dict.fromkeys(relation.update(own, self._world)))
         touched = {condition for row in changed for condition in row.conditions}
         for condition in sorted(touched, key=lambda c: c.number):
-            condition.judge(version, changed)
+            condition.judge(self.version, changed)
 
     def later(self, call: Callable[[], None]) -> None:
         """Queue a call for when the lock is released; under the lock."""

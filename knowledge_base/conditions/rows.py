@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from knowledge_base.facts import Fact, Value
+from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.index import FactIndex
 from knowledge_base.language.expression import TypedVariable
 from knowledge_base.schema import Schema, Signature
@@ -74,8 +75,8 @@ class RowsWorld:
         """At most how many they are."""
         return (self._rows if predicate == ROWS else self._world).estimate(predicate, pattern)
 
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value."""
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth."""
         return self._world.value(function, args)
 
     def objects(self, type_name: str) -> list[str]:
@@ -95,4 +96,4 @@ def row_fact(row: Row) -> Fact:
 def schema_with_rows(schema: Schema, params: tuple[str, ...]) -> Schema:
     """`schema` with the relation of rows declared, for compiling joins with it."""
     rows = Signature(ROWS, tuple(map(TypedVariable, params)))
-    return Schema(schema.types, schema.constants, {**schema.predicates, ROWS: rows}, schema.functions)
+    return replace(schema, predicates={**schema.predicates, ROWS: rows})

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from knowledge_base.errors import UnknownNameError
-from knowledge_base.facts import Fact
+from knowledge_base.facts import Content, Fact
 from knowledge_base.language.printer import value_text
 from knowledge_base.view import View
 
@@ -69,7 +69,7 @@ def scene(world: View, thing: str | None, hops: int, most: int) -> Scene:
     """
     types = world.nodes()
     said = [_said(fact, types) for fact in world.facts()]
-    said += [_said(fluent, types, f"= {_number(number)}") for fluent, number in world.values().items()]
+    said += [_said(fluent, types, f"= {_content(content)}") for fluent, content in world.values().items()]
     if thing is None:
         wanted = list(types)
     elif thing in types:
@@ -90,8 +90,8 @@ def _said(fact: Fact, types: dict[str, str], value: str = "") -> _Said:
     return _Said(things, fact.predicate, " ".join((*rest, value)).strip())
 
 
-def _number(number: object) -> str:
-    return f"{number:g}" if isinstance(number, float) else str(number)
+def _content(content: Content) -> str:
+    return f"{content:g}" if isinstance(content, float) else value_text(content, quoted=isinstance(content, str))
 
 
 def _around(thing: str, said: Iterable[_Said], hops: int) -> Iterator[str]:

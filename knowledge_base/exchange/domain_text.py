@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from knowledge_base.content import UNSET
 from knowledge_base.errors import ParseError, Place, SchemaError
 from knowledge_base.exchange.files import text_and_source
 from knowledge_base.exchange.sections import Definition, read_definition, word
@@ -31,11 +32,12 @@ _ACTION_PARTS = (":parameters", ":precondition", ":effect")
 
 @dataclass(frozen=True, slots=True)
 class DeclarationText:
-    """A predicate or function as declared: `(on ?a ?b - item)`."""
+    """A predicate or function as declared: `(on ?a ?b - item)`; `result` is what a function is worth."""
 
     name: str
     parameters: tuple[TypedVariable, ...]
     place: Place
+    result: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,44 +93,50 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
         types=tuple(parse_names(definition.nodes(":types"))),
         constants=tuple(parse_names(definition.nodes(":constants"))),
         predicates=tuple(_declarations(definition.nodes(":predicates"))),
-        functions=tuple(_declarations(definition.nodes(":functions"), result="number")),
+        functions=tuple(_functions(definition.nodes(":functions"))),
         actions=_actions(definition),
     )
 
 
-def _declarations(nodes: Sequence[Node], result: str | None = None) -> list[DeclarationText]:
+def _declarations(nodes: Sequence[Node]) -> list[DeclarationText]:
+    declared = [_declaration(node) for node in nodes]
+    return [d for d in declared if d.name != "="]  # declared by old files, though the language has it
+
+
+def _functions(nodes: Sequence[Node]) -> list[DeclarationText]:
+    """Declarations, which `- TYPE` after them makes worth that; without it they are numeric, as in PDDL 2.1."""
     found: list[DeclarationText] = []
+    untyped: list[DeclarationText] = []
     position = 0
     while position < len(nodes):
         node = nodes[position]
-        if isinstance(node, Word):
-            position = _after_result_type(nodes, position, result)
-            continue
-        declared = _declaration(node)
-        if declared.name != "=":  # declared by old files, though the language has it
-            found.append(declared)
-        position += 1
-    return found
+        if isinstance(node, Word) and node.text == "-" and untyped:
+            result = _result(nodes[position + 1 :], node)
+            found += [replace(function, result=result) for function in untyped]
+            untyped.clear()
+            position += 2
+        else:
+            untyped.append(_declaration(node))
+            position += 1
+    return found + [replace(function, result="number") for function in untyped]
 
 
-def _declaration(group: Group) -> DeclarationText:
-    head = group.head()
+def _declaration(node: Node) -> DeclarationText:
+    if isinstance(node, Word):
+        raise ParseError("a declaration is written in parentheses: (NAME ?x - TYPE)", place=node.place)
+    head = node.head()
     if head is None or head[0] in "?:":
-        raise ParseError("a declaration begins with a name: (NAME ?x - TYPE)", place=group.place)
-    return DeclarationText(head, typed_variables(group.items[1:]), group.place)
+        raise ParseError("a declaration begins with a name: (NAME ?x - TYPE)", place=node.place)
+    return DeclarationText(head, typed_variables(node.items[1:]), node.place)
 
 
-def _after_result_type(nodes: Sequence[Node], position: int, result: str | None) -> int:
-    """Skip the `- number` that may follow functions."""
-    here = word(nodes[position], "a declaration")
-    if result is None or here.text != "-" or position == 0:
-        raise ParseError("a declaration is written in parentheses: (NAME ?x - TYPE)", place=here.place)
-    if position + 1 == len(nodes):
-        raise ParseError("'-' without a type after it", place=here.place)
-    kind = word(nodes[position + 1], "a type")
-    if kind.folded() != result:
-        raise ParseError("only functions to numbers are supported", place=kind.place, found=kind.text, valid=(result,))
-    return position + 2
+def _result(after: Sequence[Node], dash: Word) -> str:
+    if not after:
+        raise ParseError("'-' without a type after it", place=dash.place)
+    kind = word(after[0], "a type")
+    if kind.folded() not in UNSET:
+        raise ParseError("a function is worth a value, not a thing", place=kind.place, found=kind.text, valid=UNSET)
+    return kind.folded()
 
 
 def _actions(definition: Definition) -> tuple[ActionText, ...]:

@@ -1,9 +1,9 @@
-"""PDDL domain and problem files: the one reader of their outer form, and the writer of problems."""
+"""PDDL domain and problem files: how they are read, and how a world is written as one."""
 
 from __future__ import annotations
 
 from knowledge_base.exchange.domain_text import ActionText, DomainText, parse_domain, read_domain
 from knowledge_base.exchange.problem_text import ProblemText, read_problem
-from knowledge_base.exchange.problem_writing import problem_text
+from knowledge_base.exchange.problem_writer import problem_to_text
 
-__all__ = ["ActionText", "DomainText", "ProblemText", "parse_domain", "problem_text", "read_domain", "read_problem"]
+__all__ = ["ActionText", "DomainText", "ProblemText", "parse_domain", "problem_to_text", "read_domain", "read_problem"]

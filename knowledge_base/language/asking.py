@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from knowledge_base.facts import VALUE_TYPES, Value
+from knowledge_base.errors import SchemaError
+from knowledge_base.facts import VALUE_TYPES, Content, Value
 from knowledge_base.language.binding import check_answers, check_bound
 from knowledge_base.language.compiler import compile_query, compile_test
 from knowledge_base.language.expression import (
@@ -96,7 +97,7 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
     return [dict(zip(found.answers, choice, strict=True)) for choice in dict.fromkeys(choices)]
 
 
-def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
+def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Content:
     """What `term` is worth on `world`.
 
     Raises:
@@ -114,6 +115,14 @@ def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_B
         if type(bindings.get(name)) not in VALUE_TYPES:
             check_bound(term, bindings)
     return known.get(world, bindings)
+
+
+def evaluate_argument(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
+    """What `term` is worth as an argument of a fact; errors as for `evaluate_term`, and a geometry is one."""
+    found = evaluate_term(term, world, bindings)
+    if isinstance(found, tuple):
+        raise SchemaError("a geometry can be compared, but nothing is said about it", place=term.place)
+    return found
 
 
 def _compiled(e: Expression, schema: Schema) -> _Condition:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from knowledge_base.errors import InputError, Place, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import (
     And,
@@ -58,8 +58,16 @@ def check_answers(e: Expression, bound: frozenset[str]) -> None:
 
 
 def check_bound(e: Expression | Term, bindings: Mapping[str, Value]) -> None:
-    """Raise `UnknownNameError` if a free variable of `e` has no value that facts and comparisons can be about."""
+    """Raise an error unless all free variables of `e` have values that facts and comparisons can be about.
+
+    Raises:
+        UnknownNameError: one has no value.
+        SchemaError: one is a geometry.
+    """
     for name in sorted(free_variables(e)):
+        if isinstance(bindings.get(name), tuple):
+            hint = "write it into the condition: (geometry ...)"
+            raise SchemaError(f"'?{name}' cannot be a geometry; {hint}", place=variable_place(e, name))
         if not isinstance(bindings.get(name), Value):
             known = [one for one, value in bindings.items() if isinstance(value, Value)]
             raise unbound_error(name, variable_place(e, name), known)

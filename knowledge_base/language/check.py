@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Literal
 
+from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.binding import check_answers, unbound_error
@@ -106,7 +107,9 @@ def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
     """Whether a value that is no thing's name may stand where one of the `wanted` types is expected."""
     if isinstance(value, bool):
         return "boolean" in wanted
-    return ("text" if isinstance(value, str) else "number") in wanted
+    if isinstance(value, str):
+        return "text" in wanted
+    return isinstance(value, int | float) and "number" in wanted
 
 
 def _written(term: Term) -> str:
@@ -176,9 +179,25 @@ class _Checker:
             case When(condition, inner):
                 self.condition(condition)
                 self.effect(inner)
-            case Assign(_, call, value):
-                self.term(call)
-                self.number(value, effect.operator)
+            case Assign():
+                self.assignment(effect)
+
+    def assignment(self, effect: Assign) -> None:
+        """What is assigned must be what the function may be worth; all else works on numbers."""
+        result = self.schema.result(effect.call.function, effect.call.place)
+        self.term(effect.call)
+        if effect.operator != "assign" or result == "number":
+            self.number(effect.call, effect.operator)
+            self.number(effect.value, effect.operator)
+            return
+        self.term(effect.value)
+        types = self.types_of(effect.value)
+        if types is not None and result not in types:
+            raise SchemaError(
+                f"'{effect.call.function}' is worth a {result}, and {_written(effect.value)} is of type "
+                f"{' or '.join(types)}",
+                place=effect.value.place or effect.place,
+            )
 
     def atom(self, atom: Atom) -> None:
         if self.schema.is_type(atom.predicate, len(atom.args)):
@@ -244,8 +263,10 @@ class _Checker:
                 return self.scope.get(name)
             case Constant(value, quoted):
                 return self.types_of_value(value, quoted=quoted)
-            case _:
-                return ("number",)
+            case Call(function):
+                return (self.schema.result(function, term.place),)
+            case Arithmetic(operator):
+                return (GEOMETRY if operator == GEOMETRY else "number",)
 
     def types_of_value(self, value: Value, *, quoted: bool) -> tuple[str, ...] | None:
         if isinstance(value, bool):

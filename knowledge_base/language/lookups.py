@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import Atom, TypedVariable, Variable, free_variables
-from knowledge_base.language.terms import Bindings, Getter, compile_term
+from knowledge_base.language.terms import Argument, Bindings, compile_argument
 from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
@@ -19,8 +19,8 @@ class Lookup:
     def __init__(self, atom: Atom, schema: Schema, finds: frozenset[str]) -> None:
         first: dict[str, int] = {}
         self._repeated: list[tuple[int, int]] = []
-        self._computed: list[tuple[int, Getter]] = []
-        self._getters: list[Getter | None] = []
+        self._computed: list[tuple[int, Argument]] = []
+        self._getters: list[Argument | None] = []
         self._predicate = atom.predicate
         for position, arg in enumerate(atom.args):
             if isinstance(arg, Variable) and arg.name in finds:
@@ -28,10 +28,10 @@ class Lookup:
                 if first.setdefault(arg.name, position) != position:
                     self._repeated.append((first[arg.name], position))
             elif free_variables(arg).isdisjoint(finds):
-                self._getters.append(compile_term(arg, schema))
+                self._getters.append(compile_argument(arg, schema))
             else:  # computed from what the other arguments find
                 self._getters.append(None)
-                self._computed.append((position, compile_term(arg, schema)))
+                self._computed.append((position, compile_argument(arg, schema)))
         self._found = tuple(first.items())
 
     def __call__(self, world: World, bindings: Bindings) -> Iterator[Bindings]:

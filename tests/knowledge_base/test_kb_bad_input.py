@@ -108,7 +108,7 @@ DOMAINS = [
     ("(:predicates p)", ParseError, "1:33", "in parentheses", None),
     ("(:predicates (p x))", ParseError, "1:36", r"begins with '\?'", None),
     ("(:predicates (p)) (:functions (p))", SchemaError, "1:50", "name of a predicate", None),
-    ("(:functions (f) - item)", ParseError, "1:38", "functions to numbers", None),
+    ("(:functions (f) - item)", ParseError, "1:38", "a function is worth a value", None),
     ("(:constants a - cup)", SchemaError, "1:32", "unknown type 'cup'", None),
     ("(:constants 1)", ParseError, "1:32", "cannot be a name", None),
     ("(:action)", ParseError, "1:20", "an action has a name", None),
@@ -230,9 +230,9 @@ def test_transaction_verbs() -> None:
     with kb.transaction(author="test") as tx:
         with pytest.raises(UnknownNameError, match="did you mean 'home'"):
             tx.remove_node("hom")
-        with pytest.raises(InputError, match="number to set"):
+        with pytest.raises(InputError, match="content to set"):
             tx.set("time")
-        with pytest.raises(InputError, match="not 'now'"):
+        with pytest.raises(SchemaError, match=r"\(time\) is a number, not 'now'"):
             tx.set("time", "now")
         with pytest.raises(UnknownNameError, match="no type"):
             kb.objects("cups")

@@ -94,7 +94,7 @@ def test_one_change_after_the_other_is_their_composition(first, second) -> None:
     one, two = KnowledgeBase(SCHEMA), KnowledgeBase(SCHEMA)
     for kb in (one, two):
         kb.apply(Delta(nodes=THINGS, added=(fact("on", "cup1", "shelf"),)), author="test")
-    second = Delta(THINGS, second.removed, second.added, second.values, second.removed_nodes)
+    second = Delta(THINGS, second.removed, second.added, second.values, second.removed_nodes, second.replaced)
     one.apply(first, author="test")
     one.apply(second, author="test")
     two.apply(first.then(second), author="test")
