@@ -36,7 +36,7 @@ def check_delta(delta: Delta, world: World) -> None:
         before.fact(fact, world.schema.predicate(fact.predicate))
     for fluent, content in delta.values.items():
         admission.fact(fluent, world.schema.function(fluent.predicate))
-        require_content(content, world.schema.result(fluent.predicate), str(fluent))
+        require_content(content, world.schema.result(fluent.predicate), fluent)
         if delta.removed_nodes and not set(delta.removed_nodes).isdisjoint(fluent.args):
             continue  # it begins anew, without a source
         if reference is not None and (source := reference(fluent.predicate, fluent.args)) is not None:

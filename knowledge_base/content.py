@@ -23,13 +23,13 @@ _SAID = {
 }
 
 
-def require_content(content: object, result: str, what: str, place: Place | None = None) -> None:
+def require_content(content: object, result: str, what: object, place: Place | None = None) -> None:
     """Raise an error unless `content` is something that a function of this result may be worth.
 
     Args:
         content: the value.
         result: the type it must be of, one of `UNSET`.
-        what: what it is the value of, for the message.
+        what: what it is the value of, written only when there is something wrong.
         place: where it is written.
 
     Raises:
@@ -44,7 +44,7 @@ def require_content(content: object, result: str, what: str, place: Place | None
             require_finite(number, what, place)
 
 
-def require_finite(number: float, what: str, place: Place | None = None) -> None:
+def require_finite(number: float, what: object, place: Place | None = None) -> None:
     """Raise `InputError` for an infinity, for what is no number, and for what no file can hold."""
     try:
         if math.isfinite(number):

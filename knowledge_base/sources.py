@@ -115,7 +115,7 @@ class Sources:
     def feed(self, source: Source, content: Content) -> None:
         """Take in a value; see `Source.update`."""
         fluent = source.fluent
-        require_content(content, self._state.schema.result(fluent.predicate), str(fluent))
+        require_content(content, self._state.schema.result(fluent.predicate), fluent)
         with self._lock:
             if source.closed:
                 raise ConflictError(f"the source '{source.reference}' of {fluent} is closed")

@@ -164,7 +164,7 @@ class _Init:
                 pass  # what is not said does not hold
             case Comparison("=", Call(function, args), said) if (content := _content(said)) is not None:
                 fluent = Fact(function, _values(args))
-                require_content(content, self.schema.result(function), str(fluent), said.place)
+                require_content(content, self.schema.result(function), fluent, said.place)
                 self.values[fluent] = content
             case _:
                 raise ParseError("':init' has facts and (= (FUNCTION ...) NUMBER)", place=e.place)

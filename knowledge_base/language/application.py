@@ -87,7 +87,7 @@ class _Application:
         change = evaluate_term(effect.value, self.world, bindings)
         again = fluent in self.values
         if operator == "assign":
-            require_content(change, self.world.schema.result(call.function), str(fluent), effect.place)
+            require_content(change, self.world.schema.result(call.function), fluent, effect.place)
             self.refuse(again and (fluent in self.computed or old != change), fluent, effect)
             self.values[fluent] = change
             return
