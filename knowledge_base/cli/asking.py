@@ -62,7 +62,7 @@ def show(
     domain: Domain = None,
     json: Json = False,
 ) -> None:
-    """Show a world's things, facts and numbers, and a problem's goal; or all that is about THING."""
+    """Show a world's things, facts and what functions are worth, and a problem's goal; or all that is about THING."""
     with opened(source, domain) as (kb, problem):
         _show(kb, problem, thing, as_json=json)
 
@@ -101,7 +101,7 @@ def _answer(world: View, expression: str, params: Mapping[str, Value], *, as_jso
 
 def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_json: bool) -> None:
     from knowledge_base.errors import UnknownNameError
-    from knowledge_base.language.printer import to_text
+    from knowledge_base.language.printer import to_text, value_text
 
     things, facts, values = world.nodes(), world.facts(), world.values()
     if thing is not None:
@@ -115,13 +115,13 @@ def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_jso
         said: dict[str, Any] = {"version": world.version}
         if problem is not None:
             said = {"problem": problem.name, "domain": problem.domain, "goal": to_text(problem.goal)}
-        numbers = {str(fluent): number for fluent, number in values.items()}
-        print_json({**said, "objects": things, "facts": [str(f) for f in facts], "values": numbers})
+        contents = {str(fluent): content for fluent, content in values.items()}
+        print_json({**said, "objects": things, "facts": [str(f) for f in facts], "values": contents})
         return
     print_table(["thing", "type"], list(things.items()))
     print_table(["fact"], [[f] for f in facts])
     if values:
-        print_table(["number", "value"], list(values.items()))
+        print_table(["function", "value"], [[f, value_text(v, quoted=isinstance(v, str))] for f, v in values.items()])
     typer.echo(f"version {world.version}" if problem is None else f"goal: {to_text(problem.goal)}")
 
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from knowledge_base.cli.sources import Domain, Source, Store, opened, writable
-
-if TYPE_CHECKING:
-    from knowledge_base.store import KnowledgeBase
 
 
 class Form(StrEnum):
@@ -48,7 +45,7 @@ def export(
     """Write a world as JSON (lossless, with its schema) or as the start of a PDDL problem."""
     with opened(source, domain) as (kb, problem):
         pddl = form is Form.PDDL or (form is None and to is not None and to.suffix == ".pddl")
-        text = _problem(kb, source.stem, problem.domain if problem else "world") if pddl else kb.to_json()
+        text = kb.to_pddl(problem.domain if problem else "world", source.stem) if pddl else kb.to_json()
     _write(text, to)
 
 
@@ -64,12 +61,6 @@ def draw(
 
     with opened(source, domain) as (kb, _):
         _write(drawn(kb, thing, hops), to)
-
-
-def _problem(kb: KnowledgeBase, name: str, domain: str) -> str:
-    from knowledge_base.exchange.pddl import problem_text
-
-    return problem_text(kb, name, domain)
 
 
 def _write(text: str, to: Path | None) -> None:

@@ -55,17 +55,20 @@ def delta_form(delta: Delta) -> dict[str, Any]:
         "removed_objects": list(delta.removed_nodes),
         "added": [str(fact) for fact in delta.added],
         "removed": [str(fact) for fact in delta.removed],
-        "values": {str(fluent): number for fluent, number in delta.values.items()},
+        "values": {str(fluent): content for fluent, content in delta.values.items()},
     }
 
 
 def delta_lines(delta: Delta) -> Iterator[str]:
     """What became different, each with a sign in front: `+ (on cup1 table)`."""
+    from knowledge_base.language.printer import value_text
+
     yield from (f"- {name} and all about it" for name in delta.removed_nodes)
     yield from (f"+ ({type_name} {name})" for name, type_name in delta.nodes.items())
     yield from (f"- {fact}" for fact in delta.removed)
     yield from (f"+ {fact}" for fact in delta.added)
-    yield from (f"= {fluent} {number}" for fluent, number in delta.values.items())
+    for fluent, content in delta.values.items():
+        yield f"= {fluent} {value_text(content, quoted=isinstance(content, str))}"
 
 
 def clock_time(seconds: float) -> str:
