@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from datetime import datetime
 from xml.etree import ElementTree as ET
 
@@ -169,3 +170,44 @@ def test_a_scenario_is_what_the_robot_knows_at_its_start(tmp_path) -> None:
 def test_parameters_are_written_with_an_equals_sign(store) -> None:
     with pytest.raises(InputError, match="a parameter is written x=VALUE, not 'where'"):
         run("query", store, "(on ?c ?where)", "-p", "where")
+
+
+def test_watching_prints_what_others_commit(store) -> None:
+    """Another process (here a thread of ours) writes; the command ends after two changes that it was asked for."""
+    waiting = threading.Event()
+
+    def write() -> None:
+        with KnowledgeBase.open(None, store) as kb:
+            waiting.wait(timeout=60)
+            for _ in range(200):  # until the command has seen two of them
+                with kb.transaction("eyes") as world:
+                    world.tell("clean", "mug")
+                with kb.transaction("eyes") as world:
+                    world.retract("clean", "mug")
+                if done.is_set():
+                    return
+                done.wait(timeout=0.05)
+
+    done, writer = threading.Event(), threading.Thread(target=write)
+    writer.start()
+    waiting.set()
+    printed = run("watch", store, "(clean ?c)", "--count", "2", "--json").splitlines()
+    done.set()
+    writer.join()
+    told = [json.loads(line) for line in printed]
+    assert [change["author"] for change in told] == ["eyes", "eyes"]
+    assert told[1]["version"] == told[0]["version"] + 1
+    assert run("watch", store, "--seconds", "0") == ""
+
+
+def test_content_is_told_and_shown_as_the_language_writes_it(tmp_path) -> None:
+    (tmp_path / "domain.pddl").write_text(
+        "(define (domain d) (:types cup) (:functions (label ?c - cup) - text (pose ?c - cup) - geometry))",
+        encoding="utf-8",
+    )
+    store = str(tmp_path / "c.kb")
+    run("new", store, "--domain", str(tmp_path / "domain.pddl"))
+    told = run("tell", store, "(cup c)", '(= (label c) "Red one")', "(= (pose c) (geometry 0.5 1))")
+    assert told == '+ (cup c)\n= (label c) "Red one"\n= (pose c) (geometry 0.5 1)\nversion 1\n'
+    assert json.loads(run("show", store, "--json"))["values"] == {"(label c)": "Red one", "(pose c)": [0.5, 1.0]}
+    assert '"Red one"' in run("show", store)
