@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from knowledge_base.computation import Computed as Computed
+    from knowledge_base.computation import computed as computed
     from knowledge_base.conditions.clock import Clock as Clock
     from knowledge_base.conditions.condition import Condition as Condition
     from knowledge_base.conditions.condition import Firing as Firing
@@ -42,6 +44,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Binding": "view",
         "Change": "facts",
         "Clock": "conditions.clock",
+        "Computed": "computation",
         "Condition": "conditions.condition",
         "ConditionCancelledError": "errors",
         "ConflictError": "errors",
@@ -66,6 +69,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "View": "view",
         "Watch": "conditions.watch",
         "WorldState": "state",
+        "computed": "computation",
         "fact": "facts",
     },
 )

@@ -28,9 +28,9 @@ def check_delta(delta: Delta, world: World) -> None:
     for name, type_name in delta.nodes.items():
         admission.node(name, type_name)
     for fact in delta.added:
-        admission.fact(fact, world.schema.predicate(fact.predicate))
+        admission.fact(fact, world.schema.told(fact.predicate))
     for fact in delta.removed:
-        before.fact(fact, world.schema.predicate(fact.predicate))
+        before.fact(fact, world.schema.told(fact.predicate))
     for fluent, number in delta.values.items():
         admission.fact(fluent, world.schema.function(fluent.predicate))
         admission.number(fluent, number)

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from typing import Any
 
+from knowledge_base.computation import Computed
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.domain_text import DeclarationText, DomainText, parse_domain, read_domain
-from knowledge_base.language.expression import KEYWORDS, TypedVariable
+from knowledge_base.language.check import check_reads
+from knowledge_base.language.expression import KEYWORDS, Atom, TypedVariable
 from knowledge_base.language.typed_list import TypedName
 
 ROOT_TYPE = "object"
 VALUE_TYPES = ("number", "text", "boolean")
 """Types of arguments that are values and not things; they have no subtypes and cannot be quantified over."""
+MOST_NESTED = 8
+"""How many computed predicates may read one through the other; each multiplies what judging the first costs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +55,11 @@ class Schema:
         predicates: by name.
         functions: numeric fluents, by name.
         places: where types and constants are declared, for messages.
+        computed: predicates that are computed, by name; no world and no store holds them.
 
     Raises:
-        SchemaError: an unknown parent, parameter or constant type, a cycle of types, or one name used twice.
+        SchemaError: an unknown parent, parameter or constant type, a cycle of types, one name used twice, or
+            a computed predicate that cannot read what it declares.
     """
 
     types: Mapping[str, str | None] = field(default_factory=dict)
@@ -59,6 +67,7 @@ class Schema:
     predicates: Mapping[str, Signature] = field(default_factory=dict)
     functions: Mapping[str, Signature] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict, repr=False)
+    computed: Mapping[str, Computed[Any]] = field(default_factory=dict)
     _ancestors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -71,12 +80,14 @@ class Schema:
             "predicates": dict(self.predicates),
             "functions": dict(self.functions),
             "places": dict(self.places),
+            "computed": {name: of.resolved(self._is_asked) for name, of in self.computed.items()},
         }
         for name, copy in copies.items():
             object.__setattr__(self, name, copy)
         object.__setattr__(self, "_ancestors", {t: tuple(self._lineage(t)) for t in self.types})
         self._check_names()
         self._check_types()
+        self._check_computed()
 
     @classmethod
     def from_pddl(cls, path: str | Path) -> Schema:
@@ -134,7 +145,21 @@ class Schema:
             predicates=_united(both, "predicate"),
             functions=_united(functions, "function"),
             places={**other.places, **self.places},
-        )
+        ).with_computed(*self.computed.values(), *other.computed.values())
+
+    def with_computed(self, *predicates: Computed[Any]) -> Schema:
+        """The schema with these predicates too; one that it has already is fine.
+
+        Raises:
+            UnknownNameError: one reads a function, predicate or type that is not declared.
+            SchemaError: its name is in use, what it reads does not fit its parameters' types, or computed
+                predicates read each other in a circle or more than `MOST_NESTED` one through the other.
+        """
+        known = dict(self.computed)
+        for one in predicates:
+            if known.setdefault(one.name, one).function is not one.function:
+                raise _twice("computed predicate", one.name, known[one.name].place, one.place)
+        return replace(self, computed=known)
 
     def is_a(self, type_name: str, ancestor: str) -> bool:
         """Whether everything of type `type_name` is of type `ancestor`; a type is its own ancestor."""
@@ -162,21 +187,40 @@ class Schema:
         if name not in self.types:
             raise UnknownNameError(f"there is no type '{name}'", place=place, found=name, valid=self.types)
 
+    def require_argument_type(self, name: str, place: Place | None = None) -> None:
+        """Raise `UnknownNameError` unless `name` is a type of things or of values."""
+        if name not in VALUE_TYPES:
+            self.require_type(name, place)
+
     def is_type(self, name: str, arity: int) -> bool:
         """Whether an atom of that name and number of arguments tests a type."""
         return arity == 1 and name in self.types and name not in self.predicates
 
     def predicate(self, name: str, place: Place | None = None) -> Signature:
-        """The predicate of that name.
+        """The predicate of that name, which may be a computed one.
 
         Raises:
             UnknownNameError: there is none; predicates, types and keywords are suggested.
         """
         found = self.predicates.get(name)
-        if found is None:
-            valid = (*self.predicates, *self.types, *KEYWORDS)
+        if found is not None:
+            return found
+        if name not in self.computed:
+            valid = (*self.predicates, *self.computed, *self.types, *KEYWORDS)
             raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
-        return found
+        of = self.computed[name]
+        return Signature(of.name, of.parameters, of.place)
+
+    def told(self, name: str, place: Place | None = None) -> Signature:
+        """The predicate of that name, whose facts can be told.
+
+        Raises:
+            UnknownNameError: there is none.
+            SchemaError: it is computed.
+        """
+        if name in self.computed:
+            raise self.computed[name].refused(place)
+        return self.predicate(name, place)
 
     def function(self, name: str, place: Place | None = None) -> Signature:
         """The numeric fluent of that name.
@@ -224,10 +268,45 @@ class Schema:
                     place=self.functions[name].place,
                 )
 
+        for name, of in self.computed.items():
+            if name in self.predicates or name in self.functions or name in self.types or name in KEYWORDS:
+                raise SchemaError(f"the name of the computed predicate '{name}' is in use already", place=of.place)
+
+    def _check_computed(self) -> None:
+        nested: dict[str, int] = {}
+        for name in self._computed_in_order():
+            of = self.computed[name]
+            check_reads(of, self)
+            nested[name] = 1 + max((nested[read] for read in self._computed_of(of)), default=0)
+            if nested[name] > MOST_NESTED:
+                raise SchemaError(
+                    f"'{name}' reads computed predicates more than {MOST_NESTED} deep, one through the other",
+                    place=of.place,
+                )
+
+    def _computed_in_order(self) -> list[str]:
+        """Those that are read come first."""
+        try:
+            return list(TopologicalSorter({n: self._computed_of(of) for n, of in self.computed.items()}).static_order())
+        except CycleError as error:
+            circle = error.args[1]
+            said = " - ".join(circle)
+            raise SchemaError(
+                f"computed predicates read each other in a circle: {said}", place=self.computed[circle[0]].place
+            ) from None
+
+    def _computed_of(self, of: Computed[Any]) -> list[str]:
+        return [r.predicate for r in of.reads if isinstance(r, Atom) and r.predicate in self.computed]
+
+    def _is_asked(self, name: str, arity: int) -> bool:
+        """Whether that is something true or false, and no function."""
+        return name in self.predicates or name in self.computed or (arity == 1 and name in self.types)
+
     def _check_types(self) -> None:
         for name, type_name in self.constants.items():
             self._known(type_name, f"the constant '{name}'", self.places.get(name), values=False)
-        for signature in (*self.predicates.values(), *self.functions.values()):
+        computed = map(self.predicate, self.computed)
+        for signature in (*self.predicates.values(), *self.functions.values(), *computed):
             for parameter in signature.parameters:
                 for type_name in parameter.types:
                     owner = f"the parameter '?{parameter.name}' of '{signature.name}'"

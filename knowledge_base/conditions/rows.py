@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
@@ -95,4 +96,4 @@ def row_fact(row: Row) -> Fact:
 def schema_with_rows(schema: Schema, params: tuple[str, ...]) -> Schema:
     """`schema` with the relation of rows declared, for compiling joins with it."""
     rows = Signature(ROWS, tuple(map(TypedVariable, params)))
-    return Schema(schema.types, schema.constants, {**schema.predicates, ROWS: rows}, schema.functions)
+    return replace(schema, predicates={**schema.predicates, ROWS: rows})

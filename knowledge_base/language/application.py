@@ -72,7 +72,7 @@ class _Application:
                 self.assign(effect, bindings)
 
     def fact(self, atom: Atom, bindings: Bindings) -> Fact:
-        signature = self.world.schema.predicate(atom.predicate, atom.place)
+        signature = self.world.schema.told(atom.predicate, atom.place)
         check_arity(signature, len(atom.args), atom.place)
         return self.instance(atom.predicate, atom, bindings)
 

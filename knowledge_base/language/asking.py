@@ -125,6 +125,6 @@ def _compiled_term(term: Term, schema: Schema) -> _Term:
 
 
 def _compiled_query(e: Expression, schema: Schema, bound: frozenset[str]) -> _Query:
-    check_answers(e, bound)
+    check_answers(e, bound, schema)
     answers = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
     return _Query(answers, compile_query(e, schema, bound))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
@@ -27,7 +27,10 @@ from knowledge_base.language.expression import (
     TypedVariable,
     Variable,
 )
-from knowledge_base.schema import VALUE_TYPES, Schema, Signature
+
+if TYPE_CHECKING:  # a schema checks what its computed predicates read
+    from knowledge_base.computation import Computed
+    from knowledge_base.schema import Schema, Signature
 
 Free = Literal["error", "answers"]
 
@@ -57,7 +60,7 @@ def check(
     checker = _Checker(schema, objects, variables or {}, free)
     checker.condition(e)
     if free == "answers":
-        check_answers(e, frozenset(variables or ()))
+        check_answers(e, frozenset(variables or ()), schema)
 
 
 def check_effect(
@@ -88,9 +91,18 @@ def check_parameters(parameters: tuple[TypedVariable, ...], schema: Schema) -> d
     """
     for parameter in parameters:
         for type_name in parameter.types:
-            if type_name not in VALUE_TYPES:
-                schema.require_type(type_name, parameter.place)
+            schema.require_argument_type(type_name, parameter.place)
     return {p.name: _single(p.types) for p in parameters}
+
+
+def check_reads(computed: Computed[Any], schema: Schema) -> None:
+    """Raise an error with its place unless the computed predicate can read what it declares; errors as `check`."""
+    checker = _Checker(schema, None, check_parameters(computed.parameters, schema), "error")
+    for read in computed.reads:
+        if isinstance(read, Atom):
+            checker.condition(read)
+        else:
+            checker.term(read)
 
 
 def check_arity(signature: Signature, count: int, place: Place | None = None) -> None:
@@ -166,7 +178,7 @@ class _Checker:
             case Add(atom) | Delete(atom):
                 if self.schema.is_type(atom.predicate, len(atom.args)):
                     raise SchemaError(f"'{atom.predicate}' is a type; things keep theirs", place=atom.place)
-                self.atom(atom)
+                self.arguments(self.schema.told(atom.predicate, atom.place), atom)
             case AllOf(parts):
                 for part in parts:
                     self.effect(part)

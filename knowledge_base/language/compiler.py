@@ -14,6 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Fact
 from knowledge_base.language.check import check_arity
 from knowledge_base.language.expression import (
     And,
@@ -105,8 +107,28 @@ def _atom(atom: Atom, schema: Schema) -> Test:
     if schema.is_type(atom.predicate, len(atom.args)):
         return _type_test(compile_term(atom.args[0], schema), (atom.predicate,), schema)
     check_arity(schema.predicate(atom.predicate, atom.place), len(atom.args), atom.place)
+    if atom.predicate in schema.computed:
+        return _computed(atom, schema)
     predicate, arguments = atom.predicate, compile_arguments(atom.args, schema)
     return lambda world, bindings: world.holds(predicate, arguments(world, bindings))
+
+
+def _computed(atom: Atom, schema: Schema) -> Test:
+    of, arguments = schema.computed[atom.predicate], compile_arguments(atom.args, schema)
+    inputs = tuple(
+        compile_test(read, schema) if isinstance(read, Atom) else compile_term(read, schema)
+        for read in of.inputs(atom.args)
+    )
+
+    def test(world: World, bindings: Bindings) -> bool:
+        values = [get(world, bindings) for get in inputs]
+        try:
+            return of.judge(values)
+        except InputError as error:
+            said = Fact(of.name, arguments(world, bindings))
+            raise InputError(f"{said} cannot be computed: {error}", place=atom.place) from error
+
+    return test
 
 
 def _type_test(get: Getter, types: tuple[str, ...], schema: Schema) -> Test:
@@ -182,7 +204,7 @@ class _Plan:
     """The stages of one search, each prepared when it is first reached."""
 
     def __init__(self, conditions: list[Conjunct], schema: Schema, bound: frozenset[str]) -> None:
-        self._steps = order(conditions, bound)
+        self._steps = order(conditions, bound, schema)
         self._schema = schema
         self._stages: dict[tuple[int, ...], _Stage] = {}
         self.first = stage = self._stage(tuple(range(len(self._steps))), bound)

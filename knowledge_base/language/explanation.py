@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from knowledge_base.computation import Read
 from knowledge_base.facts import Value
 from knowledge_base.language.application import choices
 from knowledge_base.language.asking import NO_BINDINGS, evaluate_term, holds
@@ -25,6 +26,7 @@ from knowledge_base.language.expression import (
     Not,
     Or,
     substitute,
+    substitute_term,
 )
 from knowledge_base.language.printer import to_text, value_text
 from knowledge_base.language.terms import Bindings
@@ -43,7 +45,8 @@ class Explanation:
         truth: whether it holds.
         children: its parts, all of them judged; for `exists` and `forall` the one choice that shows it, if
             there is one (a witness, the nearest miss, a counterexample).
-        detail: for a comparison with computed sides what they are worth; for a choice, what was chosen.
+        detail: for a comparison with computed sides what they are worth, for a computed predicate what its
+            inputs are; for a choice, what was chosen.
         decider: which of the children decides; `None` for a leaf.
     """
 
@@ -91,8 +94,7 @@ def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
     text = to_text(substitute(e, bindings))
     match e:
         case Atom() | Comparison():
-            detail = _computed(e, world, bindings) if isinstance(e, Comparison) else None
-            found = Explanation(text, holds(e, world, bindings), detail=detail)
+            found = Explanation(text, holds(e, world, bindings), detail=_detail(e, world, bindings))
         case Not(body):
             child = _explain(body, world, bindings)
             found = Explanation(text, not child.truth, (child,), decider=0)
@@ -156,7 +158,24 @@ def _nearness(miss: Explanation) -> float:
     return sum(c.truth for c in miss.children) / len(miss.children) if miss.children else 0.0
 
 
-def _computed(e: Comparison, world: World, bindings: Bindings) -> str | None:
+def _detail(e: Atom | Comparison, world: World, bindings: Bindings) -> str | None:
+    """What stands behind a leaf that does not just say a fact."""
+    if isinstance(e, Comparison):
+        return _compared(e, world, bindings)
+    of = world.schema.computed.get(e.predicate)
+    if of is None:
+        return None
+    inputs = of.inputs(tuple(substitute_term(arg, bindings) for arg in e.args))
+    return ", ".join(_input(read, world) for read in inputs) or None
+
+
+def _input(read: Read, world: World) -> str:
+    if isinstance(read, Atom):
+        return f"{to_text(read)} is {'true' if holds(read, world) else 'false'}"
+    return f"{to_text(read)} = {value_text(evaluate_term(read, world))}"
+
+
+def _compared(e: Comparison, world: World, bindings: Bindings) -> str | None:
     if not any(isinstance(side, Call | Arithmetic) for side in (e.left, e.right)):
         return None
     left, right = (value_text(evaluate_term(side, world, bindings)) for side in (e.left, e.right))

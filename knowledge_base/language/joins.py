@@ -24,6 +24,7 @@ from knowledge_base.language.expression import (
     free_variables,
     variable_place,
 )
+from knowledge_base.schema import Schema
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +45,18 @@ class Step:
 
     conjunct: Conjunct
     free: frozenset[str]
+    schema: Schema
 
     def is_ready(self, bound: frozenset[str]) -> bool:
         """Whether it can be done when the variables `bound` have values."""
-        return self.free <= bound | _finds(self.conjunct, bound)
+        return self.free <= bound | _finds(self.conjunct, bound, self.schema)
 
     def cost(self, bound: frozenset[str]) -> tuple[int, int, int]:
         """Kind of look-up (tests are 0 to 2), then open arguments, then bound ones; smaller is earlier."""
         unbound = len(self.free - bound)
         match self.conjunct:
+            case Atom(name, _) if name in self.schema.computed:
+                return (2, 0, 0)
             case Atom(_, args):
                 open_args = sum(isinstance(a, Variable) and a.name not in bound for a in args)
                 found = 3 if open_args < len(args) else 4
@@ -87,13 +91,13 @@ def opposite(e: Expression) -> Expression:
             return Not(e, place=e.place)
 
 
-def order(conditions: Iterable[Conjunct], bound: frozenset[str]) -> list[Step]:
+def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Schema) -> list[Step]:
     """The look-ups in a good order when the variables `bound` have values and no numbers of facts are known.
 
     Raises:
         InputError: a variable is only tested and nothing finds values for it.
     """
-    pending = [Step(c, _free(c)) for c in conditions]
+    pending = [Step(c, _free(c), schema) for c in conditions]
     steps: list[Step] = []
     while pending:
         ready = [s for s in pending if s.is_ready(bound)]
@@ -122,8 +126,8 @@ def _free(conjunct: Conjunct) -> frozenset[str]:
     return free_variables(conjunct)
 
 
-def _finds(conjunct: Conjunct, bound: frozenset[str]) -> frozenset[str]:
-    return _free(conjunct) if isinstance(conjunct, Range) else found_variables(conjunct, bound)
+def _finds(conjunct: Conjunct, bound: frozenset[str], schema: Schema) -> frozenset[str]:
+    return _free(conjunct) if isinstance(conjunct, Range) else found_variables(conjunct, schema, bound)
 
 
 def _unfound(pending: list[Step], bound: frozenset[str]) -> InputError:

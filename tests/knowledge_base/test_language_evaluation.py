@@ -60,7 +60,7 @@ def test_an_explanation_agrees_with_the_truth(e, delta, b) -> None:
 def test_answers_are_all_choices_that_make_it_true_each_once(e, delta, b, bound) -> None:
     world = world_of(delta)
     params = {name: b[name] for name in bound}
-    assume(not only_tested(e, frozenset(bound)))
+    assume(not only_tested(e, SCHEMA, frozenset(bound)))
     asked = sorted(free_variables(e) - bound)
     answers = query(e, world, params)
     choices = brute_choices([TypedVariable(name) for name in asked], world)
