@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Fact as Fact
     from knowledge_base.facts import Value as Value
     from knowledge_base.facts import fact as fact
+    from knowledge_base.language.explanation import Explanation as Explanation
+    from knowledge_base.language.query_plan import QueryPlan as QueryPlan
+    from knowledge_base.language.query_plan import QueryStep as QueryStep
     from knowledge_base.overlay import Overlay as Overlay
     from knowledge_base.schema import Schema as Schema
     from knowledge_base.schema import Signature as Signature
@@ -49,6 +52,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "ConditionCancelledError": "errors",
         "ConflictError": "errors",
         "Delta": "facts",
+        "Explanation": "language.explanation",
         "Fact": "facts",
         "Firing": "conditions.condition",
         "HistoryError": "errors",
@@ -58,6 +62,8 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Overlay": "overlay",
         "ParseError": "errors",
         "Place": "errors",
+        "QueryPlan": "language.query_plan",
+        "QueryStep": "language.query_plan",
         "Schema": "schema",
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",

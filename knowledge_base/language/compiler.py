@@ -6,7 +6,7 @@ counterexample, through the index and not by trying all objects.
 
 A search decides at every step anew which condition to look up next: the one with the fewest matches, given
 what is bound by then. What can be prepared for a step depends only on the conditions that are left, and is
-kept (`_Plan`).
+kept (`SearchPlan`).
 """
 
 from __future__ import annotations
@@ -170,11 +170,11 @@ def _found(search: Search) -> Test:
 
 
 def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Search:
-    plan = _Plan([_as_range(c, schema) for c in conditions], schema, bound)
+    plan = SearchPlan(conditions, schema, bound)
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
         """Backtracking with a stack of its own, so that long conjunctions do not recurse."""
-        stack: list[tuple[_Stage, Iterator[Bindings]]] = [(plan.first, iter((bindings,)))]
+        stack: list[tuple[Stage, Iterator[Bindings]]] = [(plan.first, iter((bindings,)))]
         while stack:
             stage, found = stack[-1]
             candidate = next(found, None)
@@ -191,8 +191,15 @@ def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str
 
 
 @dataclass(frozen=True, slots=True)
-class _Stage:
-    """What to do when these conditions (by number) are left: the tests, then one of the look-ups."""
+class Stage:
+    """What to do next: the tests, then one of the look-ups.
+
+    Attributes:
+        test: whether the conditions hold that need no more values.
+        choices: the look-ups that may come next, by the number of their condition.
+        left: the conditions that are not dealt with then.
+        bound: the variables that have a value.
+    """
 
     test: Test
     choices: tuple[tuple[int, Lookup | Search], ...]
@@ -200,33 +207,38 @@ class _Stage:
     bound: frozenset[str]
 
 
-class _Plan:
-    """The stages of one search, each prepared when it is first reached."""
+class SearchPlan:
+    """The stages of one search, each prepared when it is first reached.
 
-    def __init__(self, conditions: list[Conjunct], schema: Schema, bound: frozenset[str]) -> None:
-        self._steps = order(conditions, bound, schema)
+    Attributes:
+        steps: the conditions; stages have their numbers.
+        first: where the search begins.
+    """
+
+    def __init__(self, conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> None:
+        self.steps = order((_as_range(c, schema) for c in conditions), bound, schema)
         self._schema = schema
-        self._stages: dict[tuple[int, ...], _Stage] = {}
-        self.first = stage = self._stage(tuple(range(len(self._steps))), bound)
+        self._stages: dict[tuple[int, ...], Stage] = {}
+        self.first = stage = self._stage(tuple(range(len(self.steps))), bound)
         while stage.choices:  # one way through, so that every mistake in the text shows now
             stage = self.after(stage, stage.choices[0][0])
 
-    def after(self, stage: _Stage, chosen: int) -> _Stage:
+    def after(self, stage: Stage, chosen: int) -> Stage:
         """The stage that follows when the condition `chosen` was looked up."""
         left = tuple([i for i in stage.left if i != chosen])
         found = self._stages.get(left)
         if found is None:
             if len(self._stages) >= _MOST_STAGES:
                 self._stages.clear()
-            found = self._stages[left] = self._stage(left, stage.bound | self._steps[chosen].free)
+            found = self._stages[left] = self._stage(left, stage.bound | self.steps[chosen].free)
         return found
 
-    def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> _Stage:
-        steps = {i: self._steps[i] for i in left}
+    def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> Stage:
+        steps = {i: self.steps[i] for i in left}
         tests = [_conjunct_test(s.conjunct, self._schema) for s in steps.values() if s.free <= bound]
         open_steps = {i: s for i, s in steps.items() if not s.free <= bound}
         choices = [(i, _lookup(s, self._schema, bound)) for i, s in candidates(open_steps, bound)]
-        return _Stage(_all(tests), tuple(choices), tuple(open_steps), bound)
+        return Stage(_all(tests), tuple(choices), tuple(open_steps), bound)
 
 
 def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
