@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
@@ -69,9 +70,9 @@ def compile_test(e: Expression, schema: Schema) -> Test:
         case Imply(premise, conclusion):
             test = _any([_negation(compile_test(premise, schema)), compile_test(conclusion, schema)])
         case Exists():
-            test = _found(witnesses(e, schema))
+            test = _found(_search(_witnessing(e, schema), schema, free_variables(e)))
         case Forall():
-            test = _negation(_found(counterexamples(e, schema)))
+            test = _negation(_found(_search(_refuting(e, schema), schema, free_variables(e))))
     return test
 
 
@@ -86,21 +87,27 @@ def compile_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Searc
 
 def witnesses(e: Exists, schema: Schema) -> Search:
     """A search for the choices of objects that make the body true."""
-    return _quantified(e.variables, e.body, schema, free_variables(e))
+    return _search(_witnessing(e, schema), schema, free_variables(e))
 
 
 def counterexamples(e: Forall, schema: Schema) -> Search:
     """A search for the choices of objects that make the body false."""
-    return _quantified(e.variables, opposite(e.body), schema, free_variables(e))
+    return _search(_refuting(e, schema), schema, free_variables(e))
 
 
-def _quantified(
-    variables: tuple[TypedVariable, ...], body: Expression, schema: Schema, bound: frozenset[str]
-) -> Search:
+def _witnessing(e: Exists, schema: Schema) -> list[Conjunct]:
+    return [*_ranges(e.variables, schema), *conjuncts(e.body)]
+
+
+def _refuting(e: Forall, schema: Schema) -> list[Conjunct]:
+    return [*_ranges(e.variables, schema), *conjuncts(opposite(e.body))]
+
+
+def _ranges(variables: tuple[TypedVariable, ...], schema: Schema) -> list[Range]:
     for variable in variables:
         for type_name in variable.types:
             schema.require_type(type_name, variable.place)
-    return _search([*map(Range, variables), *conjuncts(body)], schema, bound)
+    return [Range(v) for v in variables]
 
 
 def _atom(atom: Atom, schema: Schema) -> Test:
@@ -235,10 +242,19 @@ class SearchPlan:
 
     def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> Stage:
         steps = {i: self.steps[i] for i in left}
-        tests = [_conjunct_test(s.conjunct, self._schema) for s in steps.values() if s.free <= bound]
         open_steps = {i: s for i, s in steps.items() if not s.free <= bound}
-        choices = [(i, _lookup(s, self._schema, bound)) for i, s in candidates(open_steps, bound)]
+        # By `map` and not in comprehensions, whose frames deep nesting would have to pay for.
+        tests = list(map(self._test, (s.conjunct for i, s in steps.items() if i not in open_steps)))
+        chosen = candidates(open_steps, bound)
+        lookups = map(partial(_lookup, schema=self._schema, bound=bound), (step for _, step in chosen))
+        choices = zip((i for i, _ in chosen), lookups, strict=True)
         return Stage(_all(tests), tuple(choices), tuple(open_steps), bound)
+
+    def _test(self, conjunct: Conjunct) -> Test:
+        if not isinstance(conjunct, Range):
+            return compile_test(conjunct, self._schema)
+        variable = conjunct.variable
+        return _type_test(compile_term(Variable(variable.name), self._schema), variable.types, self._schema)
 
 
 def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
@@ -248,13 +264,6 @@ def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
             return Range(TypedVariable(variable, (name,), place=conjunct.place))
         case _:
             return conjunct
-
-
-def _conjunct_test(conjunct: Conjunct, schema: Schema) -> Test:
-    if isinstance(conjunct, Range):
-        variable = conjunct.variable
-        return _type_test(compile_term(Variable(variable.name), schema), variable.types, schema)
-    return compile_test(conjunct, schema)
 
 
 def _lookup(step: Step, schema: Schema, bound: frozenset[str]) -> Lookup | Search:
@@ -268,8 +277,8 @@ def _lookup(step: Step, schema: Schema, bound: frozenset[str]) -> Lookup | Searc
             return Lookup(atom, schema, finds)
         case Or(parts):
             return distinct(alternatives([_search(conjuncts(p), schema, bound) for p in parts]), finds)
-        case Exists(variables, body):
+        case Exists(variables) as exists:
             hidden = frozenset(v.name for v in variables)
-            return distinct(_quantified(variables, body, schema, bound - hidden), finds)
+            return distinct(_search(_witnessing(exists, schema), schema, bound - hidden), finds)
         case _:
             raise AssertionError("only these conditions find values")
