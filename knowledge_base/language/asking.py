@@ -13,6 +13,7 @@ from types import MappingProxyType
 from knowledge_base.facts import VALUE_TYPES, Value
 from knowledge_base.language.binding import check_answers, check_bound
 from knowledge_base.language.compiler import compile_query, compile_test
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.expression import (
     Constant,
     Expression,
@@ -67,6 +68,7 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
     Raises:
         UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
         SchemaError: a wrong number of arguments, or `<` and the like met something that is no number.
+        InputError: it is nested too deeply, or something in it cannot be computed.
     """
     schema = world.schema
     condition = _conditions.find(e, schema) or _conditions.keep(e, schema, _compiled(e, schema))
@@ -87,7 +89,7 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
         UnknownNameError, SchemaError: as for `holds`.
     """
     schema = world.schema
-    queries = _queries.find(e, schema) or _queries.keep(e, schema, _Queries(free_variables(e), {}))
+    queries = _queries.find(e, schema) or _queries.keep(e, schema, _unsearched(e))
     bound = queries.free.intersection(bindings)
     found = queries.by_bound.get(bound)
     if found is None:
@@ -116,11 +118,18 @@ def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_B
     return known.get(world, bindings)
 
 
+def _unsearched(e: Expression) -> _Queries:
+    check_depth(e)
+    return _Queries(free_variables(e), {})
+
+
 def _compiled(e: Expression, schema: Schema) -> _Condition:
+    check_depth(e)
     return _Condition(free_variables(e), compile_test(e, schema))
 
 
 def _compiled_term(term: Term, schema: Schema) -> _Term:
+    check_depth(term)
     return _Term(free_variables(term), compile_term(term, schema))
 
 

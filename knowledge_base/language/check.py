@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.binding import check_answers, unbound_error
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.expression import (
     And,
@@ -55,8 +56,9 @@ def check(
     Raises:
         UnknownNameError: an undeclared predicate, function, type, variable or object.
         SchemaError: a wrong number of arguments, or a type that can never fit.
-        InputError: a query's variable that occurs only under `not` or in a comparison.
+        InputError: a query's variable that occurs only under `not` or in a comparison; nesting that is too deep.
     """
+    check_depth(e)
     checker = _Checker(schema, objects, variables or {}, free)
     checker.condition(e)
     if free == "answers":
@@ -73,11 +75,13 @@ def check_effect(
 
     Args and errors are those of `check`; a type as effect is a `SchemaError`, since things keep their type.
     """
+    check_depth(effect)
     _Checker(schema, objects, variables or {}, "error").effect(effect)
 
 
 def check_term(term: Term, schema: Schema, variables: Mapping[str, str | None] | None = None) -> None:
     """Raise an error with its place unless `term` has a value on worlds of `schema`; args and errors as `check`."""
+    check_depth(term)
     _Checker(schema, None, variables or {}, "error").term(term)
 
 

@@ -13,6 +13,7 @@ from knowledge_base.language.application import choices
 from knowledge_base.language.asking import NO_BINDINGS, evaluate_term, holds
 from knowledge_base.language.binding import check_bound
 from knowledge_base.language.compiler import counterexamples, witnesses
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.expression import (
     And,
     Arithmetic,
@@ -84,8 +85,9 @@ def explain(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BIND
 
     Raises:
         UnknownNameError: a free variable is not bound, or a name is not declared.
-        SchemaError: as for `holds`.
+        SchemaError, InputError: as for `holds`.
     """
+    check_depth(e)
     check_bound(e, bindings)
     return _explain(e, world, bindings)
 

@@ -10,6 +10,7 @@ from knowledge_base.facts import Value
 from knowledge_base.language.asking import NO_BINDINGS
 from knowledge_base.language.binding import check_answers
 from knowledge_base.language.compiler import SearchPlan, Stage
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.expression import (
     Atom,
     Exists,
@@ -97,6 +98,7 @@ def plan_query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_B
     Raises:
         InputError: as for `query`.
     """
+    check_depth(e)
     bound = free_variables(e).intersection(bindings)
     check_answers(e, bound, world.schema)
     answers = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
