@@ -78,6 +78,12 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
     return condition.test(world, bindings)
 
 
+def prepare(e: Expression, schema: Schema) -> None:
+    """Raise now what is wrong with the text of `e`, whatever the world will be; errors as for `holds`."""
+    if _conditions.find(e, schema) is None:
+        _conditions.keep(e, schema, _compiled(e, schema))
+
+
 def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> list[dict[str, Value]]:
     """The values of the free variables of `e`, each choice once, that make it true of `world`.
 
