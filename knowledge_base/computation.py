@@ -9,7 +9,8 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Generic, ParamSpec
+from graphlib import CycleError, TopologicalSorter
+from typing import Any, Generic, ParamSpec
 
 from knowledge_base.errors import InputError, Place, SchemaError
 from knowledge_base.exchange.domain_text import parse_declaration
@@ -19,6 +20,9 @@ from knowledge_base.language.printer import to_text
 
 Read = Term | Atom
 """What comes in: a term's value, or whether an atom is true."""
+
+MOST_NESTED = 8
+"""How many may read one through the other; each multiplies what judging the first costs."""
 
 _Inputs = ParamSpec("_Inputs")
 _SOURCE = "@computed"
@@ -121,6 +125,31 @@ def computed(
         return Computed(declared.name, declared.parameters, parsed, function, declared.place)
 
     return declare
+
+
+def in_reading_order(known: Mapping[str, Computed[Any]]) -> list[Computed[Any]]:
+    """All of them, those that others read first.
+
+    Raises:
+        SchemaError: they read each other in a circle, or more than `MOST_NESTED` one through the other.
+    """
+    read = {
+        name: [r.predicate for r in of.reads if isinstance(r, Atom) and r.predicate in known]
+        for name, of in known.items()
+    }
+    try:
+        names = list(TopologicalSorter(read).static_order())
+    except CycleError as error:
+        circle = error.args[1]
+        said = " - ".join(circle)
+        raise SchemaError(f"computed predicates in a circle: {said}", place=known[circle[0]].place) from None
+    nested: dict[str, int] = {}
+    for name in names:
+        nested[name] = 1 + max((nested[other] for other in read[name]), default=0)
+        if nested[name] > MOST_NESTED:
+            message = f"'{name}' reads computed predicates more than {MOST_NESTED} deep, one through the other"
+            raise SchemaError(message, place=known[name].place)
+    return [known[name] for name in names]
 
 
 def _takes(function: Callable[..., object], count: int) -> bool:

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
-from knowledge_base.computation import Computed
+from knowledge_base.computation import Computed, in_reading_order
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.domain_text import DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.language.check import check_reads
-from knowledge_base.language.expression import KEYWORDS, Atom, TypedVariable
+from knowledge_base.language.expression import KEYWORDS, TypedVariable
 from knowledge_base.language.typed_list import TypedName
 
 ROOT_TYPE = "object"
 VALUE_TYPES = ("number", "text", "boolean")
 """Types of arguments that are values and not things; they have no subtypes and cannot be quantified over."""
-MOST_NESTED = 8
-"""How many computed predicates may read one through the other; each multiplies what judging the first costs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,30 +270,8 @@ class Schema:
                 raise SchemaError(f"the name of the computed predicate '{name}' is in use already", place=of.place)
 
     def _check_computed(self) -> None:
-        nested: dict[str, int] = {}
-        for name in self._computed_in_order():
-            of = self.computed[name]
+        for of in in_reading_order(self.computed):
             check_reads(of, self)
-            nested[name] = 1 + max((nested[read] for read in self._computed_of(of)), default=0)
-            if nested[name] > MOST_NESTED:
-                raise SchemaError(
-                    f"'{name}' reads computed predicates more than {MOST_NESTED} deep, one through the other",
-                    place=of.place,
-                )
-
-    def _computed_in_order(self) -> list[str]:
-        """Those that are read come first."""
-        try:
-            return list(TopologicalSorter({n: self._computed_of(of) for n, of in self.computed.items()}).static_order())
-        except CycleError as error:
-            circle = error.args[1]
-            said = " - ".join(circle)
-            raise SchemaError(
-                f"computed predicates read each other in a circle: {said}", place=self.computed[circle[0]].place
-            ) from None
-
-    def _computed_of(self, of: Computed[Any]) -> list[str]:
-        return [r.predicate for r in of.reads if isinstance(r, Atom) and r.predicate in self.computed]
 
     def _is_asked(self, name: str, arity: int) -> bool:
         """Whether that is something true or false, and no function."""
