@@ -15,6 +15,7 @@ from knowledge_base.language.application import choices
 from knowledge_base.language.asking import NO_BINDINGS, evaluate_term, holds, prepare
 from knowledge_base.language.binding import check_bound
 from knowledge_base.language.compiler import counterexamples, witnesses
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.expression import (
     And,
     Arithmetic,
@@ -91,7 +92,7 @@ def explain(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BIND
         UnknownNameError: a free variable is not bound, or a name is not declared.
         SchemaError, InputError: as for `holds`.
     """
-    prepare(e, world.schema)
+    check_depth(e)
     check_bound(e, bindings)
     return _explain(e, world, bindings)
 
@@ -122,6 +123,7 @@ def _judged(e: Expression, world: World, bindings: Bindings) -> _Judged:
     try:
         return _explain(e, world, bindings), None
     except InputError as error:
+        prepare(e, world.schema)  # a mistake in the text is one even if the part does not matter
         text = to_text(substitute(e, bindings))
         return Explanation(text, truth=False, detail=f"cannot be computed: {error}"), error
 
