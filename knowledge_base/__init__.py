@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from knowledge_base.computation import Computed as Computed
+    from knowledge_base.computation import computed as computed
     from knowledge_base.conditions.clock import Clock as Clock
     from knowledge_base.conditions.condition import Condition as Condition
     from knowledge_base.conditions.condition import Firing as Firing
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Fact as Fact
     from knowledge_base.facts import Value as Value
     from knowledge_base.facts import fact as fact
+    from knowledge_base.language.explanation import Explanation as Explanation
+    from knowledge_base.language.query_plan import QueryPlan as QueryPlan
+    from knowledge_base.language.query_plan import QueryStep as QueryStep
     from knowledge_base.overlay import Overlay as Overlay
     from knowledge_base.schema import Schema as Schema
     from knowledge_base.schema import Signature as Signature
@@ -44,11 +49,13 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Binding": "view",
         "Change": "facts",
         "Clock": "conditions.clock",
+        "Computed": "computation",
         "Condition": "conditions.condition",
         "ConditionCancelledError": "errors",
         "ConflictError": "errors",
         "Content": "facts",
         "Delta": "facts",
+        "Explanation": "language.explanation",
         "Fact": "facts",
         "Firing": "conditions.condition",
         "HistoryError": "errors",
@@ -58,6 +65,8 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Overlay": "overlay",
         "ParseError": "errors",
         "Place": "errors",
+        "QueryPlan": "language.query_plan",
+        "QueryStep": "language.query_plan",
         "Schema": "schema",
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",
@@ -70,6 +79,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "View": "view",
         "Watch": "conditions.watch",
         "WorldState": "state",
+        "computed": "computation",
         "fact": "facts",
     },
 )

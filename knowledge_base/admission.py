@@ -31,9 +31,9 @@ def check_delta(delta: Delta, world: World) -> None:
     for name, type_name in delta.nodes.items():
         admission.node(name, type_name)
     for fact in (*delta.added, *delta.replaced):
-        admission.fact(fact, world.schema.predicate(fact.predicate))
+        admission.fact(fact, world.schema.told(fact.predicate))
     for fact in delta.removed:
-        before.fact(fact, world.schema.predicate(fact.predicate))
+        before.fact(fact, world.schema.told(fact.predicate))
     for fluent, content in delta.values.items():
         admission.fact(fluent, world.schema.function(fluent.predicate))
         require_content(content, world.schema.result(fluent.predicate), fluent)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+from knowledge_base.computation import Computed, in_reading_order
 from knowledge_base.content import GEOMETRY, UNSET
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.domain_text import DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.facts import Content
+from knowledge_base.language.check import check_reads
 from knowledge_base.language.expression import KEYWORDS, TypedVariable
 from knowledge_base.language.typed_list import TypedName
 
@@ -58,9 +61,11 @@ class Schema:
         functions: by name; one without a result is numeric.
         places: where types and constants are declared, for messages.
         functional: the predicates whose last argument the others settle, see `with_functional`.
+        computed: predicates that are computed, by name; no world and no store holds them.
 
     Raises:
-        SchemaError: an unknown parent, parameter or constant type, a cycle of types, or one name used twice.
+        SchemaError: an unknown parent, parameter or constant type, a cycle of types, one name used twice, or
+            a computed predicate that cannot read what it declares.
     """
 
     types: Mapping[str, str | None] = field(default_factory=dict)
@@ -69,6 +74,7 @@ class Schema:
     functions: Mapping[str, Signature] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict, repr=False)
     functional: frozenset[str] = frozenset()
+    computed: Mapping[str, Computed[Any]] = field(default_factory=dict)
     _ancestors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False)
     _unset: Mapping[str, Content] = field(init=False, repr=False)
 
@@ -82,12 +88,14 @@ class Schema:
             "predicates": dict(self.predicates),
             "functions": {n: f if f.result else replace(f, result="number") for n, f in self.functions.items()},
             "places": dict(self.places),
+            "computed": {name: of.resolved(self._is_asked) for name, of in self.computed.items()},
         }
         for name, copy in copies.items():
             object.__setattr__(self, name, copy)
         object.__setattr__(self, "_ancestors", {t: tuple(self._lineage(t)) for t in self.types})
         self._check_names()
         self._check_types()
+        self._check_computed()
         self._check_functional()
         object.__setattr__(self, "_unset", {name: UNSET[self.result(name)] for name in self.functions})
 
@@ -159,7 +167,21 @@ class Schema:
             functions=_united(functions, "function"),
             places={**other.places, **self.places},
             functional=self.functional | other.functional,
-        )
+        ).with_computed(*self.computed.values(), *other.computed.values())
+
+    def with_computed(self, *predicates: Computed[Any]) -> Schema:
+        """The schema with these predicates too; one that it has already is fine.
+
+        Raises:
+            UnknownNameError: one reads a function, predicate or type that is not declared.
+            SchemaError: its name is in use, what it reads does not fit its parameters' types, or computed
+                predicates read each other in a circle or more than `MOST_NESTED` one through the other.
+        """
+        known = dict(self.computed)
+        for one in predicates:
+            if known.setdefault(one.name, one).function is not one.function:
+                raise _twice("computed predicate", one.name, known[one.name].place, one.place)
+        return replace(self, computed=known)
 
     def is_a(self, type_name: str, ancestor: str) -> bool:
         """Whether everything of type `type_name` is of type `ancestor`; a type is its own ancestor."""
@@ -187,25 +209,44 @@ class Schema:
         if name not in self.types:
             raise UnknownNameError(f"there is no type '{name}'", place=place, found=name, valid=self.types)
 
+    def require_argument_type(self, name: str, place: Place | None = None) -> None:
+        """Raise `UnknownNameError` unless `name` is a type of things or of values."""
+        if name not in VALUE_TYPES:
+            self.require_type(name, place)
+
     def is_type(self, name: str, arity: int) -> bool:
         """Whether an atom of that name and number of arguments tests a type."""
         return arity == 1 and name in self.types and name not in self.predicates
 
     def predicate(self, name: str, place: Place | None = None) -> Signature:
-        """The predicate of that name.
+        """The predicate of that name, which may be a computed one.
 
         Raises:
             UnknownNameError: there is none; predicates, types and keywords are suggested.
             SchemaError: it is a function.
         """
         found = self.predicates.get(name)
-        if found is None:
+        if found is not None:
+            return found
+        if name not in self.computed:
             if name in self.functions:
                 hint = f"compare what it is worth: (= ({name} ...) VALUE)"
                 raise SchemaError(f"'{name}' is a function; {hint}", place=place)
-            valid = (*self.predicates, *self.types, *KEYWORDS)
+            valid = (*self.predicates, *self.computed, *self.types, *KEYWORDS)
             raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
-        return found
+        of = self.computed[name]
+        return Signature(of.name, of.parameters, place=of.place)
+
+    def told(self, name: str, place: Place | None = None) -> Signature:
+        """The predicate of that name, whose facts can be told.
+
+        Raises:
+            UnknownNameError: there is none.
+            SchemaError: it is computed.
+        """
+        if name in self.computed:
+            raise self.computed[name].refused(place)
+        return self.predicate(name, place)
 
     def function(self, name: str, place: Place | None = None) -> Signature:
         """The function of that name.
@@ -262,6 +303,18 @@ class Schema:
                     place=self.functions[name].place,
                 )
 
+        for name, of in self.computed.items():
+            if name in self.predicates or name in self.functions or name in self.types or name in KEYWORDS:
+                raise SchemaError(f"the name of the computed predicate '{name}' is in use already", place=of.place)
+
+    def _check_computed(self) -> None:
+        for of in in_reading_order(self.computed):
+            check_reads(of, self)
+
+    def _is_asked(self, name: str, arity: int) -> bool:
+        """Whether that is something true or false, and no function."""
+        return name in self.predicates or name in self.computed or (arity == 1 and name in self.types)
+
     def _check_types(self) -> None:
         for name, type_name in self.constants.items():
             self._known(type_name, f"the constant '{name}'", self.places.get(name), values=False)
@@ -271,7 +324,8 @@ class Schema:
                     f"the function '{function.name}' has an unknown type of result",
                     place=function.place, found=function.result, valid=UNSET,
                 )  # fmt: skip
-        for signature in (*self.predicates.values(), *self.functions.values()):
+        computed = map(self.predicate, self.computed)
+        for signature in (*self.predicates.values(), *self.functions.values(), *computed):
             for parameter in signature.parameters:
                 for type_name in parameter.types:
                     owner = f"the parameter '?{parameter.name}' of '{signature.name}'"

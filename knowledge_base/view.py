@@ -10,6 +10,7 @@ from knowledge_base.exchange.problem_writer import problem_to_text
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.evaluation import Explanation, explain, holds, query
 from knowledge_base.language.expression import TRUE, Expression
+from knowledge_base.language.query_plan import QueryPlan, plan_query
 from knowledge_base.overlay import Overlay
 from knowledge_base.questions import Questions
 from knowledge_base.schema import Schema
@@ -82,6 +83,12 @@ class View:
         params = params or {}
         with self._lock:
             return explain(self._questions.condition(text, params, self._state), self._state, params)
+
+    def explain_query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> QueryPlan:
+        """How the query would run on the world as it is: what is looked up, in which order; errors as for `query`."""
+        params = params or {}
+        with self._lock:
+            return plan_query(self._questions.query(text, params, self._state), self._state, params)
 
     def overlay(self) -> Overlay:
         """A world of pending changes on top of this one, which stays as it is."""

@@ -1,7 +1,7 @@
 """Conditions after everything that cannot change was evaluated: what is left for a planner to decide.
 
 Quantifiers are expanded over the known objects; types, equality, numbers and predicates that no action
-changes are evaluated on the world (partial evaluation). What remains is in negation normal form.
+changes, computed ones too, are evaluated on the world (partial evaluation). What remains is in negation normal form.
 """
 
 from __future__ import annotations
@@ -213,10 +213,14 @@ class Grounder:
                 return evaluate_argument(term, self.world, bindings)
 
     def _atom(self, atom: Atom, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:
-        if atom.predicate not in self.world.schema.predicates:  # a type
+        schema = self.world.schema
+        if schema.is_type(atom.predicate, len(atom.args)):
             return holds(atom, self.world, bindings) is wanted
         ground = self.fact(atom, bindings)
         if atom.predicate in self.changing:
             return Literal(ground, wanted)
-        so = self.world.holds(ground.predicate, ground.args) is wanted
+        if atom.predicate in schema.computed:
+            so = holds(atom, self.world, bindings) is wanted
+        else:
+            so = self.world.holds(ground.predicate, ground.args) is wanted
         return Literal(ground, wanted) if self.keep_false and not so else so

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import InputError, Place, UnknownNameError
 from knowledge_base.exchange.domain_text import ActionText, parse_domain
@@ -15,8 +15,9 @@ from knowledge_base.language.expression import And, Atom, Constant, Expression, 
 from knowledge_base.schema import ROOT_TYPE, Schema
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
+    from knowledge_base.computation import Computed
     from knowledge_base.facts import Delta
     from knowledge_base.language.effect import Effect
     from planning.plan import PlanStep
@@ -46,23 +47,29 @@ class PlanningDomain:
     actions: Mapping[str, PlanningAction]
 
     @classmethod
-    def from_pddl(cls, path: str | Path) -> PlanningDomain:
+    def from_pddl(cls, path: str | Path, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
         """The domain of a PDDL file.
+
+        Args:
+            path: the file.
+            computed: predicates that its conditions use and that Python computes.
 
         Raises:
             InputError: the file cannot be read or contains a mistake; it says where.
         """
-        return cls.parse(read_text(Path(path)), str(path))
+        return cls.parse(read_text(Path(path)), str(path), computed)
 
     @classmethod
-    def parse(cls, text: str, source: str | None = None) -> PlanningDomain:
+    def parse(
+        cls, text: str, source: str | None = None, computed: Iterable[Computed[Any]] = ()
+    ) -> PlanningDomain:
         """The domain given as text; `source` names it in messages.
 
         Raises:
             InputError: it contains a mistake; it says where.
         """
         read = parse_domain(text, source)
-        schema = Schema.from_text(read)
+        schema = Schema.from_text(read).with_computed(*computed)
         return cls(read.name, schema, {a.name: _checked(a, schema) for a in read.actions})
 
     def applicable(self, step: PlanStep, world: World) -> bool:

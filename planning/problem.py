@@ -32,9 +32,10 @@ from planning.relevance import (
 from planning.strips import GroundAction, Problem
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from knowledge_base.language.evaluation import World
+    from knowledge_base.schema import Schema
     from planning.domain import PlanningAction, PlanningDomain
 
 # Names with blanks, which no declared name can clash with.
@@ -68,7 +69,8 @@ def pose(domain: PlanningDomain, world: World, goal: Expression) -> Problem:
 
     Raises:
         InputError: the goal has a free variable, or names something that is not declared or not known.
-        UnsupportedGoalError: the goal asks about a number that actions change.
+        UnsupportedGoalError: the goal asks about a number that actions change, or about what is computed from
+            something that they change.
         UnsupportedActionError: so does an action that matters, or it has too many alternatives.
     """
     check_goal(goal, world)
@@ -106,6 +108,7 @@ def grounded(domain: PlanningDomain, world: World, goal: Expression) -> Grounded
     """
     actions = relevant_actions(goal, domain.actions.values())
     _refuse_numbers(goal, actions, domain)
+    _refuse_computed(goal, actions, domain)
     changing = frozenset(p for action in actions for p in changed_predicates(action.effect))
     grounder = Grounder(world, changing)
     wanted = replace(grounder, keep_false=True).residual(goal, {})
@@ -223,6 +226,49 @@ def _refuse_numbers(goal: Expression, actions: Sequence[PlanningAction], domain:
                         f" {to_text(comparison)}",
                         place=comparison.place,
                     )
+
+
+def _refuse_computed(goal: Expression, actions: Sequence[PlanningAction], domain: PlanningDomain) -> None:
+    """What a function makes of things that actions change, no engine can foresee."""
+    leaves = [leaf for a in domain.actions.values() for leaf in effect_leaves(a.effect)]
+    changed = {leaf.call.function if isinstance(leaf, Assign) else leaf.atom.predicate for leaf in leaves}
+    for atom, read in _computed_from(goal, domain.schema, changed):
+        raise UnsupportedGoalError(
+            f"the goal asks for what is computed from something that planning actions change:"
+            f" {to_text(atom)} reads {to_text(read)}",
+            place=atom.place,
+        )
+    for action in actions:
+        for condition in (action.precondition, *effect_conditions(action.effect)):
+            for atom, read in _computed_from(condition, domain.schema, changed):
+                raise UnsupportedActionError(
+                    f"planning action '{action.name}' asks for what is computed from something that planning"
+                    f" actions change: {to_text(atom)} reads {to_text(read)}",
+                    place=atom.place,
+                )
+
+
+def _computed_from(
+    e: Expression | Term, schema: Schema, changed: Collection[str]
+) -> Iterator[tuple[Atom, Expression | Term]]:
+    """The computed atoms in `e`, each with what it reads of the functions and predicates in `changed`."""
+    if isinstance(e, Atom) and e.predicate in schema.computed:
+        for read in schema.computed[e.predicate].inputs(e.args):
+            yield from ((e, part) for part in _parts(read) if _name(part) in changed)
+            yield from ((e, inner) for _, inner in _computed_from(read, schema, changed))
+    for part in parts_of(e):
+        yield from _computed_from(part, schema, changed)
+
+
+def _parts(e: Expression | Term) -> Iterator[Expression | Term]:
+    yield e
+    for part in parts_of(e):
+        yield from _parts(part)
+
+
+def _name(e: Expression | Term) -> str | None:
+    """The function or predicate that it asks about."""
+    return e.function if isinstance(e, Call) else e.predicate if isinstance(e, Atom) else None
 
 
 def _comparisons(e: Expression | Term) -> list[Comparison | Atom]:

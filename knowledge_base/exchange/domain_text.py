@@ -13,7 +13,7 @@ from knowledge_base.exchange.sections import Definition, read_definition, word
 from knowledge_base.language.effect import NO_EFFECT, Effect
 from knowledge_base.language.expression import TRUE, Expression, TypedVariable
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_variables
-from knowledge_base.language.sexpr import Group, Node, Word
+from knowledge_base.language.sexpr import Group, Node, Word, read
 from knowledge_base.language.typed_list import TypedName, parse_names, typed_variables
 
 _SECTIONS = {
@@ -96,6 +96,18 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
         functions=tuple(_functions(definition.nodes(":functions"))),
         actions=_actions(definition),
     )
+
+
+def parse_declaration(text: str, source: str | None = None) -> DeclarationText:
+    """Read one declaration from its text, e.g. `(near ?a ?b - thing)`.
+
+    Raises:
+        ParseError: it has another form.
+    """
+    nodes = read(text, source)
+    if len(nodes) != 1 or isinstance(nodes[0], Word):
+        raise ParseError("one declaration is expected: (NAME ?x - TYPE)", place=Place(source, 1, 1))
+    return _declaration(nodes[0])
 
 
 def _declarations(nodes: Sequence[Node]) -> list[DeclarationText]:

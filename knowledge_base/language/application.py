@@ -10,6 +10,7 @@ from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.language.asking import NO_BINDINGS, evaluate_argument, evaluate_term, holds
 from knowledge_base.language.check import check_arity
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.expression import Arithmetic, Atom, Call, Constant, TypedVariable
 from knowledge_base.language.terms import Bindings, as_number
@@ -27,7 +28,9 @@ def apply_effect(effect: Effect, world: World, bindings: Mapping[str, Value] = N
     Raises:
         UnknownNameError: a variable is not bound, or a name is not declared.
         SchemaError: contradicting assignments, a wrong number of arguments, arithmetic on no number.
+        InputError: it is nested too deeply.
     """
+    check_depth(effect)
     application = _Application(world)
     application.apply(effect, bindings)
     added = tuple(application.added)
@@ -73,7 +76,7 @@ class _Application:
                 self.assign(effect, bindings)
 
     def fact(self, atom: Atom, bindings: Bindings) -> Fact:
-        signature = self.world.schema.predicate(atom.predicate, atom.place)
+        signature = self.world.schema.told(atom.predicate, atom.place)
         check_arity(signature, len(atom.args), atom.place)
         return self.instance(atom.predicate, atom, bindings)
 

@@ -14,6 +14,7 @@ from knowledge_base.errors import SchemaError
 from knowledge_base.facts import VALUE_TYPES, Content, Value
 from knowledge_base.language.binding import check_answers, check_bound
 from knowledge_base.language.compiler import compile_query, compile_test
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.expression import (
     Constant,
     Expression,
@@ -68,6 +69,7 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
     Raises:
         UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
         SchemaError: a wrong number of arguments, or `<` and the like met something that is no number.
+        InputError: it is nested too deeply, or something in it cannot be computed.
     """
     schema = world.schema
     condition = _conditions.find(e, schema) or _conditions.keep(e, schema, _compiled(e, schema))
@@ -75,6 +77,12 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
         if type(bindings.get(name)) not in VALUE_TYPES:
             check_bound(e, bindings)
     return condition.test(world, bindings)
+
+
+def prepare(e: Expression, schema: Schema) -> None:
+    """Raise now what is wrong with the text of `e`, whatever the world will be; errors as for `holds`."""
+    if _conditions.find(e, schema) is None:
+        _conditions.keep(e, schema, _compiled(e, schema))
 
 
 def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> list[dict[str, Value]]:
@@ -88,7 +96,7 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
         UnknownNameError, SchemaError: as for `holds`.
     """
     schema = world.schema
-    queries = _queries.find(e, schema) or _queries.keep(e, schema, _Queries(free_variables(e), {}))
+    queries = _queries.find(e, schema) or _queries.keep(e, schema, _unsearched(e))
     bound = queries.free.intersection(bindings)
     found = queries.by_bound.get(bound)
     if found is None:
@@ -125,15 +133,22 @@ def evaluate_argument(term: Term, world: World, bindings: Mapping[str, Value] = 
     return found
 
 
+def _unsearched(e: Expression) -> _Queries:
+    check_depth(e)
+    return _Queries(free_variables(e), {})
+
+
 def _compiled(e: Expression, schema: Schema) -> _Condition:
+    check_depth(e)
     return _Condition(free_variables(e), compile_test(e, schema))
 
 
 def _compiled_term(term: Term, schema: Schema) -> _Term:
+    check_depth(term)
     return _Term(free_variables(term), compile_term(term, schema))
 
 
 def _compiled_query(e: Expression, schema: Schema, bound: frozenset[str]) -> _Query:
-    check_answers(e, bound)
+    check_answers(e, bound, schema)
     answers = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
     return _Query(answers, compile_query(e, schema, bound))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.binding import check_answers, unbound_error
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.expression import (
     And,
@@ -28,7 +29,10 @@ from knowledge_base.language.expression import (
     TypedVariable,
     Variable,
 )
-from knowledge_base.schema import VALUE_TYPES, Schema, Signature
+
+if TYPE_CHECKING:  # a schema checks what its computed predicates read
+    from knowledge_base.computation import Computed
+    from knowledge_base.schema import Schema, Signature
 
 Free = Literal["error", "answers"]
 
@@ -53,12 +57,13 @@ def check(
     Raises:
         UnknownNameError: an undeclared predicate, function, type, variable or object.
         SchemaError: a wrong number of arguments, or a type that can never fit.
-        InputError: a query's variable that occurs only under `not` or in a comparison.
+        InputError: a query's variable that occurs only under `not` or in a comparison; nesting that is too deep.
     """
+    check_depth(e)
     checker = _Checker(schema, objects, variables or {}, free)
     checker.condition(e)
     if free == "answers":
-        check_answers(e, frozenset(variables or ()))
+        check_answers(e, frozenset(variables or ()), schema)
 
 
 def check_effect(
@@ -71,11 +76,13 @@ def check_effect(
 
     Args and errors are those of `check`; a type as effect is a `SchemaError`, since things keep their type.
     """
+    check_depth(effect)
     _Checker(schema, objects, variables or {}, "error").effect(effect)
 
 
 def check_term(term: Term, schema: Schema, variables: Mapping[str, str | None] | None = None) -> None:
     """Raise an error with its place unless `term` has a value on worlds of `schema`; args and errors as `check`."""
+    check_depth(term)
     _Checker(schema, None, variables or {}, "error").term(term)
 
 
@@ -89,9 +96,18 @@ def check_parameters(parameters: tuple[TypedVariable, ...], schema: Schema) -> d
     """
     for parameter in parameters:
         for type_name in parameter.types:
-            if type_name not in VALUE_TYPES:
-                schema.require_type(type_name, parameter.place)
+            schema.require_argument_type(type_name, parameter.place)
     return {p.name: _single(p.types) for p in parameters}
+
+
+def check_reads(computed: Computed[Any], schema: Schema) -> None:
+    """Raise an error with its place unless the computed predicate can read what it declares; errors as `check`."""
+    checker = _Checker(schema, None, check_parameters(computed.parameters, schema), "error")
+    for read in computed.reads:
+        if isinstance(read, Atom):
+            checker.condition(read)
+        else:
+            checker.term(read)
 
 
 def check_arity(signature: Signature, count: int, place: Place | None = None) -> None:
@@ -169,7 +185,7 @@ class _Checker:
             case Add(atom) | Delete(atom):
                 if self.schema.is_type(atom.predicate, len(atom.args)):
                     raise SchemaError(f"'{atom.predicate}' is a type; things keep theirs", place=atom.place)
-                self.atom(atom)
+                self.arguments(self.schema.told(atom.predicate, atom.place), atom)
             case AllOf(parts):
                 for part in parts:
                     self.effect(part)

@@ -12,8 +12,8 @@ from knowledge_base.schema import Schema
 class World(Protocol):
     """A state of the world: the store, pending changes on top of it, a planner's state.
 
-    Predicates are the declared ones; types as predicates, quantifiers and comparisons are the language's
-    affair and are built from these five answers. A world that also has `estimate(predicate, pattern) -> int`,
+    Predicates are the told ones; types as predicates, computed predicates, quantifiers and comparisons are the
+    language's affair and are built from these answers. A world that also has `estimate(predicate, pattern) -> int`,
     at most how many facts match, lets conjunctions begin with the rarest. One that has `reference(function, args) ->
     str | None`, where what the function is worth comes from, refuses to have it set.
     """
