@@ -25,7 +25,9 @@ class WorldGraph:
     """Keeps the graph in step with committed changes."""
 
     def __init__(self, state: WorldState) -> None:
-        self._schema = state.schema
+        declared = {**state.schema.predicates, **state.schema.functions}
+        self._arcs = frozenset(name for name, signature in declared.items() if _is_arc(signature))
+        self._things = {name: _thing_positions(signature) for name, signature in declared.items()}
         self._graph: Graph = nx.MultiDiGraph()
         self.view: Graph = self._graph.copy(as_view=True)
         """The graph, live and read-only."""
@@ -40,20 +42,20 @@ class WorldGraph:
         for name, type_name in effective.nodes.items():
             self._graph.add_node(name, type=type_name)
         for fact in effective.added:
-            self._put(fact, self._schema.predicates[fact.predicate], {})
+            self._put(fact, {})
         for fluent, number in effective.values.items():
-            self._put(fluent, self._schema.functions[fluent.predicate], {"value": number})
+            self._put(fluent, {"value": number})
 
-    def _put(self, fact: Fact, signature: Signature, content: Mapping[str, float]) -> None:
-        if _is_arc(signature):
+    def _put(self, fact: Fact, content: Mapping[str, float]) -> None:
+        if fact.predicate in self._arcs:
             self._graph.add_edge(fact.args[0], fact.args[-1], key=fact.predicate, **content)
             return
         self._graph.add_node(fact, relation=fact.predicate, **content)
-        for position in _thing_positions(signature):
+        for position in self._things[fact.predicate]:
             self._graph.add_edge(fact, fact.args[position], key=position)
 
     def _remove(self, fact: Fact) -> None:
-        if _is_arc(self._schema.predicates[fact.predicate]):
+        if fact.predicate in self._arcs:
             self._graph.remove_edge(fact.args[0], fact.args[-1], key=fact.predicate)
         else:
             self._graph.remove_node(fact)
