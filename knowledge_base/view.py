@@ -46,7 +46,8 @@ class View:
     def graph(self) -> Graph:
         """The world as a graph, read-only; see `world_graph` for its form.
 
-        It is made when it is first asked for. That of a `KnowledgeBase` follows every commit then; other threads must not commit while it is being walked.
+        It is made when it is first asked for. That of a `KnowledgeBase` follows every commit from then on; other
+        threads must not commit while it is being walked.
         """
         with self._lock:
             if self._graph is None:
