@@ -7,7 +7,7 @@ from threading import RLock
 
 from knowledge_base.exchange.json import to_json
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.evaluation import Explanation, explain, holds, query
+from knowledge_base.language.evaluation import Explanation, explain
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
 from knowledge_base.questions import Questions
@@ -69,13 +69,13 @@ class View:
         """
         params = params or {}
         with self._lock:
-            return query(self._questions.query(text, params, self._state), self._state, params)
+            return self._questions.answers(text, params, self._state)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
         params = params or {}
         with self._lock:
-            return holds(self._questions.condition(text, params, self._state), self._state, params)
+            return self._questions.ask(text, params, self._state)
 
     def explain(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> Explanation:
         """Why the text is true or false; errors as for `ask`."""

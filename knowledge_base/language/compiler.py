@@ -11,8 +11,8 @@ kept (`_Plan`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
 
 from knowledge_base.language.check import check_arity
 from knowledge_base.language.expression import (
@@ -30,7 +30,7 @@ from knowledge_base.language.expression import (
     free_variables,
 )
 from knowledge_base.language.joins import Conjunct, Range, Step, candidates, conjuncts, opposite, order
-from knowledge_base.language.lookups import Lookup, Search, alternatives, distinct, smallest, things
+from knowledge_base.language.lookups import Answer, Lookup, Search, alternatives, distinct, smallest, things
 from knowledge_base.language.terms import (
     Bindings,
     Getter,
@@ -43,6 +43,7 @@ from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
 _MOST_STAGES = 1000
+Answers = Callable[[World, Bindings], list[Answer]]
 
 
 def compile_test(e: Expression, schema: Schema) -> Test:
@@ -80,6 +81,27 @@ def compile_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Searc
         InputError: such a variable is only tested; and what `compile_test` raises.
     """
     return _search(conjuncts(e), schema, bound)
+
+
+def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names: tuple[str, ...]) -> Answers:
+    """All that `compile_query` would find, as dictionaries of the variables `names`, which are those it finds.
+
+    No two are the same: facts and things are found once, and `distinct` sees to the rest.
+    """
+    plan = _Plan([_as_range(c, schema) for c in conjuncts(e)], schema, bound)
+
+    def answers(world: World, bindings: Bindings) -> list[Answer]:
+        found: list[Answer] = []
+        for candidate, last in _ends(plan, world, bindings):
+            if last is None:
+                found.append({name: candidate[name] for name in names})
+            elif isinstance(last, Lookup):
+                found += last.all(world, candidate, {name: candidate.get(name, "") for name in names})
+            else:
+                found += [{name: each[name] for name in names} for each in last(world, candidate)]
+        return found
+
+    return answers
 
 
 def witnesses(e: Exists, schema: Schema) -> Search:
@@ -151,31 +173,50 @@ def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str
     plan = _Plan([_as_range(c, schema) for c in conditions], schema, bound)
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
-        """Backtracking with a stack of its own, so that long conjunctions do not recurse."""
-        stack: list[tuple[_Stage, Iterator[Bindings]]] = [(plan.first, iter((bindings,)))]
-        while stack:
-            stage, found = stack[-1]
-            candidate = next(found, None)
-            if candidate is None:
-                stack.pop()
-            elif stage.test(world, candidate):
-                if not stage.choices:
-                    yield candidate
-                    continue
-                i, lookup = smallest(stage.choices, world, candidate)
-                stack.append((plan.after(stage, i), lookup(world, candidate)))
+        for candidate, last in _ends(plan, world, bindings):
+            if last is None:
+                yield candidate
+            else:
+                yield from last(world, candidate)
 
     return search
+
+
+def _ends(plan: _Plan, world: World, bindings: Bindings) -> Iterator[tuple[Bindings, Lookup | Search | None]]:
+    """All candidates for which only one look-up is left, whatever it finds being right, or nothing at all.
+
+    Backtracking with a stack of its own, so that long conjunctions do not recurse.
+    """
+    stack: list[tuple[_Stage, Iterator[Bindings]]] = [(plan.first, iter((bindings,)))]
+    while stack:
+        stage, found = stack[-1]
+        for candidate in found:
+            if stage.test is not None and not stage.test(world, candidate):
+                continue
+            if not stage.choices:
+                yield candidate, None
+                continue
+            i, lookup = stage.choices[0] if len(stage.choices) == 1 else smallest(stage.choices, world, candidate)
+            after = plan.after(stage, i)
+            if after.test is None and not after.choices:
+                yield candidate, lookup
+                continue
+            stack.append((after, lookup(world, candidate)))
+            break
+        else:
+            stack.pop()
 
 
 @dataclass(frozen=True, slots=True)
 class _Stage:
     """What to do when these conditions (by number) are left: the tests, then one of the look-ups."""
 
-    test: Test
+    test: Test | None
     choices: tuple[tuple[int, Lookup | Search], ...]
     left: tuple[int, ...]
     bound: frozenset[str]
+    after: dict[int, _Stage] = field(default_factory=dict)
+    """The stages that follow, as far as they are prepared."""
 
 
 class _Plan:
@@ -191,12 +232,16 @@ class _Plan:
 
     def after(self, stage: _Stage, chosen: int) -> _Stage:
         """The stage that follows when the condition `chosen` was looked up."""
-        left = tuple([i for i in stage.left if i != chosen])
-        found = self._stages.get(left)
+        found = stage.after.get(chosen)
         if found is None:
-            if len(self._stages) >= _MOST_STAGES:
-                self._stages.clear()
-            found = self._stages[left] = self._stage(left, stage.bound | self._steps[chosen].free)
+            left = tuple([i for i in stage.left if i != chosen])
+            found = self._stages.get(left)
+            if found is None:
+                if len(self._stages) >= _MOST_STAGES:
+                    self._stages.clear()
+                    self.first.after.clear()
+                found = self._stages[left] = self._stage(left, stage.bound | self._steps[chosen].free)
+            stage.after[chosen] = found
         return found
 
     def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> _Stage:
@@ -204,7 +249,7 @@ class _Plan:
         tests = [_conjunct_test(s.conjunct, self._schema) for s in steps.values() if s.free <= bound]
         open_steps = {i: s for i, s in steps.items() if not s.free <= bound}
         choices = [(i, _lookup(s, self._schema, bound)) for i, s in candidates(open_steps, bound)]
-        return _Stage(_all(tests), tuple(choices), tuple(open_steps), bound)
+        return _Stage(_all(tests) if tests else None, tuple(choices), tuple(open_steps), bound)
 
 
 def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:

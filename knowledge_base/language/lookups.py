@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import Atom, TypedVariable, Variable, free_variables
@@ -11,6 +11,7 @@ from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
 Search = Callable[[World, Bindings], Iterator[Bindings]]
+Answer = dict[str, Value]
 
 
 class Lookup:
@@ -35,17 +36,45 @@ class Lookup:
         self._found = tuple(first.items())
 
     def __call__(self, world: World, bindings: Bindings) -> Iterator[Bindings]:
-        """`bindings` with the values of the open variables, for every fact that matches."""
-        for args in world.match(self._predicate, self._pattern(world, bindings)):
-            if all(args[i] == args[j] for i, j in self._repeated):
-                found = {**bindings, **{name: args[i] for name, i in self._found}}
-                if not self._computed or all(args[i] == get(world, found) for i, get in self._computed):
-                    yield found
+        """`bindings` with the values of the open variables, for every fact that matches; looked up one by one."""
+        matches = self._matches(world, bindings)
+        if len(self._found) == 1:
+            ((name, i),) = self._found
+            return ({**bindings, name: args[i]} for args in matches)
+        return (self._extended(bindings, args) for args in matches)
+
+    def all(self, world: World, bindings: Bindings, answer: Answer) -> list[Answer]:
+        """`answer`, which has places for them, with the values of the open variables, for every fact that matches."""
+        matches = self._matches(world, bindings)
+        if len(self._found) == 1:
+            ((name, i),) = self._found
+            if len(answer) == 1:
+                return [{name: args[i]} for args in matches]
+            return [{**answer, name: args[i]} for args in matches]
+        return [self._extended(answer, args) for args in matches]
 
     def size(self, world: World, bindings: Bindings) -> int:
         """At most how many facts match; 0 if the world cannot say so cheaply."""
         estimate = getattr(world, "estimate", None)
         return estimate(self._predicate, self._pattern(world, bindings)) if estimate else 0
+
+    def _matches(self, world: World, bindings: Bindings) -> Iterable[tuple[Value, ...]]:
+        matches = world.match(self._predicate, self._pattern(world, bindings))
+        if not (self._repeated or self._computed):
+            return matches
+        return (args for args in matches if self._agrees(args, world, bindings))
+
+    def _agrees(self, args: tuple[Value, ...], world: World, bindings: Bindings) -> bool:
+        if any(args[i] != args[j] for i, j in self._repeated):
+            return False
+        found = self._extended(bindings, args)
+        return all(args[i] == get(world, found) for i, get in self._computed)
+
+    def _extended(self, bindings: Bindings, args: tuple[Value, ...]) -> Answer:
+        found = dict(bindings)
+        for name, i in self._found:
+            found[name] = args[i]
+        return found
 
     def _pattern(self, world: World, bindings: Bindings) -> tuple[Value | None, ...]:
         return tuple([get and get(world, bindings) for get in self._getters])
