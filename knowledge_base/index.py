@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from itertools import chain
 from typing import TypeVar
 
@@ -44,31 +44,30 @@ class FactIndex:
         Looks through the shortest of the lists of facts that have one of the bound arguments. It looks when
         it is iterated, so the set must not change until then.
         """
-        if None not in pattern:
-            return (pattern,) if self.holds(predicate, pattern) else ()  # type: ignore[arg-type,return-value]
-        bound = 0
-        shortest: Mapping[Args, object] | None = None
-        for position, value in enumerate(pattern):
-            if value is not None:
-                bound += 1
-                listed = self._by_argument.get((predicate, position, value))
-                if listed is None:
-                    return ()
-                if shortest is None or len(listed) < len(shortest):
-                    shortest = listed
-        if shortest is None:
-            return self._facts.get(predicate, ())
-        return shortest if bound == 1 else _agreeing(shortest, pattern)
+        listed = self._listed(predicate, pattern)
+        return listed if pattern.count(None) >= len(pattern) - 1 else _agreeing(listed, pattern)
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
         """At most how many facts agree with `pattern`, without looking through them."""
+        return len(self._listed(predicate, pattern))
+
+    def _listed(self, predicate: str, pattern: tuple[Value | None, ...]) -> Collection[Args]:
+        """The shortest list that has all facts which agree with `pattern`."""
+        if len(pattern) == 2:  # arcs from or to a thing are asked for so often that it pays
+            start, end = pattern
+            if start is None and end is not None:
+                return self._by_argument.get((predicate, 1, end), ())
+            if end is None and start is not None:
+                return self._by_argument.get((predicate, 0, start), ())
         if None not in pattern:
-            return int(self.holds(predicate, pattern))  # type: ignore[arg-type]
-        least = len(self._facts.get(predicate, ()))
+            return (pattern,) if self.holds(predicate, pattern) else ()  # type: ignore[arg-type,return-value]
+        shortest: Collection[Args] = self._facts.get(predicate, ())
         for position, value in enumerate(pattern):
             if value is not None:
-                least = min(least, len(self._by_argument.get((predicate, position, value), ())))
-        return least
+                listed = self._by_argument.get((predicate, position, value), ())
+                if len(listed) < len(shortest):
+                    shortest = listed
+        return shortest
 
     def add(self, fact: Fact) -> None:
         """Put the fact at the end, unless it is there."""

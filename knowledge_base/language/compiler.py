@@ -89,6 +89,10 @@ def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names:
     No two are the same: facts and things are found once, and `distinct` sees to the rest.
     """
     plan = _Plan([_as_range(c, schema) for c in conjuncts(e)], schema, bound)
+    only = plan.first.last
+    template: Answer = dict.fromkeys(names, "")
+    if isinstance(only, Lookup) and plan.first.test is None:
+        return lambda world, bindings: only.all(world, bindings, template)
 
     def answers(world: World, bindings: Bindings) -> list[Answer]:
         found: list[Answer] = []
@@ -96,7 +100,11 @@ def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names:
             if last is None:
                 found.append({name: candidate[name] for name in names})
             elif isinstance(last, Lookup):
-                found += last.all(world, candidate, {name: candidate.get(name, "") for name in names})
+                answer = template.copy()
+                for name in names:
+                    if name in candidate:
+                        answer[name] = candidate[name]
+                found += last.all(world, candidate, answer)
             else:
                 found += [{name: each[name] for name in names} for each in last(world, candidate)]
         return found
@@ -193,15 +201,11 @@ def _ends(plan: _Plan, world: World, bindings: Bindings) -> Iterator[tuple[Bindi
         for candidate in found:
             if stage.test is not None and not stage.test(world, candidate):
                 continue
-            if not stage.choices:
-                yield candidate, None
+            if stage.last is not None or not stage.choices:
+                yield candidate, stage.last
                 continue
-            i, lookup = stage.choices[0] if len(stage.choices) == 1 else smallest(stage.choices, world, candidate)
-            after = plan.after(stage, i)
-            if after.test is None and not after.choices:
-                yield candidate, lookup
-                continue
-            stack.append((after, lookup(world, candidate)))
+            i, lookup = smallest(stage.choices, world, candidate)
+            stack.append((plan.after(stage, i), lookup(world, candidate)))
             break
         else:
             stack.pop()
@@ -215,6 +219,8 @@ class _Stage:
     choices: tuple[tuple[int, Lookup | Search], ...]
     left: tuple[int, ...]
     bound: frozenset[str]
+    last: Lookup | Search | None
+    """The look-up, if it is the last: nothing is left to be tested of what it finds."""
     after: dict[int, _Stage] = field(default_factory=dict)
     """The stages that follow, as far as they are prepared."""
 
@@ -249,7 +255,8 @@ class _Plan:
         tests = [_conjunct_test(s.conjunct, self._schema) for s in steps.values() if s.free <= bound]
         open_steps = {i: s for i, s in steps.items() if not s.free <= bound}
         choices = [(i, _lookup(s, self._schema, bound)) for i, s in candidates(open_steps, bound)]
-        return _Stage(_all(tests) if tests else None, tuple(choices), tuple(open_steps), bound)
+        last = choices[0][1] if len(open_steps) == 1 else None
+        return _Stage(_all(tests) if tests else None, tuple(choices), tuple(open_steps), bound, last)
 
 
 def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:

@@ -21,33 +21,35 @@ class Lookup:
         first: dict[str, int] = {}
         self._repeated: list[tuple[int, int]] = []
         self._computed: list[tuple[int, Getter]] = []
-        self._getters: list[Getter | None] = []
+        getters: list[Getter | None] = []
         self._predicate = atom.predicate
         for position, arg in enumerate(atom.args):
             if isinstance(arg, Variable) and arg.name in finds:
-                self._getters.append(None)
+                getters.append(None)
                 if first.setdefault(arg.name, position) != position:
                     self._repeated.append((first[arg.name], position))
             elif free_variables(arg).isdisjoint(finds):
-                self._getters.append(compile_term(arg, schema))
+                getters.append(compile_term(arg, schema))
             else:  # computed from what the other arguments find
-                self._getters.append(None)
+                getters.append(None)
                 self._computed.append((position, compile_term(arg, schema)))
         self._found = tuple(first.items())
+        self._single = self._found[0] if len(first) == 1 else None
+        self._pattern = _pattern(getters)
 
     def __call__(self, world: World, bindings: Bindings) -> Iterator[Bindings]:
         """`bindings` with the values of the open variables, for every fact that matches; looked up one by one."""
         matches = self._matches(world, bindings)
-        if len(self._found) == 1:
-            ((name, i),) = self._found
+        if self._single is not None:
+            name, i = self._single
             return ({**bindings, name: args[i]} for args in matches)
         return (self._extended(bindings, args) for args in matches)
 
     def all(self, world: World, bindings: Bindings, answer: Answer) -> list[Answer]:
         """`answer`, which has places for them, with the values of the open variables, for every fact that matches."""
         matches = self._matches(world, bindings)
-        if len(self._found) == 1:
-            ((name, i),) = self._found
+        if self._single is not None:
+            name, i = self._single
             if len(answer) == 1:
                 return [{name: args[i]} for args in matches]
             return [{**answer, name: args[i]} for args in matches]
@@ -76,8 +78,18 @@ class Lookup:
             found[name] = args[i]
         return found
 
-    def _pattern(self, world: World, bindings: Bindings) -> tuple[Value | None, ...]:
-        return tuple([get and get(world, bindings) for get in self._getters])
+
+def _pattern(getters: Sequence[Getter | None]) -> Callable[[World, Bindings], tuple[Value | None, ...]]:
+    """What to look for; most look-ups go from one end of an arc to the other."""
+    match getters:
+        case [None, None]:
+            return lambda _world, _bindings: (None, None)
+        case [None, end] if end:
+            return lambda world, bindings: (None, end(world, bindings))
+        case [start, None] if start:
+            return lambda world, bindings: (start(world, bindings), None)
+        case _:
+            return lambda world, bindings: tuple([get and get(world, bindings) for get in getters])
 
 
 def smallest(
@@ -86,7 +98,13 @@ def smallest(
     """The choice with the fewest matches; the first of them, or the only one without counting."""
     if len(choices) == 1:
         return choices[0]
-    return min(choices, key=lambda c: c[1].size(world, bindings) if isinstance(c[1], Lookup) else 0)
+    found, least = choices[0], -1
+    for choice in choices:
+        lookup = choice[1]
+        size = lookup.size(world, bindings) if isinstance(lookup, Lookup) else 0
+        if least < 0 or size < least:
+            found, least = choice, size
+    return found
 
 
 def things(variable: TypedVariable) -> Search:
