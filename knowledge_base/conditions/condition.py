@@ -18,6 +18,7 @@ from knowledge_base.facts import Value
 
 if TYPE_CHECKING:
     from knowledge_base.conditions.installed import Installed
+    from knowledge_base.conditions.shape import Args
 
 Fire = Literal["edge", "each"]
 FIRE: tuple[Fire, ...] = ("edge", "each")
@@ -57,7 +58,7 @@ class Terms:
 @dataclass(slots=True)
 class _Reading:
     truth: bool
-    witness: dict[str, Value] | None
+    witness: Args | None
     version: int
 
 
@@ -74,7 +75,9 @@ class Condition:
     As a context manager it is cancelled at the end of the block. All of it may be used from any thread.
     """
 
-    def __init__(self, owner: Installed, text: str, rows: tuple[Row, Row], terms: Terms, number: int) -> None:
+    def __init__(
+        self, owner: Installed, text: str, rows: tuple[Row, Row], names: tuple[str, ...], terms: Terms, number: int
+    ) -> None:
         rise, _ = self.rows = rows
         self.text = text
         """The condition with its parameters filled in, for messages."""
@@ -82,7 +85,8 @@ class Condition:
         """The how-manieth it was to be installed: the order of firing within a version."""
         self._owner = owner
         self._terms = terms
-        self._now = _Reading(rise.truth, rise.witness(), owner.version)
+        self._names = names
+        self._now = _Reading(rise.truth, rise.witness, owner.version)
         self._told_true = rise.truth and terms.hold is None
         self._listening: dict[int, _Listening] = {}
         self._keys = count()
@@ -104,7 +108,7 @@ class Condition:
     def witness(self) -> dict[str, Value] | None:
         """A choice for its free variables that makes it true (`{}` if it has none); `None` when it is false."""
         found = self._now.witness
-        return None if found is None else dict(found)
+        return None if found is None else dict(zip(self._names, found, strict=True))
 
     @property
     def version(self) -> int:
@@ -196,7 +200,7 @@ class Condition:
         truth = rise.truth or (was and stay.truth)
         if not (truth or was):
             return
-        self._now = _Reading(truth, (rise.witness() or stay.witness()) if truth else None, version)
+        self._now = _Reading(truth, (stay if rise.witness is None else rise).witness if truth else None, version)
         if not truth:
             self._fall()
         elif not was:

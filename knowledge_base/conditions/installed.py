@@ -19,7 +19,7 @@ from knowledge_base.conditions.hysteresis import relaxed
 from knowledge_base.conditions.readers import Readers
 from knowledge_base.conditions.relation import Relation
 from knowledge_base.conditions.rows import Row
-from knowledge_base.conditions.shape import Args, Shape, lifted
+from knowledge_base.conditions.shape import Args, Lifted, Shape, lifted
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Value
 from knowledge_base.language.expression import Expression, substitute
@@ -71,10 +71,11 @@ class Installed:
             InputError: there is nothing that the hysteresis could be about.
         """
         eased = e if hysteresis is None else relaxed(e, hysteresis)
-        rise = self._row(e, params)
-        stay = rise if eased is e else self._row(eased, params)
+        found = lifted(e, params)
+        rise = self._row(found)
+        stay = rise if eased is e else self._row(lifted(eased, params))
         self._numbers += 1
-        condition = Condition(self, to_text(substitute(e, params)), (rise, stay), terms, self._numbers)
+        condition = Condition(self, to_text(substitute(e, params)), (rise, stay), found.names, terms, self._numbers)
         for row in (rise, stay):
             row.conditions[condition] = None
         if terms.fire == "each":
@@ -151,12 +152,12 @@ class Installed:
         for condition in sorted(touched, key=lambda c: c.number):
             condition.judge(self.version, self._changed)
 
-    def _row(self, e: Expression, params: Mapping[str, Value]) -> Row:
-        shape, key = lifted(e, params)
-        relation = self._relations.get(shape)
+    def _row(self, found: Lifted) -> Row:
+        relation = self._relations.get(found.shape)
         if relation is None:
-            relation = self._relations[shape] = Relation(shape, self._world, self._readers_of, self._changed)
-        return relation.row(key)
+            relation = Relation(found.shape, self._world, self._readers_of, self._changed)
+            self._relations[found.shape] = relation
+        return relation.row(found.key)
 
     def _readers_of(self, occurrence: Occurrence) -> Readers:
         return self._readers.setdefault((occurrence.kind, occurrence.name), Readers())

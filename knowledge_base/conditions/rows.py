@@ -54,10 +54,10 @@ class Row:
         """Whether another witness would make a difference."""
         return self.wants_all or not self.witnesses
 
-    def witness(self) -> dict[str, Value] | None:
+    @property
+    def witness(self) -> Args | None:
         """A choice for the shape's answers that makes it true."""
-        first = next(iter(self.witnesses), None)
-        return None if first is None else dict(zip(self.relation.shape.answers, first, strict=True))
+        return next(iter(self.witnesses), None)
 
 
 class RowsWorld:

@@ -12,7 +12,7 @@ kept (`_Plan`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from knowledge_base.language.check import check_arity
 from knowledge_base.language.expression import (
@@ -89,13 +89,15 @@ def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names:
     No two are the same: facts and things are found once, and `distinct` sees to the rest.
     """
     plan = _Plan([_as_range(c, schema) for c in conjuncts(e)], schema, bound)
-    only = plan.first.last
+    first_test, only = plan.first.test, plan.first.last
     template: Answer = dict.fromkeys(names, "")
-    if isinstance(only, Lookup) and plan.first.test is None:
+    if isinstance(only, Lookup) and first_test is None:
         return lambda world, bindings: only.all(world, bindings, template)
 
     def answers(world: World, bindings: Bindings) -> list[Answer]:
         found: list[Answer] = []
+        if first_test is not None and not first_test(world, bindings):
+            return found
         for candidate, last in _ends(plan, world, bindings):
             if last is None:
                 found.append({name: candidate[name] for name in names})
@@ -180,22 +182,30 @@ def _found(search: Search) -> Test:
 def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Search:
     plan = _Plan([_as_range(c, schema) for c in conditions], schema, bound)
 
+    first_test = plan.first.test
+
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
-        for candidate, last in _ends(plan, world, bindings):
-            if last is None:
-                yield candidate
-            else:
-                yield from last(world, candidate)
+        if first_test is not None and not first_test(world, bindings):  # most searches of conditions end here
+            return iter(())
+        return _candidates(plan, world, bindings)
 
     return search
+
+
+def _candidates(plan: _Plan, world: World, bindings: Bindings) -> Iterator[Bindings]:
+    for candidate, last in _ends(plan, world, bindings):
+        if last is None:
+            yield candidate
+        else:
+            yield from last(world, candidate)
 
 
 def _ends(plan: _Plan, world: World, bindings: Bindings) -> Iterator[tuple[Bindings, Lookup | Search | None]]:
     """All candidates for which only one look-up is left, whatever it finds being right, or nothing at all.
 
-    Backtracking with a stack of its own, so that long conjunctions do not recurse.
+    The plan's first test was passed. Backtracking with a stack of its own, so that long conjunctions do not recurse.
     """
-    stack: list[tuple[_Stage, Iterator[Bindings]]] = [(plan.first, iter((bindings,)))]
+    stack: list[tuple[_Stage, Iterator[Bindings]]] = [(plan.tested, iter((bindings,)))]
     while stack:
         stage, found = stack[-1]
         for candidate in found:
@@ -235,6 +245,7 @@ class _Plan:
         self.first = stage = self._stage(tuple(range(len(self._steps))), bound)
         while stage.choices:  # one way through, so that every mistake in the text shows now
             stage = self.after(stage, stage.choices[0][0])
+        self.tested = replace(self.first, test=None)
 
     def after(self, stage: _Stage, chosen: int) -> _Stage:
         """The stage that follows when the condition `chosen` was looked up."""
