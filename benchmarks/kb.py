@@ -13,12 +13,12 @@ import page
 from knowledge import contenders
 from knowledge.contender import Contender
 from knowledge.questions import question_rows
-from knowledge.updates import FSYNCED, JOURNALED, Sizes, condition_rows, everyday_rows, recovery_row, size_rows
+from knowledge.updates import FSYNCED, JOURNALED, Sizes, condition_rows, everyday_rows, recovery_rows, size_rows
 from rows import ENGINE, Row, table
 from timing import Pace
 
 FULL, QUICK = Pace(rounds=9, seconds=0.02), Pace(rounds=1, seconds=0.001)
-TINY = Sizes(many=300, conditions=(20, 40), facts=(300, 600), versions=50, singly=20)
+TINY = Sizes(many=300, conditions=(20, 40), facts=(300, 600), versions=70, singly=20)
 
 
 def rows_of(everyone: list[type[Contender]], *, quick: bool) -> list[Row]:
@@ -26,7 +26,7 @@ def rows_of(everyone: list[type[Contender]], *, quick: bool) -> list[Row]:
     pace, sizes = (QUICK, TINY) if quick else (FULL, Sizes())
     asked = [row for size in ((100,) if quick else (10_000, 100_000)) for row in question_rows(everyone, size, pace)]
     watched = condition_rows(pace, sizes)
-    return [*everyday_rows(pace), *asked, *watched, *size_rows(pace, sizes), recovery_row(sizes)]
+    return [*everyday_rows(pace), *asked, *watched, *size_rows(pace, sizes), *recovery_rows(sizes)]
 
 
 def main() -> None:

@@ -36,5 +36,5 @@ def test_conditions_are_updated_in_three_kinds_of_store(rows):
 
 def test_targets_are_judged_by_their_figures(rows):
     targets = [target for row in rows.values() for target in row["targets"]]
-    assert len(targets) == 20
+    assert len(targets) == 21
     assert all(one["met"] is (one["value"] <= one["bound"]) for one in targets)
