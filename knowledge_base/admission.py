@@ -66,6 +66,7 @@ class _Admission:
         self.delta = delta
         self.world = world
         self.schema = world.schema
+        self.type_of = self.changed_type_of if delta.nodes or delta.removed_nodes else self.known_type_of
 
     def node(self, name: str, type_name: str) -> None:
         if not isinstance(name, str) or not name:
@@ -76,15 +77,17 @@ class _Admission:
             raise SchemaError(f"'{name}' is of type '{known}' and cannot become '{type_name}'")
 
     def fact(self, fact: Fact, signature: Signature) -> None:
-        check_arity(signature, len(fact.args))
+        if len(fact.args) != len(signature.parameters):
+            check_arity(signature, len(fact.args))
+        fitting, type_of = self.schema.fitting, self.type_of
         for parameter, value in zip(signature.parameters, fact.args, strict=True):
-            self.argument(value, parameter, fact)
+            known = type_of(value)
+            if known is None or known not in fitting(parameter.types):
+                self.other_argument(value, known, parameter, fact)
 
-    def argument(self, value: Value, parameter: TypedVariable, fact: Fact) -> None:
+    def other_argument(self, value: Value, known: str | None, parameter: TypedVariable, fact: Fact) -> None:
+        """It is no thing of the right type, so it is a value or a mistake."""
         wanted = parameter.types or (ROOT_TYPE,)
-        known = self.type_of(value)
-        if known is not None and self.schema.fits(known, wanted):
-            return
         if value_fits(value, wanted):
             if not isinstance(value, str):
                 require_finite(value, f"the argument '?{parameter.name}' of {fact.predicate}")
@@ -96,7 +99,10 @@ class _Admission:
             raise SchemaError(f"{expected}, not {value!r}")
         raise UnknownNameError(f"there is no object '{value}', used in {fact}", found=value, valid=self.things(wanted))
 
-    def type_of(self, value: Value) -> str | None:
+    def known_type_of(self, value: Value) -> str | None:
+        return self.world.type_of(value) if isinstance(value, str) else None
+
+    def changed_type_of(self, value: Value) -> str | None:
         if not isinstance(value, str):
             return None
         new = self.delta.nodes.get(value)

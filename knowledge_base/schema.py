@@ -77,6 +77,7 @@ class Schema:
     computed: Mapping[str, Computed[Any]] = field(default_factory=dict)
     _ancestors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False)
     _unset: Mapping[str, Content] = field(init=False, repr=False)
+    _fitting: dict[tuple[str, ...], frozenset[str]] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.types.get(ROOT_TYPE) not in (None, ROOT_TYPE):
@@ -189,7 +190,16 @@ class Schema:
 
     def fits(self, type_name: str, wanted: Iterable[str]) -> bool:
         """Whether `type_name` is one of the `wanted` types; none wanted means any object."""
-        return any(self.is_a(type_name, w) for w in (tuple(wanted) or (ROOT_TYPE,)))
+        return type_name in self.fitting(tuple(wanted))
+
+    def fitting(self, wanted: tuple[str, ...]) -> frozenset[str]:
+        """All types that fit the `wanted` ones; worked out once, for every argument of every change is tested."""
+        found = self._fitting.get(wanted)
+        if found is None:
+            all_types = (*self.types, *VALUE_TYPES)
+            found = frozenset(t for t in all_types if any(self.is_a(t, w) for w in wanted or (ROOT_TYPE,)))
+            self._fitting[wanted] = found
+        return found
 
     def subtypes(self, type_name: str) -> tuple[str, ...]:
         """`type_name` and all types below it, in the order declared."""

@@ -6,7 +6,7 @@ and by installed conditions, at the present version; no version, change or journ
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from threading import RLock
 from types import TracebackType
 from typing import Self
@@ -88,7 +88,12 @@ class Sources:
     """All open sources of a knowledge base, in the order in which they were bound."""
 
     def __init__(
-        self, state: WorldState, graph: WorldGraph, installed: Installed, announcer: Announcer, lock: RLock
+        self,
+        state: WorldState,
+        graph: Callable[[], WorldGraph | None],
+        installed: Installed,
+        announcer: Announcer,
+        lock: RLock,
     ) -> None:
         self._state, self._graph, self._installed = state, graph, installed
         self._announcer, self._lock = announcer, lock
@@ -104,7 +109,7 @@ class Sources:
                 raise SchemaError(f"{fluent} is fed by '{self._open[fluent].reference}' already")
             source = self._open[fluent] = Source(self, fluent, reference)
             self._state.bind(fluent, reference)
-            self._graph.feed(fluent, reference, self._value(fluent))
+            self._show(fluent, reference, self._value(fluent))
         return source
 
     def listed(self) -> list[Source]:
@@ -122,7 +127,7 @@ class Sources:
             before = self._value(fluent)
             source.take(content)
             self._state.feed(fluent, content)
-            self._graph.feed(fluent, source.reference, content)
+            self._show(fluent, source.reference, content)
             self._tell(fluent, before)
         self._announcer.deliver()
 
@@ -147,7 +152,12 @@ class Sources:
         source.end()
         del self._open[source.fluent]
         self._state.unbind(source.fluent)
-        self._graph.unfeed(source.fluent, self._state.values.get(source.fluent))
+        if (graph := self._graph()) is not None:
+            graph.unfeed(source.fluent, self._state.values.get(source.fluent))
+
+    def _show(self, fluent: Fact, reference: str, content: Content) -> None:
+        if (graph := self._graph()) is not None:  # nobody has looked at it otherwise
+            graph.feed(fluent, reference, content)
 
     def _tell(self, fluent: Fact, before: Content) -> None:
         if self._value(fluent) != before:

@@ -69,6 +69,11 @@ class WorldState:
         """What functions were set to."""
         return self._values
 
+    @property
+    def references(self) -> Mapping[Fact, str]:
+        """The fluents that are fed by sources, and where what they are worth comes from."""
+        return self._references
+
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
         """Whether the fact is true."""
         return self._facts.holds(predicate, args)

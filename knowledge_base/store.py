@@ -25,7 +25,6 @@ from knowledge_base.sources import Source, Sources
 from knowledge_base.state import WorldState
 from knowledge_base.transaction import Transaction
 from knowledge_base.view import View
-from knowledge_base.world_graph import WorldGraph
 
 Now = Callable[[], float]
 """Tells the time in seconds."""
@@ -49,8 +48,7 @@ class KnowledgeBase(Observable):
         self._history = history or MemoryHistory(Version(WorldState(schema), 0, clock()))
         start = self._history.newest()
         super().__init__(start.state, start.version)
-        self._graph: WorldGraph = WorldGraph(start.state)
-        self._sources = Sources(start.state, self._graph, self._installed, self._announcer, self._lock)
+        self._sources = Sources(start.state, lambda: self._graph, self._installed, self._announcer, self._lock)
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
@@ -304,7 +302,8 @@ class KnowledgeBase(Observable):
         departures = self._installed.departures(effective)
         self._sources.close_about(effective.removed_nodes)
         self._state.commit(effective)
-        self._graph.commit(effective)
+        if self._graph is not None:
+            self._graph.commit(effective)
         self._version = change.version
         self._announcer.add(change)
         self._installed.commit(effective, departures, self._version)

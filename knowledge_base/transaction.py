@@ -7,7 +7,6 @@ from typing import cast
 
 from knowledge_base.errors import ConflictError, InputError, UnknownNameError
 from knowledge_base.facts import Change, Content, Delta, Fact, Value
-from knowledge_base.language.evaluation import holds, query
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
 from knowledge_base.questions import Questions
@@ -102,13 +101,11 @@ class Transaction:
 
     def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[dict[str, Value]]:
         """As `KnowledgeBase.query`, with the changes so far."""
-        params = params or {}
-        return query(self._questions.query(text, params, self._view), self._view, params)
+        return self._questions.answers(text, params or {}, self._view)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """As `KnowledgeBase.ask`, with the changes so far."""
-        params = params or {}
-        return holds(self._questions.condition(text, params, self._view), self._view, params)
+        return self._questions.ask(text, params or {}, self._view)
 
     def close(self) -> None:
         """No more changes; called when the block is left."""

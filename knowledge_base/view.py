@@ -8,7 +8,7 @@ from threading import RLock
 from knowledge_base.exchange.json import to_json
 from knowledge_base.exchange.problem_writer import problem_to_text
 from knowledge_base.facts import Content, Fact, Value
-from knowledge_base.language.evaluation import Explanation, explain, holds, query
+from knowledge_base.language.evaluation import Explanation, explain
 from knowledge_base.language.expression import TRUE, Expression
 from knowledge_base.language.query_plan import QueryPlan, plan_query
 from knowledge_base.overlay import Overlay
@@ -48,7 +48,8 @@ class View:
     def graph(self) -> Graph:
         """The world as a graph, read-only; see `world_graph` for its form.
 
-        That of a `KnowledgeBase` follows every commit; other threads must not commit while it is being walked.
+        It is made when it is first asked for. That of a `KnowledgeBase` follows every commit from then on; other
+        threads must not commit while it is being walked.
         """
         with self._lock:
             if self._graph is None:
@@ -70,13 +71,13 @@ class View:
         """
         params = params or {}
         with self._lock:
-            return query(self._questions.query(text, params, self._state), self._state, params)
+            return self._questions.answers(text, params, self._state)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
         params = params or {}
         with self._lock:
-            return holds(self._questions.condition(text, params, self._state), self._state, params)
+            return self._questions.ask(text, params, self._state)
 
     def explain(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> Explanation:
         """Why the text is true or false; errors as for `ask`."""

@@ -26,46 +26,49 @@ class WorldGraph:
     """Keeps the graph in step with committed changes."""
 
     def __init__(self, state: WorldState) -> None:
-        self._schema = state.schema
+        declared = {**state.schema.predicates, **state.schema.functions}
+        self._arcs = frozenset(name for name, signature in declared.items() if _is_arc(signature))
+        self._things = {name: _thing_positions(signature) for name, signature in declared.items()}
         self._graph: Graph = nx.MultiDiGraph()
         self.view: Graph = self._graph.copy(as_view=True)
         """The graph, live and read-only."""
         self.commit(Delta(nodes=state.nodes, added=tuple(state.facts), values=state.values))
+        for fluent, reference in state.references.items():
+            self.feed(fluent, reference, state.value(fluent.predicate, fluent.args))
 
     def commit(self, effective: Delta) -> None:
         """Make a change that lists exactly what becomes different."""
         for fact in effective.removed:
-            self._remove(fact, self._schema.predicates[fact.predicate])
+            self._remove(fact)
         for name in effective.removed_nodes:
             self._remove_node(name)
         for name, type_name in effective.nodes.items():
             self._graph.add_node(name, type=type_name)
         for fact in effective.added:
-            self._put(fact, self._schema.predicates[fact.predicate], {})
+            self._put(fact, {})
         for fluent, content in effective.values.items():
-            self._put(fluent, self._schema.functions[fluent.predicate], {"value": content})
+            self._put(fluent, {"value": content})
 
     def feed(self, fluent: Fact, reference: str, content: Content) -> None:
         """A fluent is fed from outside and worth this now."""
-        self._put(fluent, self._schema.functions[fluent.predicate], {"value": content, "source": reference})
+        self._put(fluent, {"value": content, "source": reference})
 
     def unfeed(self, fluent: Fact, kept: Content | None) -> None:
         """It is not fed any more; `kept` is what it was set to, if it was."""
-        signature = self._schema.functions[fluent.predicate]
-        self._remove(fluent, signature)
+        self._remove(fluent)
         if kept is not None:
-            self._put(fluent, signature, {"value": kept})
+            self._put(fluent, {"value": kept})
 
-    def _put(self, fact: Fact, signature: Signature, content: Mapping[str, Content]) -> None:
-        if _is_arc(signature):
+    def _put(self, fact: Fact, content: Mapping[str, Content]) -> None:
+        if fact.predicate in self._arcs:
             self._graph.add_edge(fact.args[0], fact.args[-1], key=fact.predicate, **content)
             return
         self._graph.add_node(fact, relation=fact.predicate, **content)
-        for position in _thing_positions(signature):
+        for position in self._things[fact.predicate]:
             self._graph.add_edge(fact, fact.args[position], key=position)
 
-    def _remove(self, fact: Fact, signature: Signature) -> None:
-        if _is_arc(signature):
+    def _remove(self, fact: Fact) -> None:
+        if fact.predicate in self._arcs:
             self._graph.remove_edge(fact.args[0], fact.args[-1], key=fact.predicate)
         else:
             self._graph.remove_node(fact)

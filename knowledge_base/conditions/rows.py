@@ -14,6 +14,7 @@ from knowledge_base.state import WorldState
 
 if TYPE_CHECKING:
     from knowledge_base.conditions.condition import Condition
+    from knowledge_base.conditions.relation import Relation
     from knowledge_base.conditions.shape import Args
 
 ROWS = "installed rows"
@@ -24,18 +25,22 @@ class Row:
     """All installed conditions of one shape with the same values.
 
     Attributes:
+        relation: the rows of that shape.
         key: the values of the shape's parameters.
         bindings: the same, by name.
         witnesses: choices for the shape's answers that make it true: one is kept, or all (`wants_all`).
         wants_all: whether each change of the set of witnesses counts.
+        is_listed: whether changes find it among the open rows.
         conditions: who is told, in the order of installation.
     """
 
-    __slots__ = ("bindings", "conditions", "key", "wants_all", "witnesses")
+    __slots__ = ("bindings", "conditions", "is_listed", "key", "relation", "wants_all", "witnesses")
 
-    def __init__(self, key: Args, names: tuple[str, ...]) -> None:
+    def __init__(self, relation: Relation, key: Args) -> None:
+        self.relation = relation
         self.key = key
-        self.bindings: dict[str, Value] = dict(zip(names, key, strict=True))
+        self.bindings: dict[str, Value] = dict(zip(relation.shape.params, key, strict=True))
+        self.is_listed = False
         self.witnesses: dict[Args, None] = {}
         self.wants_all = False
         self.conditions: dict[Condition, None] = {}
@@ -49,6 +54,11 @@ class Row:
     def is_open(self) -> bool:
         """Whether another witness would make a difference."""
         return self.wants_all or not self.witnesses
+
+    @property
+    def witness(self) -> Args | None:
+        """A choice for the shape's answers that makes it true."""
+        return next(iter(self.witnesses), None)
 
 
 class RowsWorld:

@@ -11,8 +11,8 @@ kept (`SearchPlan`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from knowledge_base.errors import InputError
@@ -33,7 +33,7 @@ from knowledge_base.language.expression import (
     free_variables,
 )
 from knowledge_base.language.joins import Conjunct, Range, Step, candidates, conjuncts, opposite, order
-from knowledge_base.language.lookups import Lookup, Search, alternatives, distinct, smallest, things
+from knowledge_base.language.lookups import Answer, Lookup, Search, alternatives, distinct, smallest, things
 from knowledge_base.language.terms import (
     Bindings,
     Getter,
@@ -46,6 +46,7 @@ from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
 _MOST_STAGES = 1000
+Answers = Callable[[World, Bindings], list[Answer]]
 
 
 def compile_test(e: Expression, schema: Schema) -> Test:
@@ -70,9 +71,9 @@ def compile_test(e: Expression, schema: Schema) -> Test:
         case Imply(premise, conclusion):
             test = _any([_negation(compile_test(premise, schema)), compile_test(conclusion, schema)])
         case Exists():
-            test = _found(_search(_witnessing(e, schema), schema, free_variables(e)))
+            test = _found(_witnessing(e, schema), schema, free_variables(e))
         case Forall():
-            test = _negation(_found(_search(_refuting(e, schema), schema, free_variables(e))))
+            test = _negation(_found(_refuting(e, schema), schema, free_variables(e)))
     return test
 
 
@@ -83,6 +84,37 @@ def compile_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Searc
         InputError: such a variable is only tested; and what `compile_test` raises.
     """
     return _search(conjuncts(e), schema, bound)
+
+
+def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names: tuple[str, ...]) -> Answers:
+    """All that `compile_query` would find, as dictionaries of the variables `names`, which are those it finds.
+
+    No two are the same: facts and things are found once, and `distinct` sees to the rest.
+    """
+    plan = SearchPlan(conjuncts(e), schema, bound)
+    first_test, only = plan.first.test, plan.first.last
+    template: Answer = dict.fromkeys(names, "")
+    if isinstance(only, Lookup) and first_test is None:
+        return lambda world, bindings: only.all(world, bindings, template)
+
+    def answers(world: World, bindings: Bindings) -> list[Answer]:
+        found: list[Answer] = []
+        if first_test is not None and not first_test(world, bindings):
+            return found
+        for candidate, last in _ends(plan, world, bindings):
+            if last is None:
+                found.append({name: candidate[name] for name in names})
+            elif isinstance(last, Lookup):
+                answer = template.copy()
+                for name in names:
+                    if name in candidate:
+                        answer[name] = candidate[name]
+                found += last.all(world, candidate, answer)
+            else:
+                found += [{name: each[name] for name in names} for each in last(world, candidate)]
+        return found
+
+    return answers
 
 
 def witnesses(e: Exists, schema: Schema) -> Search:
@@ -172,29 +204,61 @@ def _any(tests: list[Test]) -> Test:
     return test
 
 
-def _found(search: Search) -> Test:
-    return lambda world, bindings: next(search(world, bindings), None) is not None
+def _found(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Test:
+    """Whether a search finds anything; it takes fewer frames than the search, which nested quantifiers pay for."""
+    plan = SearchPlan(conditions, schema, bound)
+    first_test = plan.first.test
+
+    def test(world: World, bindings: Bindings) -> bool:
+        if first_test is not None and not first_test(world, bindings):  # most searches of conditions end here
+            return False
+        for candidate, last in _ends(plan, world, bindings):
+            if last is None or next(last(world, candidate), None) is not None:
+                return True
+        return False
+
+    return test
 
 
 def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Search:
     plan = SearchPlan(conditions, schema, bound)
+    first_test = plan.first.test
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
-        """Backtracking with a stack of its own, so that long conjunctions do not recurse."""
-        stack: list[tuple[Stage, Iterator[Bindings]]] = [(plan.first, iter((bindings,)))]
-        while stack:
-            stage, found = stack[-1]
-            candidate = next(found, None)
-            if candidate is None:
-                stack.pop()
-            elif stage.test(world, candidate):
-                if not stage.choices:
-                    yield candidate
-                    continue
-                i, lookup = smallest(stage.choices, world, candidate)
-                stack.append((plan.after(stage, i), lookup(world, candidate)))
+        if first_test is not None and not first_test(world, bindings):
+            return iter(())
+        return _candidates(plan, world, bindings)
 
     return search
+
+
+def _candidates(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[Bindings]:
+    for candidate, last in _ends(plan, world, bindings):
+        if last is None:
+            yield candidate
+        else:
+            yield from last(world, candidate)
+
+
+def _ends(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[tuple[Bindings, Lookup | Search | None]]:
+    """All candidates for which only one look-up is left, whatever it finds being right, or nothing at all.
+
+    The plan's first test was passed. Backtracking with a stack of its own, so that long conjunctions do not recurse.
+    """
+    stack: list[tuple[Stage, Iterator[Bindings]]] = [(plan.tested, iter((bindings,)))]
+    while stack:
+        stage, found = stack[-1]
+        for candidate in found:
+            if stage.test is not None and not stage.test(world, candidate):
+                continue
+            if stage.last is not None or not stage.choices:
+                yield candidate, stage.last
+                continue
+            i, lookup = smallest(stage.choices, world, candidate)
+            stack.append((plan.after(stage, i), lookup(world, candidate)))
+            break
+        else:
+            stack.pop()
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,16 +266,20 @@ class Stage:
     """What to do next: the tests, then one of the look-ups.
 
     Attributes:
-        test: whether the conditions hold that need no more values.
+        test: whether the conditions hold that need no more values; `None` if there are none.
         choices: the look-ups that may come next, by the number of their condition.
         left: the conditions that are not dealt with then.
         bound: the variables that have a value.
+        last: the look-up, if it is the last: nothing is left to be tested of what it finds.
+        after: the stages that follow, as far as they are prepared.
     """
 
-    test: Test
+    test: Test | None
     choices: tuple[tuple[int, Lookup | Search], ...]
     left: tuple[int, ...]
     bound: frozenset[str]
+    last: Lookup | Search | None
+    after: dict[int, Stage] = field(default_factory=dict)
 
 
 class SearchPlan:
@@ -220,6 +288,7 @@ class SearchPlan:
     Attributes:
         steps: the conditions; stages have their numbers.
         first: where the search begins.
+        tested: the same without its test, for who has made it.
     """
 
     def __init__(self, conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> None:
@@ -229,15 +298,20 @@ class SearchPlan:
         self.first = stage = self._stage(tuple(range(len(self.steps))), bound)
         while stage.choices:  # one way through, so that every mistake in the text shows now
             stage = self.after(stage, stage.choices[0][0])
+        self.tested = replace(self.first, test=None)
 
     def after(self, stage: Stage, chosen: int) -> Stage:
         """The stage that follows when the condition `chosen` was looked up."""
-        left = tuple([i for i in stage.left if i != chosen])
-        found = self._stages.get(left)
+        found = stage.after.get(chosen)
         if found is None:
-            if len(self._stages) >= _MOST_STAGES:
-                self._stages.clear()
-            found = self._stages[left] = self._stage(left, stage.bound | self.steps[chosen].free)
+            left = tuple([i for i in stage.left if i != chosen])
+            found = self._stages.get(left)
+            if found is None:
+                if len(self._stages) >= _MOST_STAGES:
+                    self._stages.clear()
+                    self.first.after.clear()
+                found = self._stages[left] = self._stage(left, stage.bound | self.steps[chosen].free)
+            stage.after[chosen] = found
         return found
 
     def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> Stage:
@@ -247,8 +321,9 @@ class SearchPlan:
         tests = list(map(self._test, (s.conjunct for i, s in steps.items() if i not in open_steps)))
         chosen = candidates(open_steps, bound)
         lookups = map(partial(_lookup, schema=self._schema, bound=bound), (step for _, step in chosen))
-        choices = zip((i for i, _ in chosen), lookups, strict=True)
-        return Stage(_all(tests), tuple(choices), tuple(open_steps), bound)
+        choices = tuple(zip((i for i, _ in chosen), lookups, strict=True))
+        last = choices[0][1] if len(open_steps) == 1 else None
+        return Stage(_all(tests) if tests else None, choices, tuple(open_steps), bound, last)
 
     def _test(self, conjunct: Conjunct) -> Test:
         if not isinstance(conjunct, Range):

@@ -136,8 +136,9 @@ class _Follower:
         for conjunct in (self._plan.steps[i].conjunct for i in numbers if i not in left):
             computed = isinstance(conjunct, Atom) and conjunct.predicate in self._world.schema.computed
             yield self._step("computed" if computed else "test", conjunct)
-        while self._candidate is not None and not stage.test(self._world, self._candidate):
-            self._candidate = next(found, None)
+        if stage.test is not None:
+            while self._candidate is not None and not stage.test(self._world, self._candidate):
+                self._candidate = next(found, None)
 
     def _lookup(self, step: Step, bound: frozenset[str], lookup: Lookup | Search) -> QueryStep:
         match step.conjunct:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
+from operator import itemgetter
 from typing import cast
 
 from knowledge_base.content import GEOMETRY
@@ -57,6 +58,10 @@ def compile_arguments(terms: tuple[Term, ...], schema: Schema) -> Callable[[Worl
     constants = tuple(t.value for t in terms if isinstance(t, Constant))
     if len(constants) == len(terms):
         return lambda _world, _bindings: constants
+    names = [t.name for t in terms if isinstance(t, Variable)]
+    if len(names) == len(terms) > 1:
+        pick = itemgetter(*names)
+        return lambda _world, bindings: pick(bindings)
     getters = tuple(compile_argument(t, schema) for t in terms)
     return lambda world, bindings: tuple([get(world, bindings) for get in getters])
 

@@ -145,6 +145,15 @@ def test_a_hold_that_was_broken_within_a_version_does_not_count(kb):
         assert told == [(1, True)]
 
 
+def test_a_graph_that_is_first_looked_at_later_has_what_sources_feed(kb, source):
+    source.update((1,))
+    kb.bind_source("light", reference="sensor")
+    assert kb.graph.edges["cup1", "map", "pose"] == {"value": (1,), "source": "tf:map/cup1"}
+    assert kb.graph.nodes[fact("light")] == {"relation": "light", "value": 0, "source": "sensor"}
+    source.close()
+    assert not kb.graph.has_edge("cup1", "map", "pose")
+
+
 def test_the_graph_has_the_reference_and_the_latest_value(kb, source):
     arc = kb.graph.edges["cup1", "map", "pose"]
     assert arc == {"value": (), "source": "tf:map/cup1"}
