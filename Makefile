@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb bench-startup bench-broken bench-engine bench-planning pictures clean
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb soak-kb bench-startup bench-broken bench-engine bench-planning bench-kb pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -60,6 +60,9 @@ soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every re
 kill-kb: $(VENV)/.test   ## kill -9 a process that writes a store, for each durability: is all that it acknowledged there? (KILLS=N)
 	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/test_kb_kill.py
 
+soak-kb: $(VENV)/.test   ## four threads and an event loop change, ask and watch one knowledge base at once (SECONDS=N)
+	$(BIN)/python tests/knowledge_base/kb_soak.py $(or $(SECONDS),30)
+
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py
 
@@ -72,10 +75,14 @@ bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this en
 bench-planning: $(VENV)/.engines   ## tables of 5 to 50 items: each engine alone, the race, and the parts (QUICK=1, WRITE=1 writes the docs)
 	$(BIN)/python benchmarks/planners.py $(if $(QUICK),--quick) $(if $(WRITE),--write)
 
+bench-kb: $(BENCH)/.peers   ## what facts, questions, updates and conditions cost: an index by hand, this knowledge base, four peers (WRITE=1 writes the docs)
+	$(BENCH)/bin/python benchmarks/kb.py $(if $(WRITE),--write)
+
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg
 	$(BIN)/dsc plot show domains/clean_up_table/plots/search.yaml --svg docs/pictures/search.svg
 	$(BIN)/dsc plot show planning/plots/achieve.yaml --svg docs/pictures/achieve.svg
+	$(BIN)/dsc kb draw examples/kitchen/problem.pddl --to docs/pictures/kitchen.svg
 
 clean:   ## forget the environment and caches
 	rm -rf $(VENV) $(BENCH) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

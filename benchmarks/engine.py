@@ -8,15 +8,14 @@ import argparse
 import json
 import logging
 import platform
-from pathlib import Path
 
+import page
 from common import common_rows
 from own import own_rows
 from peers import contenders
 from rows import table
 from timing import Pace
 
-PAGE = Path(__file__).parents[1] / "docs" / "speed.md"
 FULL, QUICK = Pace(rounds=15, seconds=0.02), Pace(rounds=1, seconds=0.002)
 
 
@@ -38,8 +37,7 @@ def main() -> None:
     text = f"{table(rows, [one.name for one in everyone])}\n\nMeasured with {said}; {pace.rounds} rounds."
     print(text)
     if options.write:
-        head, mark, _ = PAGE.read_text(encoding="utf-8").partition("<!-- results -->\n")
-        PAGE.write_text(f"{head}{mark}{text}\n", encoding="utf-8")
+        page.put(text, "engine")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TextIO
@@ -10,12 +12,16 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 import typer
 
 from dsc.cli import app as plot_app
+from dsc.viewer.cli import NoOpen, Port, view_command
 from knowledge_base.cli import app as kb_app
+from knowledge_base.cli import readers
 from planning.cli import doctor_command, plan_command
 
 if TYPE_CHECKING:
     from domains.clean_up_table.deployment import CleanUpTable
     from domains.clean_up_table.report import Report
+    from dsc.sequencer.sequencer import Sequencer
+    from knowledge_base.store import KnowledgeBase
 
 app = typer.Typer(
     name="dsc",
@@ -29,8 +35,20 @@ app.add_typer(plot_app, name="plot")
 app.add_typer(kb_app, name="kb")
 app.command("plan")(plan_command)
 app.command("doctor")(doctor_command)
+app.command("view")(view_command)
 
 WORLDS = ("clean-up-table",)
+
+
+def _scenario(path: Path) -> KnowledgeBase:
+    """What the robot knows when it starts into the scenario: `dsc kb` looks into it."""
+    from domains.clean_up_table.deployment import deploy
+    from domains.clean_up_table.scenario import Scenario
+
+    return deploy(Scenario.load(path)).executive.knowledge
+
+
+readers.update(dict.fromkeys((".yaml", ".yml"), _scenario))
 
 
 def _show_version(wanted: bool) -> None:
@@ -61,6 +79,13 @@ def run(
     real_time: Annotated[bool, typer.Option("--real-time", help="Let time pass as on the wall.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
     trace: Annotated[Path | None, typer.Option(help="Write every record to this file (JSON lines).")] = None,
+    view: Annotated[bool, typer.Option("--view", help="Show it in the browser while it runs.")] = False,
+    port: Port = 0,
+    no_open: NoOpen = False,
+    allow_control: Annotated[
+        bool, typer.Option("--allow-control", help="With --view: the page may hold the run and hand things in.")
+    ] = False,
+    no_wait: Annotated[bool, typer.Option("--no-wait", help="With --view: end with the run, not at Ctrl-C.")] = False,
 ) -> None:
     """Run a ready world. Exit status: 0 goal reached, 1 something is left (the report says what and why)."""
     from domains.clean_up_table.deployment import deploy
@@ -71,13 +96,47 @@ def run(
         raise UnknownNameError(f"there is no world '{world}'", found=world, valid=WORLDS)
     chosen = Scenario.load(scenario) if scenario is not None else Scenario.default()
     deployed = deploy(chosen, seed, faults)
+    follow = partial(_followed, deployed, simulated=not real_time, quiet=json, trace=trace)
     with deployed.executive:
-        report = _followed(deployed, simulated=not real_time, quiet=json, trace=trace)
-    _print(report, as_json=json)
+        if not view:
+            report = follow()
+            _print(report, as_json=json)
+        else:
+            report = _viewed(deployed, follow, port, opens=not no_open, control=allow_control, wait=not no_wait)
     raise typer.Exit(0 if report.goal_reached else 1)
 
 
-def _followed(deployed: CleanUpTable, *, simulated: bool, quiet: bool, trace: Path | None) -> Report:
+def _viewed(
+    deployed: CleanUpTable, follow: partial[Report], port: int, *, opens: bool, control: bool, wait: bool
+) -> Report:
+    """Run with a page in the browser, which stays when the run has ended."""
+    from dsc.trace import header
+    from dsc.viewer.cli import page, until_interrupt, viewer_installed
+
+    viewer_installed()
+    from dsc.viewer.control import Control
+    from dsc.viewer.records import RecordLog
+
+    log = RecordLog(header(**deployed.header()), live=True)
+    deployed.executive.listen(log.hear)
+    hands = Control(log.wake) if control else None
+    with page(log, hands, port, opens=opens) as viewer:
+        report = follow(prepare=hands.attach if hands else None)
+        log.end()
+        _print(report, as_json=bool(follow.keywords["quiet"]))
+        if wait:
+            until_interrupt(viewer)
+    return report
+
+
+def _followed(
+    deployed: CleanUpTable,
+    *,
+    simulated: bool,
+    quiet: bool,
+    trace: Path | None,
+    prepare: Callable[[Sequencer], None] | None = None,
+) -> Report:
     """Run, showing progress unless `quiet`, and writing the trace."""
     from contextlib import ExitStack
 
@@ -98,7 +157,7 @@ def _followed(deployed: CleanUpTable, *, simulated: bool, quiet: bool, trace: Pa
             deployed.executive.listen(stack.enter_context(live))
         elif not quiet:
             deployed.executive.listen(PlainProgress(typer.echo))
-        return deployed.run(simulated=simulated)
+        return deployed.run(simulated=simulated, prepare=prepare)
 
 
 def _opened(path: Path) -> TextIO:

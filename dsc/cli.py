@@ -141,6 +141,33 @@ def export(
 
 
 @app.command()
+def diff(
+    old: Annotated[Path, typer.Argument(metavar="OLD", help="A plot file.")],
+    new: Annotated[Path, typer.Argument(metavar="NEW", help="Another one.")],
+    svg: Annotated[
+        str | None, typer.Option("--svg", metavar="OUT.svg", help="Draw both, one above the other, with marks.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print a JSON list of differences.")] = False,
+) -> None:
+    """Say what is different between two plots. Exit status: 0 nothing, 1 something."""
+    from dataclasses import asdict
+
+    from dsc.text.diagram.svg import above
+    from dsc.text.difference import differences, draw_difference
+
+    before, after = _load(old), _load(new)
+    found = differences(before, after)
+    if json:
+        _print_json([asdict(difference) for difference in found])
+    else:
+        for difference in found:
+            typer.echo(str(difference))
+    if svg is not None:
+        _write(svg, above(*draw_difference(before, after)))
+    raise typer.Exit(1 if found else 0)
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON Schema of plot files, for editors."""
     from dsc.text.schema import json_schema

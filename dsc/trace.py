@@ -22,8 +22,8 @@ class Record:
     Attributes:
         seq: its number, from 1.
         t: seconds of run time.
-        type: `plot`, `event`, `step`, `rule`, `decision`, `knowledge`, `action`, `log`, `end`, or an upper room's
-            (`plan.found`, `scene`, …).
+        type: `world`, `plot`, `event`, `step`, `rule`, `decision`, `knowledge`, `action`, `log`, `end`, or an upper
+            room's (`plan.found`, `scene`, …).
         cause: seq of the record that led to it; `None` for the first.
         data: what there is to say, plain data.
     """
@@ -52,6 +52,11 @@ class Trace:
         self._listeners: list[Listener] = []
         self._seq = 0
         self.cause: int | None = None
+
+    @property
+    def heard(self) -> bool:
+        """Whether anybody listens."""
+        return bool(self._listeners)
 
     def listen(self, listener: Listener) -> None:
         """Tell `listener` every record from now on."""

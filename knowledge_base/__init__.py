@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from knowledge_base.computation import Computed as Computed
+    from knowledge_base.computation import computed as computed
     from knowledge_base.conditions.clock import Clock as Clock
     from knowledge_base.conditions.condition import Condition as Condition
     from knowledge_base.conditions.condition import Firing as Firing
@@ -24,13 +26,18 @@ if TYPE_CHECKING:
     from knowledge_base.errors import UnknownNameError as UnknownNameError
     from knowledge_base.errors import UnsupportedConstructError as UnsupportedConstructError
     from knowledge_base.facts import Change as Change
+    from knowledge_base.facts import Content as Content
     from knowledge_base.facts import Delta as Delta
     from knowledge_base.facts import Fact as Fact
     from knowledge_base.facts import Value as Value
     from knowledge_base.facts import fact as fact
+    from knowledge_base.language.explanation import Explanation as Explanation
+    from knowledge_base.language.query_plan import QueryPlan as QueryPlan
+    from knowledge_base.language.query_plan import QueryStep as QueryStep
     from knowledge_base.overlay import Overlay as Overlay
     from knowledge_base.schema import Schema as Schema
     from knowledge_base.schema import Signature as Signature
+    from knowledge_base.sources import Source as Source
     from knowledge_base.state import WorldState as WorldState
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
     from knowledge_base.transaction import Transaction as Transaction
@@ -43,10 +50,13 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Binding": "view",
         "Change": "facts",
         "Clock": "conditions.clock",
+        "Computed": "computation",
         "Condition": "conditions.condition",
         "ConditionCancelledError": "errors",
         "ConflictError": "errors",
+        "Content": "facts",
         "Delta": "facts",
+        "Explanation": "language.explanation",
         "Fact": "facts",
         "Firing": "conditions.condition",
         "HistoryError": "errors",
@@ -56,10 +66,13 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Overlay": "overlay",
         "ParseError": "errors",
         "Place": "errors",
+        "QueryPlan": "language.query_plan",
+        "QueryStep": "language.query_plan",
         "Schema": "schema",
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",
         "Signature": "schema",
+        "Source": "sources",
         "StoreError": "errors",
         "Transaction": "transaction",
         "UnknownNameError": "errors",
@@ -68,6 +81,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "View": "view",
         "Watch": "conditions.watch",
         "WorldState": "state",
+        "computed": "computation",
         "fact": "facts",
     },
 )

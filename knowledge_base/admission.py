@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 
+from knowledge_base.content import require_content, require_finite
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.functional import require_single
 from knowledge_base.language.check import check_arity, value_fits
 from knowledge_base.language.expression import TypedVariable
 from knowledge_base.language.world import World
@@ -19,24 +20,45 @@ def check_delta(delta: Delta, world: World) -> None:
 
     Raises:
         UnknownNameError: an undeclared type, predicate or function, or a thing that is not there.
-        SchemaError: a wrong number of arguments, a wrong type, a second type for a thing.
+        SchemaError: a wrong number of arguments, a wrong type, a second type for a thing, a second fact of a
+            functional predicate, a value that a source feeds.
         InputError: a number that is not finite, a name that is empty.
     """
     admission = _Admission(delta, world)
     # Facts may be removed together with the things they are about.
     before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission
+    reference = getattr(world, "reference", None)
     for name, type_name in delta.nodes.items():
         admission.node(name, type_name)
-    for fact in delta.added:
-        admission.fact(fact, world.schema.predicate(fact.predicate))
+    for fact in (*delta.added, *delta.replaced):
+        admission.fact(fact, world.schema.told(fact.predicate))
     for fact in delta.removed:
-        before.fact(fact, world.schema.predicate(fact.predicate))
-    for fluent, number in delta.values.items():
+        before.fact(fact, world.schema.told(fact.predicate))
+    for fluent, content in delta.values.items():
         admission.fact(fluent, world.schema.function(fluent.predicate))
-        admission.number(fluent, number)
+        require_content(content, world.schema.result(fluent.predicate), fluent)
+        if delta.removed_nodes and not set(delta.removed_nodes).isdisjoint(fluent.args):
+            continue  # it begins anew, without a source
+        if reference is not None and (source := reference(fluent.predicate, fluent.args)) is not None:
+            raise SchemaError(f"{fluent} is fed by '{source}' and cannot be set")
     for name in delta.removed_nodes:
         if name in world.schema.constants and name not in delta.nodes:
             raise SchemaError(f"'{name}' is a constant of the domain and cannot be removed")
+    for fact in delta.replaced:
+        if not fact.args:
+            raise SchemaError(f"{fact} has no argument that could be replaced")
+    if delta.replaced or world.schema.functional:
+        require_single(delta, world)
+
+
+def check_fluent(fluent: Fact, world: World) -> None:
+    """Raise an error unless there is such a function and it takes such arguments.
+
+    Raises:
+        UnknownNameError: an undeclared function, or a thing that is not there.
+        SchemaError: a wrong number of arguments, a wrong type.
+    """
+    _Admission(Delta(), world).fact(fluent, world.schema.function(fluent.predicate))
 
 
 class _Admission:
@@ -44,6 +66,7 @@ class _Admission:
         self.delta = delta
         self.world = world
         self.schema = world.schema
+        self.type_of = self.changed_type_of if delta.nodes or delta.removed_nodes else self.known_type_of
 
     def node(self, name: str, type_name: str) -> None:
         if not isinstance(name, str) or not name:
@@ -54,18 +77,20 @@ class _Admission:
             raise SchemaError(f"'{name}' is of type '{known}' and cannot become '{type_name}'")
 
     def fact(self, fact: Fact, signature: Signature) -> None:
-        check_arity(signature, len(fact.args))
+        if len(fact.args) != len(signature.parameters):
+            check_arity(signature, len(fact.args))
+        fitting, type_of = self.schema.fitting, self.type_of
         for parameter, value in zip(signature.parameters, fact.args, strict=True):
-            self.argument(value, parameter, fact)
+            known = type_of(value)
+            if known is None or known not in fitting(parameter.types):
+                self.other_argument(value, known, parameter, fact)
 
-    def argument(self, value: Value, parameter: TypedVariable, fact: Fact) -> None:
+    def other_argument(self, value: Value, known: str | None, parameter: TypedVariable, fact: Fact) -> None:
+        """It is no thing of the right type, so it is a value or a mistake."""
         wanted = parameter.types or (ROOT_TYPE,)
-        known = self.type_of(value)
-        if known is not None and self.schema.fits(known, wanted):
-            return
         if value_fits(value, wanted):
             if not isinstance(value, str):
-                _require_finite(value, f"the argument '?{parameter.name}' of {fact.predicate}")
+                require_finite(value, f"the argument '?{parameter.name}' of {fact.predicate}")
             return
         expected = f"the argument '?{parameter.name}' of {fact} is of type {' or '.join(wanted)}"
         if known is not None:
@@ -74,7 +99,10 @@ class _Admission:
             raise SchemaError(f"{expected}, not {value!r}")
         raise UnknownNameError(f"there is no object '{value}', used in {fact}", found=value, valid=self.things(wanted))
 
-    def type_of(self, value: Value) -> str | None:
+    def known_type_of(self, value: Value) -> str | None:
+        return self.world.type_of(value) if isinstance(value, str) else None
+
+    def changed_type_of(self, value: Value) -> str | None:
         if not isinstance(value, str):
             return None
         new = self.delta.nodes.get(value)
@@ -85,17 +113,3 @@ class _Admission:
     def things(self, types: Iterable[str]) -> set[str]:
         known = {t for t in types if t not in VALUE_TYPES}
         return {name for t in known for name in self.world.objects(t)} | self.delta.nodes.keys()
-
-    def number(self, fluent: Fact, number: float) -> None:
-        if isinstance(number, bool) or not isinstance(number, int | float):
-            raise SchemaError(f"{fluent} is a number, not {number!r}")
-        _require_finite(number, str(fluent))
-
-
-def _require_finite(number: float, what: str) -> None:
-    try:
-        if math.isfinite(number):
-            return
-    except OverflowError:
-        raise InputError(f"{what} is a number of at most 1e308") from None
-    raise InputError(f"{what} is a finite number, not {number}")

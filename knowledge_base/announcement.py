@@ -67,6 +67,8 @@ class Announcer:
         Raises:
             ExceptionGroup: listeners failed; all others have heard everything nevertheless.
         """
+        if not self._waiting:  # what another thread is about to queue it delivers itself
+            return
         with self._lock:
             if self._delivering or self._quiet:
                 return

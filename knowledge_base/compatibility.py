@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from knowledge_base.errors import Place, SchemaMismatchError, nearest
+from knowledge_base.errors import Place, SchemaError, SchemaMismatchError, nearest
 from knowledge_base.facts import Delta
+from knowledge_base.functional import require_single
 from knowledge_base.schema import ROOT_TYPE, Schema, Signature
 from knowledge_base.state import WorldState
 
@@ -13,7 +14,8 @@ from knowledge_base.state import WorldState
 def require_extension(written: Schema, given: Schema, place: Place | None = None) -> None:
     """Raise an error unless `given` declares all that `written` does, and that alike.
 
-    New types, constants, predicates and functions are welcome; parameters' names do not matter.
+    New types, constants, predicates and functions are welcome, and more predicates that are functional;
+    parameters' names do not matter.
 
     Raises:
         SchemaMismatchError: each difference is named, with the nearest name of `given` for a missing one.
@@ -23,9 +25,25 @@ def require_extension(written: Schema, given: Schema, place: Place | None = None
         *_differences("constant", written.constants, given.constants),
         *_differences("predicate", _shapes(written.predicates), _shapes(given.predicates)),
         *_differences("function", _shapes(written.functions), _shapes(given.functions)),
+        *(
+            f"the predicate '{name}' was functional, now it is not"
+            for name in sorted(written.functional & given.predicates.keys() - given.functional)
+        ),
     ]
     if found:
         raise SchemaMismatchError(found, place=place)
+
+
+def require_functional(state: WorldState, place: Place | None = None) -> None:
+    """Raise an error if the world says two things of what the schema made functional after it was written.
+
+    Raises:
+        SchemaMismatchError: the two facts are named.
+    """
+    try:
+        require_single(Delta(added=tuple(state.facts)), state)
+    except SchemaError as error:
+        raise SchemaMismatchError([error.message], place=place) from None
 
 
 def missing_constants(state: WorldState, place: Place | None = None) -> Delta:
@@ -55,8 +73,9 @@ def _differences(kind: str, written: Mapping[str, str | None], given: Mapping[st
 
 
 def _shapes(signatures: Mapping[str, Signature]) -> dict[str, str | None]:
-    """What a declaration means, in words: the types of its arguments."""
+    """What a declaration means, in words: the types of its arguments, and of a function's content."""
     return {
         name: " ".join([name, *("/".join(p.types or (ROOT_TYPE,)) for p in signature.parameters)])
+        + ("" if signature.result in (None, "number") else f" - {signature.result}")
         for name, signature in signatures.items()
     }

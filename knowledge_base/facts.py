@@ -9,6 +9,11 @@ Value = str | int | float | bool
 VALUE_TYPES = frozenset({str, int, float, bool})
 """What a fact's argument or a bound variable may be: an object's name, a number, a truth value."""
 
+Geometry = tuple[float, ...]
+"""A position, a pose, a matrix: finite numbers whose meaning the function's name says; `()` is unknown."""
+Content = Value | Geometry
+"""What a function may be worth: the symbolic or geometric content of an arc (S4.3)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Fact:
@@ -31,43 +36,61 @@ def fact(predicate: str, *args: Value) -> Fact:
 class Delta:
     """A change of the world model as a value: applied as a whole or not at all.
 
-    Removals come before additions, as in PDDL effects, so that a fact in both stays true.
+    Replacements come before removals, and those before additions, as in PDDL effects, so that a fact in both
+    stays true.
 
     Attributes:
         nodes: things that are there now, name -> type; naming a known one again with its type is fine.
         removed: facts that hold no longer; one that did not hold is fine.
         added: facts that hold now.
-        values: numeric fluents' new values, by function and arguments.
-        removed_nodes: things that are there no longer, nor any fact or number about them; this comes first
+        values: what functions are worth now, by function and arguments.
+        removed_nodes: things that are there no longer, nor any fact or value about them; this comes first
             of all, so that a thing in `nodes` too begins anew. One that was not there is fine.
+        replaced: facts that hold now, and none any more that differs from them only in the last argument:
+            `fact("at", "cup1", "shelf")` whatever it was at before. What really changes has no part in it.
     """
 
     nodes: Mapping[str, str] = field(default_factory=dict)
     removed: tuple[Fact, ...] = ()
     added: tuple[Fact, ...] = ()
-    values: Mapping[Fact, float] = field(default_factory=dict)
+    values: Mapping[Fact, Content] = field(default_factory=dict)
     removed_nodes: tuple[str, ...] = ()
+    replaced: tuple[Fact, ...] = ()
 
     def __bool__(self) -> bool:
         """Whether it says anything at all."""
-        return bool(self.nodes or self.removed or self.added or self.values or self.removed_nodes)
+        return bool(
+            self.nodes or self.removed or self.added or self.values or self.removed_nodes or self.replaced
+        )
 
     def __len__(self) -> int:
-        """How many things, facts and numbers it names."""
-        return len(self.nodes) + len(self.removed) + len(self.added) + len(self.values) + len(self.removed_nodes)
+        """How many things, facts and values it names."""
+        facts = len(self.removed) + len(self.added) + len(self.replaced)
+        return len(self.nodes) + facts + len(self.values) + len(self.removed_nodes)
 
     def then(self, later: Delta) -> Delta:
-        """This change followed by `later`, as one change."""
+        """This change followed by `later`, as one change.
+
+        A replacement that names a thing which `later` removes is forgotten with it.
+        """
         undone, gone = set(later.removed), set(later.removed_nodes)
-        added = [a for a in self.added if a not in undone and gone.isdisjoint(a.args)]
-        redone = set(later.added)
-        removed = [r for r in (*self.removed, *later.removed) if r not in redone]
+        anew = {(r.predicate, r.args[:-1]) for r in later.replaced}
+        added = [
+            a for a in self.added
+            if a not in undone and gone.isdisjoint(a.args) and (a.predicate, a.args[:-1]) not in anew
+        ]  # fmt: skip
+        replaced = [
+            r for r in self.replaced if gone.isdisjoint(r.args) and (r.predicate, r.args[:-1]) not in anew
+        ]
+        redone = {*later.added, *later.replaced}
+        removed = [r for r in self.removed if r not in redone] + [r for r in later.removed if r not in later.added]
         return Delta(
             nodes={**{n: t for n, t in self.nodes.items() if n not in gone}, **later.nodes},
             removed=tuple(dict.fromkeys(removed)),
             added=tuple(dict.fromkeys([*added, *later.added])),
             values={**{f: v for f, v in self.values.items() if gone.isdisjoint(f.args)}, **later.values},
             removed_nodes=tuple(dict.fromkeys([*self.removed_nodes, *later.removed_nodes])),
+            replaced=(*replaced, *later.replaced),
         )
 
 

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
+from itertools import chain
 from typing import TypeVar
 
 from knowledge_base.facts import Fact, Value
 
 Args = tuple[Value, ...]
 _K = TypeVar("_K")
+_V = TypeVar("_V")
 
 
 class FactIndex:
     """A set of facts in order of insertion, indexed per predicate and argument position.
 
-    Dicts with `None` stand for ordered sets.
+    Dicts with `None` stand for ordered sets. Facts of one argument need no list for it.
     """
 
     def __init__(self) -> None:
-        self._facts: dict[str, dict[Args, None]] = {}
+        self._facts: dict[str, dict[Args, Fact]] = {}
         self._by_argument: dict[tuple[str, int, Value], dict[Args, None]] = {}
 
     def __contains__(self, fact: Fact) -> bool:
@@ -26,7 +28,7 @@ class FactIndex:
 
     def __iter__(self) -> Iterator[Fact]:
         """All facts, predicate by predicate."""
-        return (Fact(predicate, args) for predicate, known in self._facts.items() for args in known)
+        return chain.from_iterable(known.values() for known in self._facts.values())
 
     def __len__(self) -> int:
         return sum(map(len, self._facts.values()))
@@ -42,47 +44,65 @@ class FactIndex:
         Looks through the shortest of the lists of facts that have one of the bound arguments. It looks when
         it is iterated, so the set must not change until then.
         """
-        bound = [(i, value) for i, value in enumerate(pattern) if value is not None]
-        if not bound:
-            return iter(self._facts.get(predicate, ()))
-        lists = [self._by_argument.get((predicate, i, value)) for i, value in bound]
-        found = [known for known in lists if known is not None]
-        if len(found) < len(bound):
-            return ()
-        shortest = min(found, key=len)
-        if len(bound) == 1:
-            return iter(shortest)
-        return (args for args in shortest if all(args[i] == value for i, value in bound))
+        listed = self._listed(predicate, pattern)
+        return listed if pattern.count(None) >= len(pattern) - 1 else _agreeing(listed, pattern)
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
         """At most how many facts agree with `pattern`, without looking through them."""
-        sizes = [
-            len(self._by_argument.get((predicate, i, value), ()))
-            for i, value in enumerate(pattern)
-            if value is not None
-        ]
-        return min(sizes, default=len(self._facts.get(predicate, ())))
+        return len(self._listed(predicate, pattern))
+
+    def _listed(self, predicate: str, pattern: tuple[Value | None, ...]) -> Collection[Args]:
+        """The shortest list that has all facts which agree with `pattern`."""
+        if len(pattern) == 2:  # arcs from or to a thing are asked for so often that it pays
+            start, end = pattern
+            if start is None and end is not None:
+                return self._by_argument.get((predicate, 1, end), ())
+            if end is None and start is not None:
+                return self._by_argument.get((predicate, 0, start), ())
+        if None not in pattern:
+            return (pattern,) if self.holds(predicate, pattern) else ()  # type: ignore[arg-type,return-value]
+        shortest: Collection[Args] = self._facts.get(predicate, ())
+        for position, value in enumerate(pattern):
+            if value is not None:
+                listed = self._by_argument.get((predicate, position, value), ())
+                if len(listed) < len(shortest):
+                    shortest = listed
+        return shortest
 
     def add(self, fact: Fact) -> None:
         """Put the fact at the end, unless it is there."""
-        known = self._facts.setdefault(fact.predicate, {})
-        if fact.args in known:
+        predicate, args = fact.predicate, fact.args
+        known = self._facts.get(predicate)
+        if known is None:
+            known = self._facts[predicate] = {}
+        elif args in known:
             return
-        known[fact.args] = None
-        for key in _keys(fact):
-            self._by_argument.setdefault(key, {})[fact.args] = None
+        known[args] = fact
+        if len(args) == 1:
+            return
+        for position, value in enumerate(args):
+            key = predicate, position, value
+            listed = self._by_argument.get(key)
+            if listed is None:
+                self._by_argument[key] = {args: None}
+            else:
+                listed[args] = None
 
     def discard(self, fact: Fact) -> None:
         """Take the fact out, if it is there."""
-        known = self._facts.get(fact.predicate, {})
-        if fact.args not in known:
+        predicate, args = fact.predicate, fact.args
+        known = self._facts.get(predicate)
+        if known is None or args not in known:
             return
-        del known[fact.args]
+        del known[args]
         if not known:  # so that the facts alone say in which order the predicates come
-            del self._facts[fact.predicate]
-        for key in _keys(fact):
+            del self._facts[predicate]
+        if len(args) == 1:
+            return
+        for position, value in enumerate(args):
+            key = predicate, position, value
             listed = self._by_argument[key]
-            del listed[fact.args]
+            del listed[args]
             if not listed:
                 del self._by_argument[key]
 
@@ -94,9 +114,10 @@ class FactIndex:
         return twin
 
 
-def _copied(groups: dict[_K, dict[Args, None]]) -> dict[_K, dict[Args, None]]:
+def _copied(groups: dict[_K, dict[Args, _V]]) -> dict[_K, dict[Args, _V]]:
     return {key: group.copy() for key, group in groups.items()}
 
 
-def _keys(fact: Fact) -> Iterator[tuple[str, int, Value]]:
-    return ((fact.predicate, i, value) for i, value in enumerate(fact.args))
+def _agreeing(facts: Iterable[Args], pattern: tuple[Value | None, ...]) -> Iterator[Args]:
+    bound = [(i, value) for i, value in enumerate(pattern) if value is not None]
+    return (args for args in facts if all(args[i] == value for i, value in bound))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from weakref import WeakSet
 
 from knowledge_base.announcement import Announcer, Listener
 from knowledge_base.conditions.clock import Clock
@@ -22,6 +23,16 @@ class Observable(View):
         super().__init__(state, version)
         self._announcer = Announcer(self._lock)
         self._installed = Installed(state, version, self._lock, self._announcer)
+        self._watches: WeakSet[Watch] = WeakSet()
+
+    def close(self) -> None:
+        """Cancel what is installed and end what is watched: whoever waits is told, no timer goes on."""
+        with self._lock:
+            conditions, watches = self._installed.conditions(), list(self._watches)
+        for condition in conditions:
+            condition.cancel()
+        for one in watches:
+            one.close()
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` with every committed change from now on; the function returned ends that.
@@ -88,4 +99,6 @@ class Observable(View):
             InputError: the pattern is none, or names what is not declared.
         """
         with self._lock:
-            return watch(self, pattern, params or {}, limit)
+            made = watch(self, pattern, params or {}, limit)
+            self._watches.add(made)
+            return made

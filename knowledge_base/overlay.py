@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from knowledge_base.admission import check_delta
-from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.facts import Content, Delta, Fact, Value
+from knowledge_base.functional import rivals
 from knowledge_base.index import FactIndex
 from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
@@ -22,7 +23,7 @@ class Overlay:
         self._schema = base.schema
         self._added = FactIndex()
         self._removed: dict[Fact, None] = {}
-        self._values: dict[Fact, float] = {}
+        self._values: dict[Fact, Content] = {}
         self._nodes: dict[str, str] = {}
         self._gone: dict[str, None] = {}
 
@@ -54,12 +55,16 @@ class Overlay:
         for name, type_name in delta.nodes.items():
             if self.type_of(name) is None:
                 self._nodes[name] = type_name
+        for fact in delta.replaced:
+            for rival in rivals(fact, self):
+                self._remove(rival)
+            self._add(fact)
         for fact in delta.removed:
             self._remove(fact)
         for fact in delta.added:
             self._add(fact)
-        for fluent, number in delta.values.items():
-            self._set(fluent, number)
+        for fluent, content in delta.values.items():
+            self._set(fluent, content)
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
         """Whether the fact is true with the changes."""
@@ -80,10 +85,16 @@ class Overlay:
         own = self._added.estimate(predicate, pattern)
         return own + below(predicate, pattern) if below else own
 
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value with the changes; 0 until it is set."""
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth with the changes."""
         pending = self._values.get(Fact(function, args))
         return self._base_value(Fact(function, args)) if pending is None else pending
+
+    def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
+        """Where what the function is worth comes from, if a source of the base feeds it."""
+        below = getattr(self._base, "reference", None)
+        begins_anew = self._gone and not self._gone.keys().isdisjoint(args)
+        return below(function, args) if below and not begins_anew else None
 
     def objects(self, type_name: str) -> list[str]:
         """The things of that type or a subtype; those of the base come first."""
@@ -96,9 +107,9 @@ class Overlay:
             return self._nodes[name]
         return None if name in self._gone else self._base.type_of(name)
 
-    def _base_value(self, fluent: Fact) -> float:
+    def _base_value(self, fluent: Fact) -> Content:
         begins_anew = self._gone and not self._gone.keys().isdisjoint(fluent.args)
-        return 0 if begins_anew else self._base.value(fluent.predicate, fluent.args)
+        return self._schema.unset(fluent.predicate) if begins_anew else self._base.value(fluent.predicate, fluent.args)
 
     def _add(self, fact: Fact) -> None:
         if self._gone and not self._gone.keys().isdisjoint(fact.args):  # went with its thing, so it is said again
@@ -114,11 +125,11 @@ class Overlay:
         elif self._base.holds(fact.predicate, fact.args):
             self._removed[fact] = None
 
-    def _set(self, fluent: Fact, number: float) -> None:
-        if number == self._base_value(fluent):
+    def _set(self, fluent: Fact, content: Content) -> None:
+        if content == self._base_value(fluent):
             self._values.pop(fluent, None)
         else:
-            self._values[fluent] = number
+            self._values[fluent] = content
 
     def _remove_node(self, name: str) -> None:
         for fact in list(self._about(name)):

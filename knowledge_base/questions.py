@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
+from typing import TypeVar
 
 from knowledge_base.facts import Value
+from knowledge_base.language.asking import Asked, Queried, asked, queried
 from knowledge_base.language.check import Free, check
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.memory import IdentityCache
@@ -15,15 +17,50 @@ from knowledge_base.language.world import World
 _parsed = lru_cache(maxsize=1024)(parse_condition)
 
 
+_MOST_KEPT = 4096
+
+_Key = tuple[str | int, ...]
+"""A text, or the identity of an expression, and the names of the parameters."""
+_T = TypeVar("_T")
+
+
+def _keep(kept: dict[_Key, _T], key: _Key, made: _T) -> None:
+    if len(kept) >= _MOST_KEPT:
+        kept.clear()
+    kept[key] = made
+
+
 class Questions:
-    """Reads texts and checks them against the schema and the things that are known.
+    """Reads texts and checks them against the schema and the things that are known, always of the same schema.
 
     A question that passed is not checked again: what it names may be removed later, and then nothing holds
     of it.
     """
 
     def __init__(self) -> None:
+        self._asked: dict[_Key, Asked] = {}
+        self._queried: dict[_Key, Queried] = {}
         self._passed: IdentityCache[Expression, set[tuple[Free, frozenset[str]]]] = IdentityCache(1024)
+
+    def ask(self, text: str | Expression, params: Mapping[str, Value], world: World) -> bool:
+        """Whether the condition is true of `world`; errors as for `condition`."""
+        key = (text if isinstance(text, str) else id(text), *params)
+        found = self._asked.get(key)
+        if found is None:
+            found = asked(self.condition(text, params, world), world.schema)
+            _keep(self._asked, key, found)
+        return found.holds(world, params)
+
+    def answers(
+        self, text: str | Expression, params: Mapping[str, Value], world: World
+    ) -> list[dict[str, Value]]:
+        """Who makes the query true of `world`; errors as for `query`."""
+        key = (text if isinstance(text, str) else id(text), *params)
+        found = self._queried.get(key)
+        if found is None:
+            found = queried(self.query(text, params, world), world.schema, params)
+            _keep(self._queried, key, found)
+        return found.answers(world, params)
 
     def condition(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
         """The condition, all of whose free variables are in `params`.

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+from knowledge_base.computation import Computed, in_reading_order
+from knowledge_base.content import GEOMETRY, UNSET
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.domain_text import DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.facts import Content
+from knowledge_base.language.check import check_reads
 from knowledge_base.language.expression import KEYWORDS, TypedVariable
 from knowledge_base.language.typed_list import TypedName
 
@@ -21,10 +26,14 @@ VALUE_TYPES = ("number", "text", "boolean")
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """A predicate's or function's name and the parameters it takes, in order."""
+    """A predicate's or function's name and the parameters it takes, in order.
+
+    `result` is what a function is worth, one of `UNSET`; a predicate has none.
+    """
 
     name: str
     parameters: tuple[TypedVariable, ...] = ()
+    result: str | None = None
     place: Place | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -33,13 +42,15 @@ class Signature:
         return len(self.parameters)
 
     def __str__(self) -> str:
-        """As declared: `(on ?a - item ?b - place)`."""
+        """As declared: `(on ?a - item ?b - place)`, `(label ?a - item) - text`."""
         typed = (f"?{p.name} - {' or '.join(p.types or (ROOT_TYPE,))}" for p in self.parameters)
-        return "(" + " ".join([self.name, *typed]) + ")"
+        result = "" if self.result in (None, "number") else f" - {self.result}"
+        return "(" + " ".join([self.name, *typed]) + ")" + result
 
     def means(self, other: Signature) -> bool:
-        """Whether both take the same types in the same order, whatever the parameters are called."""
-        return [p.types for p in self.parameters] == [p.types for p in other.parameters]
+        """Whether both take the same types in the same order and are worth the same, whatever the parameters' names."""
+        mine, others = ([p.types for p in s.parameters] for s in (self, other))
+        return mine == others and self.result == other.result
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,11 +61,14 @@ class Schema:
         types: each type's parent; `object` is always there and has none.
         constants: things that every world of this schema has, with their types.
         predicates: by name.
-        functions: numeric fluents, by name.
+        functions: by name; one without a result is numeric.
         places: where types and constants are declared, for messages.
+        functional: the predicates whose last argument the others settle, see `with_functional`.
+        computed: predicates that are computed, by name; no world and no store holds them.
 
     Raises:
-        SchemaError: an unknown parent, parameter or constant type, a cycle of types, or one name used twice.
+        SchemaError: an unknown parent, parameter or constant type, a cycle of types, one name used twice, or
+            a computed predicate that cannot read what it declares.
     """
 
     types: Mapping[str, str | None] = field(default_factory=dict)
@@ -62,7 +76,11 @@ class Schema:
     predicates: Mapping[str, Signature] = field(default_factory=dict)
     functions: Mapping[str, Signature] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict, repr=False)
+    functional: frozenset[str] = frozenset()
+    computed: Mapping[str, Computed[Any]] = field(default_factory=dict)
     _ancestors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False)
+    _unset: Mapping[str, Content] = field(init=False, repr=False)
+    _fitting: dict[tuple[str, ...], frozenset[str]] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.types.get(ROOT_TYPE) not in (None, ROOT_TYPE):
@@ -72,14 +90,18 @@ class Schema:
             "types": {t: p or (None if t == ROOT_TYPE else ROOT_TYPE) for t, p in parents.items()},
             "constants": dict(self.constants),
             "predicates": dict(self.predicates),
-            "functions": dict(self.functions),
+            "functions": {n: f if f.result else replace(f, result="number") for n, f in self.functions.items()},
             "places": dict(self.places),
+            "computed": {name: of.resolved(self._is_asked) for name, of in self.computed.items()},
         }
         for name, copy in copies.items():
             object.__setattr__(self, name, copy)
         object.__setattr__(self, "_ancestors", {t: tuple(self._lineage(t)) for t in self.types})
         self._check_names()
         self._check_types()
+        self._check_computed()
+        self._check_functional()
+        object.__setattr__(self, "_unset", {name: UNSET[self.result(name)] for name in self.functions})
 
     @classmethod
     def from_pddl(cls, path: str | Path) -> Schema:
@@ -116,6 +138,17 @@ class Schema:
             places={name: declared.place for name, declared in {**types, **constants}.items()},
         )
 
+    def with_functional(self, *predicates: str) -> Schema:
+        """This schema, in which two facts of these predicates cannot differ in nothing but the last argument.
+
+        `schema.with_functional("robot-at", "at")`: a robot, and a thing, is at one place at a time.
+
+        Raises:
+            UnknownNameError: there is no such predicate.
+            SchemaError: it has no arguments.
+        """
+        return replace(self, functional=self.functional.union(predicates))
+
     def merged(self, other: Schema) -> Schema:
         """Everything that one of the two declares.
 
@@ -139,7 +172,23 @@ class Schema:
             predicates=_united(both, "predicate"),
             functions=_united(functions, "function"),
             places={**other.places, **self.places},
-        )
+            functional=self.functional | other.functional,
+        ).with_computed(*self.computed.values(), *other.computed.values())
+
+    def with_computed(self, *predicates: Computed[Any]) -> Schema:
+        """The schema with these predicates too; one that it has already is fine.
+
+        Raises:
+            UnknownNameError: one reads a function, predicate or type that is not declared.
+            SchemaError: its name is in use, what it reads does not fit its parameters' types, or computed
+                predicates read each other in a circle or more than `MOST_NESTED` one through the other.
+        """
+        known = dict(self.computed)
+        for one in predicates:
+            if known.setdefault(one.name, one).function is not one.function:
+                first, second = ("by one function", known[one.name].place), ("by another", one.place)
+                raise _twice("computed predicate", one.name, first, second)
+        return replace(self, computed=known)
 
     def is_a(self, type_name: str, ancestor: str) -> bool:
         """Whether everything of type `type_name` is of type `ancestor`; a type is its own ancestor."""
@@ -147,7 +196,16 @@ class Schema:
 
     def fits(self, type_name: str, wanted: Iterable[str]) -> bool:
         """Whether `type_name` is one of the `wanted` types; none wanted means any object."""
-        return any(self.is_a(type_name, w) for w in (tuple(wanted) or (ROOT_TYPE,)))
+        return type_name in self.fitting(tuple(wanted))
+
+    def fitting(self, wanted: tuple[str, ...]) -> frozenset[str]:
+        """All types that fit the `wanted` ones; worked out once, for every argument of every change is tested."""
+        found = self._fitting.get(wanted)
+        if found is None:
+            all_types = (*self.types, *VALUE_TYPES)
+            found = frozenset(t for t in all_types if any(self.is_a(t, w) for w in wanted or (ROOT_TYPE,)))
+            self._fitting[wanted] = found
+        return found
 
     def subtypes(self, type_name: str) -> tuple[str, ...]:
         """`type_name` and all types below it, in the order declared."""
@@ -167,6 +225,11 @@ class Schema:
         if name not in self.types:
             raise UnknownNameError(f"there is no type '{name}'", place=place, found=name, valid=self.types)
 
+    def require_argument_type(self, name: str, place: Place | None = None) -> None:
+        """Raise `UnknownNameError` unless `name` is a type of things or of values."""
+        if name not in VALUE_TYPES:
+            self.require_type(name, place)
+
     def is_type(self, name: str, arity: int) -> bool:
         """Whether an atom of that name and number of arguments tests a type.
 
@@ -176,19 +239,37 @@ class Schema:
         return arity == 1 and name in self.types and name not in self.predicates
 
     def predicate(self, name: str, place: Place | None = None) -> Signature:
-        """The predicate of that name.
+        """The predicate of that name, which may be a computed one.
 
         Raises:
             UnknownNameError: there is none; predicates, types and keywords are suggested.
+            SchemaError: it is a function.
         """
         found = self.predicates.get(name)
-        if found is None:
-            valid = (*self.predicates, *self.types, *KEYWORDS)
+        if found is not None:
+            return found
+        if name not in self.computed:
+            if name in self.functions:
+                hint = f"compare what it is worth: (= ({name} ...) VALUE)"
+                raise SchemaError(f"'{name}' is a function; {hint}", place=place)
+            valid = (*self.predicates, *self.computed, *self.types, *KEYWORDS)
             raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
-        return found
+        of = self.computed[name]
+        return Signature(of.name, of.parameters, place=of.place)
+
+    def told(self, name: str, place: Place | None = None) -> Signature:
+        """The predicate of that name, whose facts can be told.
+
+        Raises:
+            UnknownNameError: there is none.
+            SchemaError: it is computed.
+        """
+        if name in self.computed:
+            raise self.computed[name].refused(place)
+        return self.predicate(name, place)
 
     def function(self, name: str, place: Place | None = None) -> Signature:
-        """The numeric fluent of that name.
+        """The function of that name.
 
         Raises:
             UnknownNameError: there is none.
@@ -197,6 +278,15 @@ class Schema:
         if found is None:
             raise UnknownNameError(f"there is no function '{name}'", place=place, found=name, valid=self.functions)
         return found
+
+    def result(self, function: str, place: Place | None = None) -> str:
+        """The type of what the function is worth; raises `UnknownNameError` as `function`."""
+        return self.function(function, place).result or "number"
+
+    def unset(self, function: str) -> Content:
+        """What the function is worth where it was not set; raises `UnknownNameError` as `function`."""
+        found = self._unset.get(function)
+        return UNSET[self.result(function)] if found is None else found
 
     def _lineage(self, type_name: str) -> Iterator[str]:
         seen: dict[str, None] = {}
@@ -217,7 +307,7 @@ class Schema:
             here = self.types[here]
 
     def _check_names(self) -> None:
-        for name in VALUE_TYPES:
+        for name in UNSET:
             if name in self.types:
                 raise SchemaError(f"'{name}' is a type of values, not of things", place=self.places.get(name))
         for name, signature in self.predicates.items():
@@ -227,18 +317,45 @@ class Schema:
                     place=self.functions[name].place,
                 )
 
+        for name, of in self.computed.items():
+            if name in self.predicates or name in self.functions or name in self.types or name in KEYWORDS:
+                raise SchemaError(f"the name of the computed predicate '{name}' is in use already", place=of.place)
+
+    def _check_computed(self) -> None:
+        for of in in_reading_order(self.computed):
+            check_reads(of, self)
+
+    def _is_asked(self, name: str, arity: int) -> bool:
+        """Whether that is something true or false, and no function."""
+        return name in self.predicates or name in self.computed or (arity == 1 and name in self.types)
+
     def _check_types(self) -> None:
         for name, type_name in self.constants.items():
             self._known(type_name, f"the constant '{name}'", self.places.get(name), values=False)
-        for signature in (*self.predicates.values(), *self.functions.values()):
+        for function in self.functions.values():
+            if function.result not in UNSET:
+                raise SchemaError(
+                    f"the function '{function.name}' has an unknown type of result",
+                    place=function.place, found=function.result, valid=UNSET,
+                )  # fmt: skip
+        computed = map(self.predicate, self.computed)
+        for signature in (*self.predicates.values(), *self.functions.values(), *computed):
             for parameter in signature.parameters:
                 for type_name in parameter.types:
                     owner = f"the parameter '?{parameter.name}' of '{signature.name}'"
                     self._known(type_name, owner, parameter.place or signature.place, values=True)
 
+    def _check_functional(self) -> None:
+        for name in sorted(self.functional):
+            signature = self.predicate(name)
+            if not signature.arity:
+                raise SchemaError(f"'{name}' has no argument that others could settle", place=signature.place)
+
     def _known(self, type_name: str, owner: str, place: Place | None, *, values: bool) -> None:
         if type_name in self.types or (values and type_name in VALUE_TYPES):
             return
+        if type_name == GEOMETRY:
+            raise SchemaError(f"{owner} cannot be a geometry; only what a function is worth can", place=place)
         raise SchemaError(f"{owner} has an unknown type '{type_name}'", place=place, found=type_name, valid=self.types)
 
 
@@ -267,7 +384,7 @@ def _typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
 
 
 def _signatures(declarations: Iterable[DeclarationText], kind: str) -> dict[str, Signature]:
-    return _united((Signature(d.name, d.parameters, d.place) for d in declarations), kind)
+    return _united((Signature(d.name, d.parameters, d.result, d.place) for d in declarations), kind)
 
 
 def _united(signatures: Iterable[Signature], kind: str) -> dict[str, Signature]:

@@ -12,7 +12,7 @@ from typing import Self
 
 from knowledge_base.errors import ConflictError, HistoryError, InputError
 from knowledge_base.exchange.json import read_json
-from knowledge_base.facts import Change, Delta
+from knowledge_base.facts import Change, Delta, Fact, Value
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability
 from knowledge_base.journal.history import History, Version, Writer
@@ -21,10 +21,10 @@ from knowledge_base.journal.memory import MemoryHistory
 from knowledge_base.observable import Observable
 from knowledge_base.overlay import Overlay
 from knowledge_base.schema import Schema
+from knowledge_base.sources import Source, Sources
 from knowledge_base.state import WorldState
 from knowledge_base.transaction import Transaction
 from knowledge_base.view import View
-from knowledge_base.world_graph import WorldGraph
 
 Now = Callable[[], float]
 """Tells the time in seconds."""
@@ -48,7 +48,7 @@ class KnowledgeBase(Observable):
         self._history = history or MemoryHistory(Version(WorldState(schema), 0, clock()))
         start = self._history.newest()
         super().__init__(start.state, start.version)
-        self._graph: WorldGraph = WorldGraph(start.state)
+        self._sources = Sources(start.state, lambda: self._graph, self._installed, self._announcer, self._lock)
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
@@ -72,7 +72,7 @@ class KnowledgeBase(Observable):
             durability: what a committed change outlives: "memory" nothing (without a path), "process" the
                 death of this process by whatever means (the default with a path), "power" a power cut too.
             clock: gives the time of changes, in seconds.
-            read_only: look at a store, as it is now, that another process may be writing.
+            read_only: look at a store that another process may be writing; `refresh` follows it.
 
         Raises:
             StoreError: the file cannot be read or written, is no store, or somebody else is writing it.
@@ -112,9 +112,35 @@ class KnowledgeBase(Observable):
         self.close()
 
     def close(self) -> None:
-        """Give back the file, if there is one; nothing can be changed then. What was committed is in it already."""
+        """Give back the file, if there is one; nothing can be changed then. What was committed is in it already.
+
+        Installed conditions are cancelled, so that no timer goes on and whoever waits for one is told; watches
+        end and sources are closed. Repeating it is fine.
+        """
+        super().close()
+        for source in self.sources():
+            source.close()
         with self._lock:
             self._history.close()
+
+    def refresh(self) -> int:
+        """Take in what the writer of a store that is opened `read_only` has committed meanwhile (S4.10).
+
+        The changes are announced in order, as if they were made here, to subscribers, watches and installed
+        conditions. Returns the version reached.
+
+        Raises:
+            ConflictError: this one is not opened `read_only`, or this thread is inside a transaction.
+            HistoryError: the writer has compacted what was not taken in yet; open the store anew.
+            StoreError: the file cannot be read, or the writer has a longer schema now; likewise.
+        """
+        with self._lock:
+            self._refuse_nesting()
+            for change in self._history.later(self._version):
+                self._time = change.time
+                self._take_in(change)
+        self._announcer.deliver()
+        return self._version
 
     @contextmanager
     def transaction(
@@ -183,6 +209,32 @@ class KnowledgeBase(Observable):
         self._announcer.deliver()
         return change
 
+    def bind_source(self, function: str, *args: Value, reference: str) -> Source:
+        """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
+
+        Its latest value is what questions, snapshots and installed conditions see; versions, changes, watches,
+        past worlds and JSON do not have it. Until the first update and after closing the function reads as if
+        it were not bound; meanwhile it cannot be set. Removing a thing closes the sources about it.
+
+        Args:
+            function: its name.
+            args: its arguments.
+            reference: where the values come from, in words of whoever provides them.
+
+        Raises:
+            UnknownNameError: an undeclared function, or a thing that is not there.
+            SchemaError: a wrong number of arguments, a wrong type, or there is a source for it already.
+            InputError: the reference is empty.
+            ConflictError: this thread is inside a transaction.
+        """
+        with self._lock:
+            self._refuse_nesting()
+            return self._sources.bind(Fact(function, args), reference)
+
+    def sources(self) -> list[Source]:
+        """The sources that are open, in the order in which they were bound."""
+        return self._sources.listed()
+
     def at(self, *, version: int | None = None, time: float | None = None) -> View:
         """The world as it was, to be asked like this one.
 
@@ -201,6 +253,11 @@ class KnowledgeBase(Observable):
             version = min(self._history.version_at(time or 0.0), self._version)
         self._require_reached(version)
         return View(self._history.state(version, self._present), version)
+
+    @property
+    def oldest(self) -> int:
+        """The first version that can still be asked for (`at`), and since which changes are known."""
+        return self._history.oldest()
 
     def changes(self, since: int = 0, until: int | None = None) -> list[Change]:
         """The changes after version `since`, up to that which made version `until` (default: all).
@@ -236,13 +293,20 @@ class KnowledgeBase(Observable):
         change = Change(self._version + bool(effective), author, effective, self._time)
         self._history.append(change, key, self._state, along)
         if effective:
-            departures = self._installed.departures(effective)
-            self._state.commit(effective)
-            self._graph.commit(effective)
-            self._version = change.version
-            self._announcer.add(change)
-            self._installed.commit(effective, departures, self._version)
+            self._take_in(change)
         return change
+
+    def _take_in(self, change: Change) -> None:
+        """The change is kept; make it, and queue what others have to be told."""
+        effective = change.delta
+        departures = self._installed.departures(effective)
+        self._sources.close_about(effective.removed_nodes)
+        self._state.commit(effective)
+        if self._graph is not None:
+            self._graph.commit(effective)
+        self._version = change.version
+        self._announcer.add(change)
+        self._installed.commit(effective, departures, self._version)
 
     def _present(self) -> Version:
         with self._lock:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import cast
 
 from knowledge_base.errors import ConflictError, InputError, UnknownNameError
-from knowledge_base.facts import Change, Delta, Fact, Value
-from knowledge_base.language.evaluation import holds, query
+from knowledge_base.facts import Change, Content, Delta, Fact, Value
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
 from knowledge_base.questions import Questions
@@ -44,7 +44,7 @@ class Transaction:
         self.apply(Delta(nodes={name: type_name}))
 
     def remove_node(self, name: str) -> None:
-        """The thing is there no longer, nor any fact or number about it.
+        """The thing is there no longer, nor any fact or value about it.
 
         Raises:
             UnknownNameError: there is no such thing.
@@ -58,7 +58,7 @@ class Transaction:
 
         Raises:
             UnknownNameError: an undeclared predicate, or a thing that is not there.
-            SchemaError: a wrong number of arguments or a wrong type.
+            SchemaError: a wrong number of arguments, a wrong type, or a second fact of a functional predicate.
         """
         self.apply(Delta(added=(Fact(predicate, args),)))
 
@@ -66,20 +66,26 @@ class Transaction:
         """The fact holds no longer; errors as for `tell`."""
         self.apply(Delta(removed=(Fact(predicate, args),)))
 
-    def set(self, function: str, *args_and_number: Value) -> None:
-        """The numeric fluent has this value now: `tx.set("failures", "cup1", 2)`.
+    def replace(self, predicate: str, *args: Value) -> None:
+        """The fact holds now, and none any more that differs in the last argument: `tx.replace("at", "cup1", "shelf")`.
+
+        Errors as for `tell`; a predicate without arguments is one.
+        """
+        self.apply(Delta(replaced=(Fact(predicate, args),)))
+
+    def set(self, function: str, *args_and_content: Content) -> None:
+        """The function is worth this now: `tx.set("failures", "cup1", 2)`, `tx.set("pose", "cup1", "map", (0.4, 0.1))`.
 
         Raises:
             UnknownNameError: an undeclared function, or a thing that is not there.
-            SchemaError: a wrong number of arguments, a wrong type, or the last one is no number.
-            InputError: the number is missing or not finite.
+            SchemaError: a wrong number of arguments, a wrong type of one of them or of the content.
+            InputError: there is no content, or a number in it is not finite.
         """
-        if not args_and_number:
-            raise InputError(f"set('{function}', ...) ends with the number to set")
-        *args, number = args_and_number
-        if isinstance(number, str):
-            raise InputError(f"set('{function}', ...) ends with the number to set, not '{number}'")
-        self.apply(Delta(values={Fact(function, tuple(args)): number}))
+        if not args_and_content:
+            raise InputError(f"set('{function}', ...) ends with the content to set")
+        *args, content = args_and_content
+        # A geometry among the arguments is refused like any other argument of a wrong type.
+        self.apply(Delta(values={Fact(function, tuple(cast("list[Value]", args))): content}))
 
     def apply(self, delta: Delta) -> None:
         """Make all the changes of `delta`, or none when one of them is an error.
@@ -95,13 +101,11 @@ class Transaction:
 
     def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[dict[str, Value]]:
         """As `KnowledgeBase.query`, with the changes so far."""
-        params = params or {}
-        return query(self._questions.query(text, params, self._view), self._view, params)
+        return self._questions.answers(text, params or {}, self._view)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """As `KnowledgeBase.ask`, with the changes so far."""
-        params = params or {}
-        return holds(self._questions.condition(text, params, self._view), self._view, params)
+        return self._questions.ask(text, params or {}, self._view)
 
     def close(self) -> None:
         """No more changes; called when the block is left."""

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from threading import RLock
 
 from knowledge_base.exchange.json import to_json
-from knowledge_base.facts import Fact, Value
-from knowledge_base.language.evaluation import Explanation, explain, holds, query
-from knowledge_base.language.expression import Expression
+from knowledge_base.exchange.problem_writer import problem_to_text
+from knowledge_base.facts import Content, Fact, Value
+from knowledge_base.language.evaluation import Explanation, explain
+from knowledge_base.language.expression import TRUE, Expression
+from knowledge_base.language.query_plan import QueryPlan, plan_query
 from knowledge_base.overlay import Overlay
 from knowledge_base.questions import Questions
 from knowledge_base.schema import Schema
@@ -46,7 +48,8 @@ class View:
     def graph(self) -> Graph:
         """The world as a graph, read-only; see `world_graph` for its form.
 
-        That of a `KnowledgeBase` follows every commit; other threads must not commit while it is being walked.
+        It is made when it is first asked for. That of a `KnowledgeBase` follows every commit from then on; other
+        threads must not commit while it is being walked.
         """
         with self._lock:
             if self._graph is None:
@@ -68,13 +71,13 @@ class View:
         """
         params = params or {}
         with self._lock:
-            return query(self._questions.query(text, params, self._state), self._state, params)
+            return self._questions.answers(text, params, self._state)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
         params = params or {}
         with self._lock:
-            return holds(self._questions.condition(text, params, self._state), self._state, params)
+            return self._questions.ask(text, params, self._state)
 
     def explain(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> Explanation:
         """Why the text is true or false; errors as for `ask`."""
@@ -82,19 +85,40 @@ class View:
         with self._lock:
             return explain(self._questions.condition(text, params, self._state), self._state, params)
 
+    def explain_query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> QueryPlan:
+        """How the query would run on the world as it is: what is looked up, in which order; errors as for `query`."""
+        params = params or {}
+        with self._lock:
+            return plan_query(self._questions.query(text, params, self._state), self._state, params)
+
     def overlay(self) -> Overlay:
         """A world of pending changes on top of this one, which stays as it is."""
         return Overlay(self)
 
     def snapshot(self) -> WorldState:
-        """The world as it is now, as a copy that nothing changes."""
+        """The world as it is now, latest values of sources included, as a copy that nothing changes."""
         with self._lock:
-            return self._state.copy()
+            return self._state.copy(fed=True)
 
     def to_json(self) -> str:
         """All of it as JSON, schema and version included; `KnowledgeBase.from_json` reads it back."""
         with self._lock:
             return to_json(self._state, self._version)
+
+    def to_pddl(self, domain: str, name: str = "world", goal: str | Expression | None = None) -> str:
+        """All of it as a PDDL problem for the domain of that name, which is not written.
+
+        Args:
+            domain: what the domain is called.
+            name: what the problem is called.
+            goal: what is wanted, if anything.
+
+        Raises:
+            InputError: as for `ask`, for the goal; and a name or number that PDDL cannot spell.
+        """
+        with self._lock:
+            wanted = TRUE if goal is None else self._questions.condition(goal, {}, self._state)
+            return problem_to_text(self._state, name, domain, wanted)
 
     def nodes(self) -> dict[str, str]:
         """All things with their types, in order of insertion."""
@@ -106,8 +130,8 @@ class View:
         with self._lock:
             return list(self._state.facts)
 
-    def values(self) -> dict[Fact, float]:
-        """The numeric fluents that were set."""
+    def values(self) -> dict[Fact, Content]:
+        """What functions were set to."""
         with self._lock:
             return dict(self._state.values)
 
@@ -126,10 +150,19 @@ class View:
         with self._lock:
             return self._state.estimate(predicate, pattern)
 
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value; 0 until it is set."""
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth; until it is set 0, `""`, `False` or `()`, as is its type.
+
+        Raises:
+            UnknownNameError: there is no such function.
+        """
         with self._lock:
             return self._state.value(function, args)
+
+    def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
+        """Where what the function is worth comes from, if a source feeds it."""
+        with self._lock:
+            return self._state.reference(function, args)
 
     def objects(self, type_name: str) -> list[str]:
         """The things of that type or a subtype, in order of insertion.

@@ -1,10 +1,11 @@
 """The world model as a networkx graph, for everyone who wants to look at it or run algorithms on it.
 
 Things are nodes with a `type`. A fact about two things is an arc from the first to the second whose key is
-the predicate; a fact about one thing is an arc from it to itself (S4.4). Numeric fluents of one or two
-things are arcs likewise, with the number as `value` (S4.3: arcs have symbolic or numeric content). Facts and
+the predicate; a fact about one thing is an arc from it to itself (S4.4). What a function of one or two things
+is worth is an arc likewise, with the content as `value` (S4.3: symbolic or geometric content). Facts and
 fluents with another number of arguments, or with values among them, are nodes of their own: the `Fact` itself
-with `relation` set to its name (and `value`), and an arc to each thing in it whose key is the position.
+with `relation` set to its name (and `value`), and an arc to each thing in it whose key is the position. What is
+fed by a source has its reference as `source` (S4.9).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any, TypeAlias
 
 import networkx as nx
 
-from knowledge_base.facts import Delta, Fact
+from knowledge_base.facts import Content, Delta, Fact
 from knowledge_base.schema import VALUE_TYPES, Signature
 from knowledge_base.state import WorldState
 
@@ -25,11 +26,15 @@ class WorldGraph:
     """Keeps the graph in step with committed changes."""
 
     def __init__(self, state: WorldState) -> None:
-        self._schema = state.schema
+        declared = {**state.schema.predicates, **state.schema.functions}
+        self._arcs = frozenset(name for name, signature in declared.items() if _is_arc(signature))
+        self._things = {name: _thing_positions(signature) for name, signature in declared.items()}
         self._graph: Graph = nx.MultiDiGraph()
         self.view: Graph = self._graph.copy(as_view=True)
         """The graph, live and read-only."""
         self.commit(Delta(nodes=state.nodes, added=tuple(state.facts), values=state.values))
+        for fluent, reference in state.references.items():
+            self.feed(fluent, reference, state.value(fluent.predicate, fluent.args))
 
     def commit(self, effective: Delta) -> None:
         """Make a change that lists exactly what becomes different."""
@@ -40,20 +45,30 @@ class WorldGraph:
         for name, type_name in effective.nodes.items():
             self._graph.add_node(name, type=type_name)
         for fact in effective.added:
-            self._put(fact, self._schema.predicates[fact.predicate], {})
-        for fluent, number in effective.values.items():
-            self._put(fluent, self._schema.functions[fluent.predicate], {"value": number})
+            self._put(fact, {})
+        for fluent, content in effective.values.items():
+            self._put(fluent, {"value": content})
 
-    def _put(self, fact: Fact, signature: Signature, content: Mapping[str, float]) -> None:
-        if _is_arc(signature):
+    def feed(self, fluent: Fact, reference: str, content: Content) -> None:
+        """A fluent is fed from outside and worth this now."""
+        self._put(fluent, {"value": content, "source": reference})
+
+    def unfeed(self, fluent: Fact, kept: Content | None) -> None:
+        """It is not fed any more; `kept` is what it was set to, if it was."""
+        self._remove(fluent)
+        if kept is not None:
+            self._put(fluent, {"value": kept})
+
+    def _put(self, fact: Fact, content: Mapping[str, Content]) -> None:
+        if fact.predicate in self._arcs:
             self._graph.add_edge(fact.args[0], fact.args[-1], key=fact.predicate, **content)
             return
         self._graph.add_node(fact, relation=fact.predicate, **content)
-        for position in _thing_positions(signature):
+        for position in self._things[fact.predicate]:
             self._graph.add_edge(fact, fact.args[position], key=position)
 
     def _remove(self, fact: Fact) -> None:
-        if _is_arc(self._schema.predicates[fact.predicate]):
+        if fact.predicate in self._arcs:
             self._graph.remove_edge(fact.args[0], fact.args[-1], key=fact.predicate)
         else:
             self._graph.remove_node(fact)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.action_text import ActionText
@@ -29,8 +29,9 @@ from knowledge_base.schema import ROOT_TYPE, Schema
 from planning.fragments import merged_text, searched, text_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
+    from knowledge_base.computation import Computed
     from knowledge_base.facts import Delta
     from knowledge_base.language.effect import Effect
     from planning.plan import PlanStep
@@ -91,22 +92,30 @@ class PlanningDomain:
     notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @classmethod
-    def from_pddl(cls, path: str | Path, *more: str | Path) -> PlanningDomain:
+    def from_pddl(cls, path: str | Path, *more: str | Path, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
         """The domain of a PDDL file, or of several that each have a part of it.
+
+        Args:
+            path: the file.
+            *more: others.
+            computed: predicates that its conditions use and that Python computes.
 
         Raises:
             InputError: a file cannot be read or contains a mistake; it says where.
         """
-        return cls.from_fragments([Path(one) for one in (path, *more)])
+        return cls.from_fragments([Path(one) for one in (path, *more)], computed)
 
     @classmethod
-    def from_fragments(cls, fragments: Iterable[PlanningDomain | DomainText | Path | str]) -> PlanningDomain:
+    def from_fragments(
+        cls, fragments: Iterable[PlanningDomain | DomainText | Path | str], computed: Iterable[Computed[Any]] = ()
+    ) -> PlanningDomain:
         """The domain that fragments make together, with the name of the first.
 
         A fragment may use what another declares, wherever it stands. The same declared twice is fine.
 
         Args:
             fragments: PDDL files (a `Path`, or a name), PDDL texts, or domains; at least one.
+            computed: predicates that their conditions use and that Python computes; a domain brings its own.
 
         Raises:
             InputError: a fragment cannot be read or contains a mistake, or two contradict each other; it says
@@ -119,25 +128,27 @@ class PlanningDomain:
             return pieces[0]
         texts = [_text(piece) for piece in pieces]
         with searched(texts):
-            return cls.from_text(merged_text(texts))
+            return cls.from_text(merged_text(texts), (*_computed(pieces), *computed))
 
     @classmethod
-    def parse(cls, text: str, source: str | None = None) -> PlanningDomain:
+    def parse(
+        cls, text: str, source: str | None = None, computed: Iterable[Computed[Any]] = ()
+    ) -> PlanningDomain:
         """The domain given as text; `source` names it in messages.
 
         Raises:
             InputError: it contains a mistake; it says where.
         """
-        return cls.from_text(parse_domain(text, source))
+        return cls.from_text(parse_domain(text, source), computed)
 
     @classmethod
-    def from_text(cls, read: DomainText) -> PlanningDomain:
+    def from_text(cls, read: DomainText, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
         """The domain that a file, or several together, declare.
 
         Raises:
             InputError: it contains a mistake; it says where.
         """
-        schema = Schema.from_text(read)
+        schema = Schema.from_text(read).with_computed(*computed)
         actions = {a.name: _checked(a, schema) for a in read.actions}
         axioms = tuple(_checked_axiom(a, schema) for a in read.axioms)
         _refuse_changed(actions.values(), axioms)
@@ -183,6 +194,12 @@ class PlanningDomain:
                 f"'{step.action}' takes {len(parameters)} arguments, {step} has {len(step.args)}"
             )
         return {p.name: arg for p, arg in zip(parameters, step.args, strict=True)}
+
+
+def _computed(pieces: Iterable[object]) -> Iterator[Computed[Any]]:
+    for piece in pieces:
+        if isinstance(piece, PlanningDomain):
+            yield from piece.schema.computed.values()
 
 
 def _text(fragment: PlanningDomain | DomainText | Path | str) -> DomainText:

@@ -7,7 +7,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Fact
+from knowledge_base.language.world import World
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,3 +201,15 @@ def from_json(data: Any) -> Quantity:
             return Operation(name, tuple(map(from_json, args)))
         case _:
             return float(data) if isinstance(data, float) else int(data)
+
+
+def worth(world: World, fluent: Fact) -> float:
+    """What a numeric fluent is worth in the world.
+
+    Raises:
+        SchemaError: its function is worth something else.
+    """
+    content = world.value(fluent.predicate, fluent.args)
+    if not isinstance(content, int | float):
+        raise SchemaError(f"{fluent} is no number")
+    return content

@@ -9,6 +9,7 @@ from dsc.dynamic.outcomes import Plots
 from dsc.engine.situation import Decision, Verdict
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState
+from knowledge_base.facts import Content
 from knowledge_base.language.evaluation import World, evaluate_term, explain, holds
 from knowledge_base.language.expression import Constant, substitute
 from knowledge_base.language.printer import to_text
@@ -31,7 +32,7 @@ def choose(
     goal = None if state.goal is None else substitute(state.goal, scalars(bindings))
     if goal is not None and holds(goal, world, {}):
         return Decision(None, satisfied=True, version=version)
-    arguments = {name: evaluate_term(term, world, bindings) for name, term in state.arguments.items()}
+    arguments = {name: plain(evaluate_term(term, world, bindings)) for name, term in state.arguments.items()}
     chosen: str | None = None
     chosen_arguments: dict[str, Any] = {}
     verdicts = []
@@ -66,6 +67,11 @@ def _defaults(plot: ActionPlot) -> dict[str, Any]:
         for name, parameter in plot.parameters.items()
         if isinstance(parameter.default, Constant)
     }
+
+
+def plain(content: Content) -> Any:
+    """What a chart's variable may hold of it: plain JSON, so a geometry is a list of numbers."""
+    return list(content) if isinstance(content, tuple) else content
 
 
 def scalars(bindings: Mapping[str, Any]) -> dict[str, Any]:

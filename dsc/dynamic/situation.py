@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from dsc.dynamic.library import Library
-from dsc.dynamic.selection import choose, scalars
+from dsc.dynamic.selection import choose, plain, scalars
 from dsc.engine.situation import Bindings, Decision
 from dsc.model.states import DynamicState
-from knowledge_base.facts import Delta, Value
+from knowledge_base.facts import Delta
 from knowledge_base.language.effect import Effect
 from knowledge_base.language.evaluation import apply_effect, evaluate_term, holds
 from knowledge_base.language.expression import Expression, Term
@@ -25,9 +27,9 @@ class KnowledgeSituation:
         """See `Situation`."""
         return holds(expression, self._world, bindings)
 
-    def value(self, term: Term, bindings: Bindings) -> Value:
+    def value(self, term: Term, bindings: Bindings) -> Any:
         """See `Situation`."""
-        return evaluate_term(term, self._world, bindings)
+        return plain(evaluate_term(term, self._world, bindings))
 
     def tell(self, effect: Effect, bindings: Bindings) -> Delta:
         """See `Situation`."""

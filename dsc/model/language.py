@@ -9,15 +9,18 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Discriminator, PlainSerializer, PlainValidator, WithJsonSchema
 
 from knowledge_base.errors import InputError
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import AllOf, Effect
 from knowledge_base.language.expression import Constant, Expression, Term
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
 from knowledge_base.language.printer import to_text
+
+_Parsed = TypeVar("_Parsed", Expression, Term, Effect)
 
 _SYMBOL = re.compile(r"[a-z0-9_][a-z0-9_\-#~.]*", re.IGNORECASE)
 
@@ -61,9 +64,17 @@ def _written_keys(kind: Any) -> set[str]:
     return {field.alias or name for name, field in fields.items()}
 
 
+def _not_too_deep(value: _Parsed) -> _Parsed:
+    try:
+        check_depth(value)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+    return value
+
+
 def _condition(value: Any) -> Expression:
     if isinstance(value, Expression):
-        return value
+        return _not_too_deep(value)
     if not isinstance(value, str):
         raise ValueError(f"a condition was expected, as text such as (on ?o table); found {value!r}")
     try:
@@ -74,7 +85,7 @@ def _condition(value: Any) -> Expression:
 
 def _term(value: Any) -> Term:
     if isinstance(value, Term):
-        return value
+        return _not_too_deep(value)
     if isinstance(value, bool | int | float):
         if not math.isfinite(value):
             raise ValueError(f"a finite number was expected; found {value!r}")
@@ -91,7 +102,7 @@ def _term(value: Any) -> Term:
 
 def _effect(value: Any) -> Effect:
     if isinstance(value, Effect):
-        return value
+        return _not_too_deep(value)
     if isinstance(value, list | tuple):
         return AllOf(tuple(_effect(part) for part in value))
     if not isinstance(value, str):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -96,10 +96,15 @@ class Sequencer:
         self._listeners: list[StepListener] = []
         self._coming: set[asyncio.TimerHandle] = set()
         self._in_vain: set[tuple[int, int]] = set()
+        self._before_events: list[Callable[[], Awaitable[None]]] = []
 
     def listen(self, listener: StepListener) -> None:
         """Tell `listener` every macrostep from now on, before its actions leave."""
         self._listeners.append(listener)
+
+    def wait_before_events(self, wait: Callable[[], Awaitable[None]]) -> None:
+        """Await `wait` before each event is taken: how a run is held still, e.g. at a breakpoint."""
+        self._before_events.append(wait)
 
     def working_for(self, action_id: str) -> frozenset[str]:
         """Names of the components that carry out skills for the content of the state that started `action_id`."""
@@ -147,12 +152,16 @@ class Sequencer:
         # Before anybody who is started by the run subscribes: what follows from a change is recorded after it.
         unsubscribe = self.knowledge.subscribe(self._tracer.knowledge)
         try:
+            self._tracer.world(self.knowledge)
             self._start(plot, arguments or {}, progress)
             while not self.machine.state.finished and progress.problem is None:
                 if self._idle():
                     progress.problem = "nothing is going on and nothing can happen any more"
                     break
-                self._take(await self._inbox.get(), progress)
+                message = await self._inbox.get()
+                for wait in self._before_events:
+                    await wait()
+                self._take(message, progress)
         finally:
             for handle in self._coming:
                 handle.cancel()

@@ -6,6 +6,7 @@ from typing import Any
 
 from dsc.engine.steps import (
     Cancel,
+    Microstep,
     Note,
     Output,
     Revoke,
@@ -18,7 +19,9 @@ from dsc.engine.steps import (
 )
 from dsc.events import Event
 from dsc.trace import Trace
+from knowledge_base.exchange.forms import delta_form, schema_form, world_form
 from knowledge_base.facts import Change
+from knowledge_base.store import KnowledgeBase
 
 
 class StepTracer:
@@ -27,6 +30,12 @@ class StepTracer:
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
         self._known_plots: set[str] = set()
+
+    def world(self, knowledge: KnowledgeBase) -> None:
+        """All that is known at the start; what follows are changes of it. Left out while nobody listens."""
+        if self._trace.heard:
+            known = {"schema": schema_form(knowledge.schema), **world_form(knowledge.snapshot())}
+            self._trace.record("world", version=knowledge.version, **known)
 
     def event(self, event: Event, source: str, original: str | None = None) -> int:
         """An event that came in; `original` is the skill's own name for it where the chart uses another."""
@@ -51,6 +60,7 @@ class StepTracer:
                     ],
                     "exited": list(micro.exited),
                     "entered": list(micro.entered),
+                    **_bound(micro),
                 }
                 for micro in step.microsteps
             ],
@@ -79,19 +89,10 @@ class StepTracer:
 
     def knowledge(self, change: Change) -> None:
         """A committed change of the knowledge base, if any; what nothing else led to is itself a cause."""
-        delta = change.delta
-        if not delta:
+        if not change.delta:
             return
-        seq = self._trace.record(
-            "knowledge",
-            version=change.version,
-            author=change.author,
-            nodes=dict(delta.nodes),
-            removed=[str(f) for f in delta.removed],
-            added=[str(f) for f in delta.added],
-            values={str(f): value for f, value in delta.values.items()},
-            **({"removed_nodes": list(delta.removed_nodes)} if delta.removed_nodes else {}),
-        )
+        said = delta_form(change.delta)
+        seq = self._trace.record("knowledge", version=change.version, author=change.author, **said)
         self._trace.cause = self._trace.cause or seq
 
     def output(self, output: Output) -> int | None:
@@ -120,6 +121,12 @@ class StepTracer:
             if digest not in self._known_plots:
                 self._known_plots.add(digest)
                 self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
+
+
+def _bound(micro: Microstep) -> dict[str, Any]:
+    """Which plots became the content of which states; the texts of the plots are records of their own."""
+    bound = [{"state": b.state, "plot": b.plot.name, "hash": b.plot.digest} for b in micro.bound]
+    return {"bound": bound} if bound else {}
 
 
 def _told_once(value: Any) -> Any:

@@ -18,7 +18,7 @@ from knowledge_base.facts import Value
 
 if TYPE_CHECKING:
     from knowledge_base.conditions.installed import Installed
-    from knowledge_base.conditions.relation import Relation
+    from knowledge_base.conditions.shape import Args
 
 Fire = Literal["edge", "each"]
 FIRE: tuple[Fire, ...] = ("edge", "each")
@@ -47,19 +47,6 @@ FiringListener = Callable[[Firing], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """Where a condition stands: the relation of its shape and its row there."""
-
-    relation: Relation
-    row: Row
-
-    def witness(self) -> dict[str, Value] | None:
-        """A choice for the condition's answers that makes it true."""
-        first = next(iter(self.row.witnesses), None)
-        return None if first is None else dict(zip(self.relation.shape.answers, first, strict=True))
-
-
-@dataclass(frozen=True, slots=True)
 class Terms:
     """On which terms a condition fires; see `KnowledgeBase.install`."""
 
@@ -71,7 +58,7 @@ class Terms:
 @dataclass(slots=True)
 class _Reading:
     truth: bool
-    witness: dict[str, Value] | None
+    witness: Args | None
     version: int
 
 
@@ -88,23 +75,26 @@ class Condition:
     As a context manager it is cancelled at the end of the block. All of it may be used from any thread.
     """
 
-    def __init__(self, owner: Installed, text: str, places: tuple[Place, Place], terms: Terms, number: int) -> None:
-        rise, _ = self.places = places
+    def __init__(
+        self, owner: Installed, text: str, rows: tuple[Row, Row], names: tuple[str, ...], terms: Terms, number: int
+    ) -> None:
+        rise, _ = self.rows = rows
         self.text = text
         """The condition with its parameters filled in, for messages."""
         self.number = number
         """The how-manieth it was to be installed: the order of firing within a version."""
         self._owner = owner
         self._terms = terms
-        self._now = _Reading(rise.row.truth, rise.witness(), owner.version)
-        self._told_true = rise.row.truth and terms.hold is None
+        self._names = names
+        self._now = _Reading(rise.truth, rise.witness, owner.version)
+        self._told_true = rise.truth and terms.hold is None
         self._listening: dict[int, _Listening] = {}
         self._keys = count()
         self._guard = Lock()
         self._waiters: Waiters[Firing] = Waiters()
         self._last: Firing | None = None
         self._fired = 0
-        self._since = self._now.version
+        self._rises = 0
         self._installed = True
         self._silent = False
         self._closed = False
@@ -118,7 +108,7 @@ class Condition:
     def witness(self) -> dict[str, Value] | None:
         """A choice for its free variables that makes it true (`{}` if it has none); `None` when it is false."""
         found = self._now.witness
-        return None if found is None else dict(found)
+        return None if found is None else dict(zip(self._names, found, strict=True))
 
     @property
     def version(self) -> int:
@@ -129,7 +119,7 @@ class Condition:
     def error(self) -> InputError | None:
         """Why it cannot be computed at present, e.g. a division by zero; it then counts as false."""
         with self._owner.lock:
-            return next((e for p in self.places if (e := p.relation.error(p.row)) is not None), None)
+            return next((e for row in self.rows if (e := row.relation.error(row)) is not None), None)
 
     @property
     def fired(self) -> int:
@@ -205,17 +195,17 @@ class Condition:
 
     def judge(self, version: int, changed: Container[Row]) -> None:
         """Its rows are up to date with `version`, which `changed` the witnesses of at least one of them."""
-        rise, stay = self.places
+        rise, stay = self.rows
         was = self._now.truth
-        truth = rise.row.truth or (was and stay.row.truth)
+        truth = rise.truth or (was and stay.truth)
         if not (truth or was):
             return
-        self._now = _Reading(truth, (rise.witness() or stay.witness()) if truth else None, version)
+        self._now = _Reading(truth, (stay if rise.witness is None else rise).witness if truth else None, version)
         if not truth:
             self._fall()
         elif not was:
             self._rise()
-        elif self._terms.fire == "each" and self._told_true and stay.row in changed:
+        elif self._terms.fire == "each" and self._told_true and stay in changed:
             self._fire()
 
     def uninstall(self) -> None:
@@ -227,7 +217,7 @@ class Condition:
     # --- firing: decided under the lock, told in order when it is released
 
     def _rise(self) -> None:
-        self._since = self._now.version
+        self._rises += 1
         if self._terms.hold is None:
             self._fire()
         else:
@@ -276,15 +266,15 @@ class Condition:
     def _hold(self) -> None:
         hold = self._terms.hold
         if hold is not None:
-            self._owner.later(partial(self._start_hold, hold, hold.due(), partial(self._held, self._since)))
+            self._owner.later(partial(self._start_hold, hold, hold.due(), partial(self._held, self._rises)))
 
     def _start_hold(self, hold: Hold, due: float, over: Callable[[], None]) -> None:
         if self._installed:
             hold.start(due, over)
 
-    def _held(self, since: int) -> None:
+    def _held(self, rises: int) -> None:
         """The clock says that it has been true for long enough, unless it has become true anew meanwhile."""
         with self._owner.lock:
-            if self._installed and self._now.truth and self._since == since:
+            if self._installed and self._now.truth and self._rises == rises:
                 self._fire()
         self._owner.deliver()

@@ -28,7 +28,7 @@ Kind = Literal["said", "type"]
 """`said`: by facts and numbers, whose names differ; `type`: by the type of things."""
 
 BOTH = 0
-"""The polarity of numbers: any change of one can make a condition true, or false."""
+"""The polarity of numbers and of what is computed from: any change can make a condition true, or false."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +61,12 @@ class _Walk:
 
     def expression(self, e: Expression, polarity: int, hidden: frozenset[str]) -> Iterator[Occurrence]:
         match e:
+            case Atom(name, args) if name in self._schema.computed:
+                for read in self._schema.computed[name].inputs(args):
+                    if isinstance(read, Atom):
+                        yield from self.expression(read, BOTH, hidden)
+                    else:
+                        yield from self.numbers((read,), hidden)
             case Atom(name, args):
                 kind: Kind = "type" if self._schema.is_type(name, len(args)) else "said"
                 yield _occurrence(kind, name, polarity, args, hidden)

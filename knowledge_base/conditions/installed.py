@@ -1,7 +1,7 @@
 """All installed conditions of a knowledge base, found by what a change touches.
 
-Every commit passes here under the lock, so that each version is judged exactly. Which shapes it can affect is
-one look-up for each changed fact, number or type; shapes that do not read it are not looked at.
+Every commit passes here under the lock, so that each version is judged exactly. Whom it can affect is looked up
+for each changed fact, number or type (`readers`); conditions that do not agree with it are not looked at.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from threading import RLock
 
 from knowledge_base.announcement import Announcer
 from knowledge_base.conditions.clock import Clock
-from knowledge_base.conditions.condition import FIRE, Condition, Fire, Place, Terms
-from knowledge_base.conditions.dependencies import BOTH, Kind
+from knowledge_base.conditions.condition import FIRE, Condition, Fire, Terms
+from knowledge_base.conditions.dependencies import BOTH, Kind, Occurrence
 from knowledge_base.conditions.holding import Hold
 from knowledge_base.conditions.hysteresis import relaxed
-from knowledge_base.conditions.relation import Hit, Relation
+from knowledge_base.conditions.readers import Readers
+from knowledge_base.conditions.relation import Relation
 from knowledge_base.conditions.rows import Row
-from knowledge_base.conditions.shape import Args, Shape, lifted
-from knowledge_base.conditions.trigger import Trigger
+from knowledge_base.conditions.shape import Args, Lifted, Shape, lifted
 from knowledge_base.errors import InputError
-from knowledge_base.facts import Delta, Value
+from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.expression import Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.schema import Schema
@@ -51,9 +51,6 @@ Event = tuple[Kind, str, Args, int]
 """One fact, number or type that a change makes different: its name, arguments, and `MORE`, `LESS` or `BOTH`."""
 
 
-_NOBODY: dict[Trigger, Relation] = {}
-
-
 class Installed:
     """The relations of a knowledge base's conditions by shape; all but `later` and `deliver` under its lock."""
 
@@ -63,7 +60,8 @@ class Installed:
         self._world = world
         self._announcer = announcer
         self._relations: dict[Shape, Relation] = {}
-        self._readers: dict[tuple[Kind, str], dict[Trigger, Relation]] = {}
+        self._readers: dict[tuple[Kind, str], Readers] = {}
+        self._changed: dict[Row, None] = {}
         self._numbers = 0
 
     def install(self, e: Expression, params: Mapping[str, Value], terms: Terms, hysteresis: float | None) -> Condition:
@@ -73,32 +71,38 @@ class Installed:
             InputError: there is nothing that the hysteresis could be about.
         """
         eased = e if hysteresis is None else relaxed(e, hysteresis)
-        rise = self._place(e, params)
-        places = rise, rise if eased is e else self._place(eased, params)
+        found = lifted(e, params, self._schema)
+        rise = self._row(found)
+        stay = rise if eased is e else self._row(lifted(eased, params, self._schema))
         self._numbers += 1
-        condition = Condition(self, to_text(substitute(e, params)), places, terms, self._numbers)
-        for place in places:
-            place.row.conditions[condition] = None
+        condition = Condition(self, to_text(substitute(e, params)), (rise, stay), found.names, terms, self._numbers)
+        for row in (rise, stay):
+            row.conditions[condition] = None
         if terms.fire == "each":
-            places[1].relation.want_all(places[1].row, self._world)
+            stay.relation.want_all(stay)
         condition.begin()
         return condition
 
     def remove(self, condition: Condition) -> None:
         """Forget a condition, and what was kept for it alone."""
-        for place in condition.places:
-            place.row.conditions.pop(condition, None)
-            if not place.row.conditions and place.row.key in place.relation.rows:
-                place.relation.drop(place.row)
-                if not place.relation.rows:
-                    self._forget(place.relation)
+        for row in condition.rows:
+            row.conditions.pop(condition, None)
+            if not row.conditions and row.key in row.relation.rows:
+                row.relation.drop(row)
+                if not row.relation.rows:
+                    self._relations.pop(row.relation.shape, None)
+
+    def conditions(self) -> list[Condition]:
+        """All that are installed, in the order of installation."""
+        rows = (row for relation in self._relations.values() for row in relation.rows.values())
+        return sorted({c for row in rows for c in row.conditions}, key=lambda c: c.number)
 
     def departures(self, effective: Delta) -> list[Event]:
         """The types and numbers that go with removed things; to be asked for before the change is made."""
         gone = set(effective.removed_nodes)
         if not (gone and self._relations):
             return []
-        numbers = [f for f in self._world.values if not gone.isdisjoint(f.args)]
+        numbers = self._world.values_about(gone)
         types = [(name, t) for name in gone if (t := self._world.type_of(name)) is not None]
         return [
             *(("said", f.predicate, f.args, BOTH) for f in numbers),
@@ -108,18 +112,12 @@ class Installed:
     def commit(self, effective: Delta, departures: list[Event], version: int) -> None:
         """Judge the change that the world has made, and queue what has to be told."""
         self.version = version
-        if not self._relations:
-            return
-        hits: dict[Relation, list[Hit]] = {}
-        for kind, name, args, sign in (*departures, *self._events(effective)):
-            for trigger, relation in self._readers.get((kind, name), _NOBODY).items():
-                hits.setdefault(relation, []).append((trigger, args, sign))
-        changed: dict[Row, None] = {}
-        for relation, own in hits.items():
-            changed.update(dict.fromkeys(relation.update(own, self._world)))
-        touched = {condition for row in changed for condition in row.conditions}
-        for condition in sorted(touched, key=lambda c: c.number):
-            condition.judge(version, changed)
+        if self._relations:
+            self._judge([*departures, *self._events(effective)])
+
+    def refreshed(self, fluent: Fact) -> None:
+        """A fluent is worth something else, and no version was made: a source feeds it."""
+        self._judge([("said", fluent.predicate, fluent.args, BOTH)])
 
     def later(self, call: Callable[[], None]) -> None:
         """Queue a call for when the lock is released; under the lock."""
@@ -144,18 +142,30 @@ class Installed:
         for fluent in effective.values:
             yield "said", fluent.predicate, fluent.args, BOTH
 
-    def _place(self, e: Expression, params: Mapping[str, Value]) -> Place:
-        shape, key = lifted(e, params, self._schema)
-        relation = self._relations.get(shape)
-        if relation is None:
-            relation = self._relations[shape] = Relation(shape, self._schema)
-            for trigger in relation.triggers:
-                read = trigger.occurrence.kind, trigger.occurrence.name
-                self._readers.setdefault(read, {})[trigger] = relation
-        return Place(relation, relation.row(key, self._world))
+    def _judge(self, events: list[Event]) -> None:
+        """Bring all rows up to date with what has happened, and tell the conditions of those that changed."""
+        known = self._readers
+        reached = [(known[kind, name], args, sign) for kind, name, args, sign in events if (kind, name) in known]
+        self._changed.clear()
+        suspects = dict.fromkeys(s for readers, args, sign in reached for s in readers.broken(args, sign))
+        renewed = [row for row, witness in suspects if row.relation.loses(row, witness)]
+        failing = dict.fromkeys(relation for readers, _, _ in reached for relation in readers.failing)
+        for row in dict.fromkeys((*renewed, *(row for relation in failing for row in relation.failed))):
+            row.relation.renew(row)
+        for readers, args, sign in reached:
+            for trigger, rows in tuple(readers.made(args, sign)):
+                if rows:  # still, for what came before may have closed them
+                    next(iter(rows)).relation.make(trigger, args, rows)
+        touched = {condition for row in self._changed for condition in row.conditions}
+        for condition in sorted(touched, key=lambda c: c.number):
+            condition.judge(self.version, self._changed)
 
-    def _forget(self, relation: Relation) -> None:
-        self._relations.pop(relation.shape, None)
-        for trigger in relation.triggers:
-            readers = self._readers.get((trigger.occurrence.kind, trigger.occurrence.name), {})
-            readers.pop(trigger, None)
+    def _row(self, found: Lifted) -> Row:
+        relation = self._relations.get(found.shape)
+        if relation is None:
+            relation = Relation(found.shape, self._world, self._readers_of, self._changed)
+            self._relations[found.shape] = relation
+        return relation.row(found.key)
+
+    def _readers_of(self, occurrence: Occurrence) -> Readers:
+        return self._readers.setdefault((occurrence.kind, occurrence.name), Readers())

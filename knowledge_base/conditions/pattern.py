@@ -32,6 +32,8 @@ def touches(pattern: Expression, params: Mapping[str, Value], schema: Schema) ->
     if name in schema.functions:
         check_arity(schema.functions[name], len(pattern.args), pattern.place)
         return lambda change: _numbered(change.delta, name, fits)
+    if name in schema.computed:
+        raise schema.computed[name].refused(pattern.place)
     if name not in schema.predicates:
         valid = (*schema.predicates, *schema.functions, *schema.types)
         message = f"there is no predicate, function or type '{name}'"

@@ -3,10 +3,11 @@
 What is incremental: a row keeps one witness (all, where each change of them counts) and is true while it has
 one. A change that can break a condition is looked up among the arguments the kept witnesses rely on, and only
 those witnesses are tested again; a row that lost its last one is searched anew. A change that can make a
-condition true is joined with the rest of the condition and the rows that are open, beginning with what the
-changed fact binds. What is re-evaluated as a whole: the part under `not` with a quantifier, `imply` and
-`forall`, for each row or witness whose bound arguments agree with the change; and all open rows, where the
-change binds none of the condition's own variables (`(forall (?c - cup) (clean ?c))`).
+condition true is looked up among the open rows whose parameters agree with it, of all shapes at once (`readers`),
+and joined with the rest of the condition and those rows, beginning with what the changed fact binds. What is
+re-evaluated as a whole: the part under `not` with a quantifier, `imply` and `forall`, for each row or witness
+whose bound arguments agree with the change; and all open rows, where the change binds none of the condition's own
+variables (`(forall (?c - cup) (clean ?c))`).
 
 A condition that cannot be computed (a division by zero) is not true, and is tried again at every change of
 what it reads.
@@ -14,139 +15,125 @@ what it reads.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 
-from knowledge_base.conditions.dependencies import occurrences
-from knowledge_base.conditions.rows import ROWS, Row, RowsWorld, row_fact
+from knowledge_base.conditions.dependencies import Occurrence, occurrences
+from knowledge_base.conditions.readers import Readers
+from knowledge_base.conditions.rows import Row, RowsWorld, row_fact
 from knowledge_base.conditions.shape import Args, Shape
 from knowledge_base.conditions.trigger import Trigger
 from knowledge_base.errors import InputError
 from knowledge_base.index import FactIndex
 from knowledge_base.language.compiler import compile_query, compile_test
 from knowledge_base.language.terms import Bindings
-from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
-
-Hit = tuple[Trigger, Args, int]
-"""What a change does to a shape: where, with which arguments, and 1 for more, -1 for less, 0 for a number."""
 
 
 class Relation:
-    """A shape with its rows."""
+    """A shape with its rows.
 
-    def __init__(self, shape: Shape, schema: Schema) -> None:
+    Args:
+        shape: the conditions without their values.
+        world: what they are about; it has a change already when it is told here.
+        readers: all who read what an occurrence is about.
+        changed: gets the rows whose witnesses become others.
+    """
+
+    def __init__(
+        self, shape: Shape, world: WorldState, readers: Callable[[Occurrence], Readers], changed: dict[Row, None]
+    ) -> None:
+        schema = world.schema
         self.shape = shape
-        self.triggers = tuple(Trigger(o, shape, schema) for o in occurrences(shape.body, schema))
         self.rows: dict[Args, Row] = {}
+        self._world = world
+        self._triggers = tuple(Trigger(o, shape, schema, readers(o)) for o in occurrences(shape.body, schema))
         self._test = compile_test(shape.body, schema)
         self._search = compile_query(shape.body, schema, frozenset(shape.params))
-        self._joins = not all(t.covers for t in self.triggers)
+        self._joins = not all(t.covers for t in self._triggers)
         self._open = FactIndex()
+        self._rows_world = RowsWorld(world, self._open)
         self._failed: dict[Row, InputError] = {}
-        self._touched: dict[Row, None] = {}
+        self._changed = changed
 
-    def row(self, key: Args, world: WorldState) -> Row:
+    def row(self, key: Args) -> Row:
         """The row for these values, evaluated when it is new."""
         row = self.rows.get(key)
         if row is None:
-            row = self.rows[key] = Row(key, self.shape.params)
-            self._renew(row, world)
+            row = self.rows[key] = Row(self, key)
+            self.renew(row)
         return row
 
-    def want_all(self, row: Row, world: WorldState) -> None:
+    def want_all(self, row: Row) -> None:
         """From now on every change of the row's set of witnesses counts."""
         if not row.wants_all:
             row.wants_all = True
-            self._renew(row, world)
+            self.renew(row)
 
     def drop(self, row: Row) -> None:
         """Forget the row."""
         for witness in tuple(row.witnesses):
             self._remove(row, witness)
-        self._failed.pop(row, None)
-        self._open.discard(row_fact(row))
+        self._mend(row)
+        self._list(row, is_open=False)
         del self.rows[row.key]
 
     def error(self, row: Row) -> InputError | None:
         """Why the row cannot be computed, if so."""
         return self._failed.get(row)
 
-    def update(self, hits: list[Hit], world: WorldState) -> Iterable[Row]:
-        """Take a change into account that `world` has already; the rows whose witnesses are others now."""
-        self._touched = {}
-        suspects: dict[tuple[Row, Args], None] = {}
-        for trigger, args, sign in hits:
-            if sign * trigger.polarity <= 0:
-                suspects.update(trigger.relying(args))
-        broken = self._break(suspects, world) if suspects else ()
-        for row in (*broken, *self._failed):
-            self._renew(row, world)
-        for trigger, args, sign in hits:
-            if sign * trigger.polarity >= 0 and trigger.fits(args):
-                self._make(trigger, args, world)
-        return self._touched
+    @property
+    def failed(self) -> list[Row]:
+        """The rows that cannot be computed."""
+        return list(self._failed)
 
-    def _break(self, suspects: Iterable[tuple[Row, Args]], world: WorldState) -> Iterable[Row]:
-        """Drop the witnesses that are none any more; the rows that have to be searched."""
-        lost: dict[Row, None] = {}
-        for row, witness in suspects:
-            if not self._holds(row, witness, world):
-                self._remove(row, witness)
-                if not row.wants_all:
-                    lost[row] = None
-        return [row for row in lost if not row.witnesses]
-
-    def _holds(self, row: Row, witness: Args, world: WorldState) -> bool:
+    def loses(self, row: Row, witness: Args) -> bool:
+        """Drop a witness that is none any more; whether the row has to be searched then."""
         try:
-            return self._test(world, {**row.bindings, **dict(zip(self.shape.answers, witness, strict=True))})
+            if self._test(self._world, {**row.bindings, **dict(zip(self.shape.answers, witness, strict=True))}):
+                return False
         except InputError as error:
-            self._failed[row] = error
-            return False
+            self._fail(row, error)
+        self._remove(row, witness)
+        return not row.witnesses and not row.wants_all
 
-    def _make(self, trigger: Trigger, args: Args, world: WorldState) -> None:
-        """Find the open rows that the change gives a witness."""
+    def make(self, trigger: Trigger, args: Args, rows: dict[Row, None]) -> None:
+        """Find what a change gives a witness among open rows, those which agree with it in their parameters."""
+        if not trigger.fits(args):
+            return
+        bindings = trigger.bindings(args)
         try:
-            if trigger.covers:
-                row = self.rows.get(trigger.key(args))
-                if row is not None and row.is_open:
-                    self._complete(row, trigger, trigger.bindings(args), world)
-            elif not trigger.finds:
-                for row in self._reached(trigger, args):
-                    self._renew(row, world)
+            if len(rows) == 1 or not trigger.finds:
+                for row in tuple(rows):
+                    self._complete(row, trigger, bindings)
             else:
-                for found in list(trigger.join(RowsWorld(world, self._open), trigger.bindings(args))):
+                for found in list(trigger.join(self._rows_world, bindings)):
                     self._add(self.rows[tuple([found[name] for name in self.shape.params])], self._witness(found))
         except InputError:  # some row of those reached cannot be computed; which one shows one by one
-            for row in self._reached(trigger, args):
-                self._renew(row, world)
+            for row in tuple(rows):
+                self.renew(row)
 
-    def _reached(self, trigger: Trigger, args: Args) -> list[Row]:
-        """The open rows that agree with the change in the parameters it determines."""
-        if trigger.covers:
-            row = self.rows.get(trigger.key(args))
-            return [row] if row is not None and row.is_open else []
-        return [self.rows[key] for key in self._open.match(ROWS, trigger.row_pattern(args))]
-
-    def _renew(self, row: Row, world: WorldState) -> None:
+    def renew(self, row: Row) -> None:
         """Search the row as if it were new."""
         try:
-            found = dict.fromkeys(self._witness(b) for b in self._few(row, self._search(world, row.bindings)))
-            self._failed.pop(row, None)
+            found = dict.fromkeys(self._witness(b) for b in self._few(row, self._search(self._world, row.bindings)))
+            self._mend(row)
         except InputError as error:
-            found, self._failed[row] = {}, error
+            found = {}
+            self._fail(row, error)
         for witness in [w for w in row.witnesses if w not in found]:
             self._remove(row, witness)
         for witness in found:
             self._add(row, witness)
-        self._settle(row)
+        self._list(row, is_open=row.is_open)
 
-    def _complete(self, row: Row, trigger: Trigger, bindings: Bindings, world: WorldState) -> None:
-        """Find what the change, which determines the row, makes a witness of."""
+    def _complete(self, row: Row, trigger: Trigger, bindings: Bindings) -> None:
+        """Find what the change makes a witness of the row."""
+        together = {**row.bindings, **bindings}
         if not trigger.leaves_open:
-            if self._test(world, bindings):
-                self._add(row, self._witness(bindings))
+            if self._test(self._world, together):
+                self._add(row, self._witness(together))
             return
-        for found in self._few(row, trigger.search(world, bindings)):
+        for found in self._few(row, trigger.search(self._world, together)):
             self._add(row, self._witness(found))
 
     def _few(self, row: Row, found: Iterator[Bindings]) -> list[Bindings]:
@@ -162,26 +149,41 @@ class Relation:
         if witness in row.witnesses or not row.is_open or row in self._failed:
             return
         row.witnesses[witness] = None
-        self._changed(row)
-        for trigger in self.triggers:
+        for trigger in self._triggers:
             trigger.lean(row, witness)
+        self._has_changed(row)
 
     def _remove(self, row: Row, witness: Args) -> None:
         del row.witnesses[witness]
-        self._changed(row)
-        for trigger in self.triggers:
+        for trigger in self._triggers:
             trigger.let_go(row, witness)
+        self._has_changed(row)
 
-    def _changed(self, row: Row) -> None:
-        self._touched[row] = None
-        self._settle(row)
+    def _has_changed(self, row: Row) -> None:
+        self._changed[row] = None
+        self._list(row, is_open=row.is_open)
 
-    def _settle(self, row: Row) -> None:
-        """Only open rows take part in joins."""
-        if not self._joins:
+    def _list(self, row: Row, *, is_open: bool) -> None:
+        """Only open rows are found by what can make them true and take part in joins."""
+        if row.is_listed is is_open:
             return
-        if row.is_open:
+        row.is_listed = is_open
+        for trigger in self._triggers:
+            if is_open:
+                trigger.open(row)
+            else:
+                trigger.close(row)
+        if self._joins and is_open:
             self._open.add(row_fact(row))
-        else:
+        elif self._joins:
             self._open.discard(row_fact(row))
 
+    def _fail(self, row: Row, error: InputError) -> None:
+        self._failed[row] = error
+        for trigger in self._triggers:
+            trigger.readers.failing[self] = None
+
+    def _mend(self, row: Row) -> None:
+        if self._failed.pop(row, None) is not None and not self._failed:
+            for trigger in self._triggers:
+                trigger.readers.failing.pop(self, None)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from knowledge_base.facts import Fact, Value
+from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.index import FactIndex
 from knowledge_base.language.expression import TypedVariable
 from knowledge_base.schema import Schema, Signature
@@ -13,6 +14,7 @@ from knowledge_base.state import WorldState
 
 if TYPE_CHECKING:
     from knowledge_base.conditions.condition import Condition
+    from knowledge_base.conditions.relation import Relation
     from knowledge_base.conditions.shape import Args
 
 ROWS = "installed rows"
@@ -23,18 +25,22 @@ class Row:
     """All installed conditions of one shape with the same values.
 
     Attributes:
+        relation: the rows of that shape.
         key: the values of the shape's parameters.
         bindings: the same, by name.
         witnesses: choices for the shape's answers that make it true: one is kept, or all (`wants_all`).
         wants_all: whether each change of the set of witnesses counts.
+        is_listed: whether changes find it among the open rows.
         conditions: who is told, in the order of installation.
     """
 
-    __slots__ = ("bindings", "conditions", "key", "wants_all", "witnesses")
+    __slots__ = ("bindings", "conditions", "is_listed", "key", "relation", "wants_all", "witnesses")
 
-    def __init__(self, key: Args, names: tuple[str, ...]) -> None:
+    def __init__(self, relation: Relation, key: Args) -> None:
+        self.relation = relation
         self.key = key
-        self.bindings: dict[str, Value] = dict(zip(names, key, strict=True))
+        self.bindings: dict[str, Value] = dict(zip(relation.shape.params, key, strict=True))
+        self.is_listed = False
         self.witnesses: dict[Args, None] = {}
         self.wants_all = False
         self.conditions: dict[Condition, None] = {}
@@ -48,6 +54,11 @@ class Row:
     def is_open(self) -> bool:
         """Whether another witness would make a difference."""
         return self.wants_all or not self.witnesses
+
+    @property
+    def witness(self) -> Args | None:
+        """A choice for the shape's answers that makes it true."""
+        return next(iter(self.witnesses), None)
 
 
 class RowsWorld:
@@ -74,8 +85,8 @@ class RowsWorld:
         """At most how many they are."""
         return (self._rows if predicate == ROWS else self._world).estimate(predicate, pattern)
 
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value."""
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth."""
         return self._world.value(function, args)
 
     def objects(self, type_name: str) -> list[str]:
@@ -95,4 +106,4 @@ def row_fact(row: Row) -> Fact:
 def schema_with_rows(schema: Schema, params: tuple[str, ...]) -> Schema:
     """`schema` with the relation of rows declared, for compiling joins with it."""
     rows = Signature(ROWS, tuple(map(TypedVariable, params)))
-    return Schema(schema.types, schema.constants, {**schema.predicates, ROWS: rows}, schema.functions)
+    return replace(schema, predicates={**schema.predicates, ROWS: rows})

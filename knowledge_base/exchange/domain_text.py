@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from knowledge_base.errors import ParseError, Place
+from knowledge_base.content import UNSET
+from knowledge_base.errors import ParseError, Place, nearest
 from knowledge_base.exchange.action_text import ACTION, DURATIVE_ACTION, ActionText, read_actions
 from knowledge_base.exchange.beyond import OBJECT_FLUENTS, refuse_forms, refused
 from knowledge_base.exchange.files import text_and_source
 from knowledge_base.exchange.sections import read_definition, word
 from knowledge_base.language.expression import Expression, TypedVariable
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.sexpr import Group, Node, Word
+from knowledge_base.language.sexpr import Group, Node, Word, read
 from knowledge_base.language.typed_list import TypedName, parse_names, typed_variables
 
 _SECTIONS = (
@@ -31,11 +32,12 @@ _SECTIONS = (
 
 @dataclass(frozen=True, slots=True)
 class DeclarationText:
-    """A predicate or function as declared: `(on ?a ?b - item)`."""
+    """A predicate or function as declared: `(on ?a ?b - item)`; `result` is what a function is worth."""
 
     name: str
     parameters: tuple[TypedVariable, ...]
     place: Place | None = field(compare=False)
+    result: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +124,7 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
         types=tuple(parse_names(definition.nodes(":types"))),
         constants=tuple(parse_names(definition.nodes(":constants"))),
         predicates=tuple(_declarations(definition.nodes(":predicates"))),
-        functions=tuple(_declarations(definition.nodes(":functions"), result="number")),
+        functions=tuple(_functions(definition.nodes(":functions"))),
         actions=read_actions(definition.sections),
         axioms=tuple(_axiom(group) for keyword, group in definition.sections if keyword == ":derived"),
         notes=tuple(definition.notes()),
@@ -136,39 +138,60 @@ def _misspelt(name: str, valid: Collection[str]) -> bool:
     return any(not other.startswith(name) and not name.startswith(other) for other in close)
 
 
-def _declarations(nodes: Sequence[Node], result: str | None = None) -> list[DeclarationText]:
+def parse_declaration(text: str, source: str | None = None) -> DeclarationText:
+    """Read one declaration from its text, e.g. `(near ?a ?b - thing)`.
+
+    Raises:
+        ParseError: it has another form.
+    """
+    nodes = read(text, source)
+    if len(nodes) != 1 or isinstance(nodes[0], Word):
+        raise ParseError("one declaration is expected: (NAME ?x - TYPE)", place=Place(source, 1, 1))
+    return _declaration(nodes[0])
+
+
+def _declarations(nodes: Sequence[Node]) -> list[DeclarationText]:
+    declared = [_declaration(node, distinct=False) for node in nodes]  # only the types count there
+    return [d for d in declared if d.name != "="]  # declared by old files, though the language has it
+
+
+def _functions(nodes: Sequence[Node]) -> list[DeclarationText]:
+    """Declarations, which `- TYPE` after them makes worth that; without it they are numeric, as in PDDL 2.1."""
     found: list[DeclarationText] = []
+    untyped: list[DeclarationText] = []
     position = 0
     while position < len(nodes):
         node = nodes[position]
-        if isinstance(node, Word):
-            position = _after_result_type(nodes, position, result)
-            continue
-        declared = _declaration(node, distinct=False)  # only the types count there
-        if declared.name != "=":  # declared by old files, though the language has it
-            found.append(declared)
-        position += 1
-    return found
+        if isinstance(node, Word) and node.text == "-" and untyped:
+            result = _result(nodes[position + 1 :], node)
+            found += [replace(function, result=result) for function in untyped]
+            untyped.clear()
+            position += 2
+        else:
+            untyped.append(_declaration(node, distinct=False))
+            position += 1
+    return found + [replace(function, result="number") for function in untyped]
 
 
-def _declaration(group: Group, *, distinct: bool = True) -> DeclarationText:
-    head = group.head()
+def _declaration(node: Node, *, distinct: bool = True) -> DeclarationText:
+    if isinstance(node, Word):
+        raise ParseError("a declaration is written in parentheses: (NAME ?x - TYPE)", place=node.place)
+    head = node.head()
     if head is None or head[0] in "?:":
-        raise ParseError("a declaration begins with a name: (NAME ?x - TYPE)", place=group.place)
-    return DeclarationText(head, typed_variables(group.items[1:], distinct=distinct), group.place)
+        raise ParseError("a declaration begins with a name: (NAME ?x - TYPE)", place=node.place)
+    return DeclarationText(head, typed_variables(node.items[1:], distinct=distinct), node.place)
 
 
-def _after_result_type(nodes: Sequence[Node], position: int, result: str | None) -> int:
-    """Skip the `- number` that may follow functions."""
-    here = word(nodes[position], "a declaration")
-    if result is None or here.text != "-" or position == 0:
-        raise ParseError("a declaration is written in parentheses: (NAME ?x - TYPE)", place=here.place)
-    if position + 1 == len(nodes):
-        raise ParseError("'-' without a type after it", place=here.place)
-    kind = word(nodes[position + 1], "a type")
-    if kind.folded() != result:
+def _result(after: Sequence[Node], dash: Word) -> str:
+    if not after:
+        raise ParseError("'-' without a type after it", place=dash.place)
+    kind = word(after[0], "a type")
+    if kind.folded() not in UNSET:
+        if nearest(kind.folded(), UNSET) is not None:
+            message = "a function is worth a value, not a thing"
+            raise ParseError(message, place=kind.place, found=kind.text, valid=UNSET)
         raise refused(OBJECT_FLUENTS, f"- {kind.text}", kind.place)
-    return position + 2
+    return kind.folded()
 
 
 def _axiom(group: Group) -> AxiomText:

@@ -1,7 +1,8 @@
 """Facts, changes, worlds and schemas as plain JSON values and back; nothing is lost, the order neither.
 
-A fact is `["on", "cup1", "table"]`, a number `["weight", "cup1", 0.2]`. JSON tells `1`, `1.0` and `true`
-apart, so values keep their Python types. Reading trusts its input: a wrong form gives a `FORM_ERRORS`.
+A fact is `["on", "cup1", "table"]`, a value `["weight", "cup1", 0.2]`, in which a geometry is a list. JSON tells
+`1`, `1.0` and `true` apart, so values keep their Python types. Reading trusts its input: a wrong form gives a
+`FORM_ERRORS`.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from knowledge_base.facts import Delta, Fact
+from knowledge_base.facts import Content, Delta, Fact
 from knowledge_base.language.expression import TypedVariable
 from knowledge_base.schema import Schema, Signature
 from knowledge_base.state import WorldState
@@ -34,6 +35,7 @@ def delta_form(delta: Delta) -> Form:
         "removed": _fact_forms(delta.removed),
         "added": _fact_forms(delta.added),
         "values": _value_forms(delta.values),
+        "replaced": _fact_forms(delta.replaced),
     }
     return {part: said for part, said in form.items() if said}
 
@@ -46,11 +48,12 @@ def delta_of(form: Form) -> Delta:
         added=tuple(_facts(form.get("added", ()))),
         values=_values(form.get("values", ())),
         removed_nodes=tuple(form.get("removed_nodes", ())),
+        replaced=tuple(_facts(form.get("replaced", ()))),
     )
 
 
 def world_form(state: WorldState) -> Form:
-    """All things (constants too), facts and numbers."""
+    """All things (constants too), facts and values."""
     return {"nodes": dict(state.nodes), "facts": _fact_forms(state.facts), "values": _value_forms(state.values)}
 
 
@@ -65,7 +68,8 @@ def schema_form(schema: Schema) -> Form:
         "types": dict(schema.types),
         "constants": dict(schema.constants),
         "predicates": {name: _parameters(signature) for name, signature in schema.predicates.items()},
-        "functions": {name: _parameters(signature) for name, signature in schema.functions.items()},
+        "functions": {name: [f.result, *_parameters(f)] for name, f in schema.functions.items()},
+        "functional": sorted(schema.functional),
     }
 
 
@@ -78,8 +82,9 @@ def schema_of(form: Form) -> Schema:
     return Schema(
         types=form["types"],
         constants=form["constants"],
-        predicates=_signatures(form["predicates"]),
-        functions=_signatures(form["functions"]),
+        predicates={name: _signature(name, parameters) for name, parameters in form["predicates"].items()},
+        functions={name: _signature(name, rest, result) for name, (result, *rest) in form["functions"].items()},
+        functional=frozenset(form["functional"]),
     )
 
 
@@ -97,20 +102,22 @@ def _facts(forms: Iterable[list[Any]]) -> Iterable[Fact]:
     return (Fact(form[0], tuple(form[1:])) for form in forms)
 
 
-def _value_forms(values: Mapping[Fact, float]) -> list[list[Any]]:
-    return [[f.predicate, *f.args, number] for f, number in values.items()]
+def _value_forms(values: Mapping[Fact, Content]) -> list[list[Any]]:
+    return [[f.predicate, *f.args, content] for f, content in values.items()]
 
 
-def _values(forms: Iterable[list[Any]]) -> dict[Fact, float]:
-    return {Fact(form[0], tuple(form[1:-1])): form[-1] for form in forms}
+def _values(forms: Iterable[list[Any]]) -> dict[Fact, Content]:
+    return {Fact(form[0], tuple(form[1:-1])): _content(form[-1]) for form in forms}
+
+
+def _content(form: Any) -> Content:
+    """JSON has no tuples: a geometry is a list there."""
+    return tuple(form) if isinstance(form, list) else form
 
 
 def _parameters(signature: Signature) -> list[list[Any]]:
     return [[p.name, *p.types] for p in signature.parameters]
 
 
-def _signatures(forms: Mapping[str, list[list[Any]]]) -> dict[str, Signature]:
-    return {
-        name: Signature(name, tuple(TypedVariable(p[0], tuple(p[1:])) for p in parameters))
-        for name, parameters in forms.items()
-    }
+def _signature(name: str, parameters: list[list[Any]], result: str | None = None) -> Signature:
+    return Signature(name, tuple(TypedVariable(p[0], tuple(p[1:])) for p in parameters), result)

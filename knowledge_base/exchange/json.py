@@ -1,4 +1,4 @@
-"""A world as one JSON text: schema, version, things, facts and numbers, lossless both ways."""
+"""A world as one JSON text: schema, version, things, facts and values, lossless both ways."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from knowledge_base.facts import Delta
 from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
 
-FORMAT = "dsc-knowledge/1"
+FORMAT = "dsc-knowledge/2"
 _PARTS = ("format", "version", "schema_hash", "schema", "nodes", "facts", "values")
 
 
 def to_json(state: WorldState, version: int) -> str:
-    """The world as JSON text; see `exchange.forms` for how facts and numbers are written."""
+    """The world as JSON text; see `exchange.forms` for how facts and values are written."""
     said = {
         "format": FORMAT,
         "version": version,
@@ -96,9 +96,9 @@ def _require_parts(form: Form, schema: Schema, place: Place) -> None:
         raise ParseError("'nodes' is an object of things with their types", place=place)
     for type_name in form["nodes"].values():
         schema.require_type(str(type_name), place)
-    for part, least, means in (("facts", 1, '["NAME", ARGUMENT...]'), ("values", 2, '["NAME", ARGUMENT..., NUMBER]')):
+    for part, least, means in (("facts", 1, '["NAME", ARGUMENT...]'), ("values", 2, '["NAME", ARGUMENT..., CONTENT]')):
         for number, item in enumerate(_items(form[part], part, place)):
-            if not _is_item(item, least):
+            if not _is_item(item, least, content=part == "values"):
                 raise ParseError(f"{part}[{number}] is of the form {means}, not {json.dumps(item)}", place=place)
 
 
@@ -108,13 +108,11 @@ def _items(said: Any, part: str, place: Place) -> Iterable[Any]:
     return said
 
 
-def _is_item(item: Any, least: int) -> bool:
-    return (
-        isinstance(item, list)
-        and len(item) >= least
-        and isinstance(item[0], str)
-        and all(isinstance(value, str | int | float) for value in item)
-    )
+def _is_item(item: Any, least: int, *, content: bool) -> bool:
+    if not (isinstance(item, list) and len(item) >= least and isinstance(item[0], str)):
+        return False
+    values = item[:-1] if content and isinstance(item[-1], list) else item
+    return all(isinstance(value, str | int | float) for value in values)
 
 
 def _require_admissible(state: WorldState) -> None:

@@ -1,9 +1,13 @@
-"""PDDL domain and problem files: the one reader of their outer form."""
+"""PDDL domain and problem files: how they are read, and how a world is written as one."""
 
 from __future__ import annotations
 
 from knowledge_base.exchange.action_text import ActionText
 from knowledge_base.exchange.domain_text import DomainText, parse_domain, read_domain
 from knowledge_base.exchange.problem_text import Metric, ProblemText, read_problem
+from knowledge_base.exchange.problem_writer import problem_to_text
 
-__all__ = ["ActionText", "DomainText", "Metric", "ProblemText", "parse_domain", "read_domain", "read_problem"]
+__all__ = [
+    "ActionText", "DomainText", "Metric", "ProblemText", "parse_domain", "problem_to_text", "read_domain",
+    "read_problem",
+]  # fmt: skip

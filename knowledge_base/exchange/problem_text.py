@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypeGuard
+from typing import Literal
 
+from knowledge_base.content import GEOMETRY, require_content
 from knowledge_base.errors import ParseError, Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.beyond import TIMED_INITIAL, refuse_forms, refused
 from knowledge_base.exchange.files import text_and_source
 from knowledge_base.exchange.sections import Definition, read_definition, word
-from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.language.check import check
 from knowledge_base.language.expression import (
     TRUE,
@@ -54,7 +55,7 @@ class ProblemText:
         domain: the name of the domain it says it is for.
         objects: the things in the order of the file, with their types.
         init: what holds at first; what is not said does not hold.
-        values: numeric fluents' values at first.
+        values: what functions are worth at first.
         goal: the condition wanted; true when the file has none.
         has_goal: whether the file says what is wanted.
         metric: what the best plan is, if the file says so.
@@ -65,7 +66,7 @@ class ProblemText:
     domain: str
     objects: Mapping[str, str]
     init: tuple[Fact, ...]
-    values: Mapping[Fact, float]
+    values: Mapping[Fact, Content]
     goal: Expression
     has_goal: bool
     metric: Metric | None = None
@@ -199,7 +200,7 @@ class _Init:
         self.schema = schema
         self.objects = objects
         self.facts: dict[Fact, None] = {}
-        self.values: dict[Fact, float] = {}
+        self.values: dict[Fact, Content] = {}
 
     def read(self, node: Node) -> None:
         if isinstance(node, Group) and node.head() == "and":
@@ -217,8 +218,10 @@ class _Init:
                 self.facts[Fact(predicate, _values(args))] = None
             case Not(Atom()):
                 pass  # what is not said does not hold
-            case Comparison("=", Call(function, args), Constant(value)) if _is_number(value):
-                self.values[Fact(function, _values(args))] = value
+            case Comparison("=", Call(function, args), said) if (content := _content(said)) is not None:
+                fluent = Fact(function, _values(args))
+                require_content(content, self.schema.result(function), fluent, said.place)
+                self.values[fluent] = content
             case _:
                 raise ParseError("':init' has facts and (= (FUNCTION ...) NUMBER)", place=e.place)
 
@@ -238,8 +241,16 @@ def _refuse_timed(node: Node) -> None:
         raise refused(TIMED_INITIAL, f"at {time.text}", node.place)
 
 
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+def _content(said: Term) -> Content | None:
+    """A value as written, `(geometry 0.4 0.1)` too; `None` for what has to be worked out on a world."""
+    match said:
+        case Constant(value):
+            return value
+        case Arithmetic(operator, args) if operator == GEOMETRY:
+            numbers = [a.value for a in args if isinstance(a, Constant) and isinstance(a.value, int | float)]
+            return tuple(numbers) if len(numbers) == len(args) else None
+        case _:
+            return None
 
 
 def _values(args: tuple[Term, ...]) -> tuple[Value, ...]:

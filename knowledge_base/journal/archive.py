@@ -19,6 +19,7 @@ from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
 
 _JOURNAL = "SELECT version, time, author, delta FROM changes WHERE version > ? AND version <= ? ORDER BY version"
+_LAST = "SELECT max(version) FROM (SELECT version FROM changes UNION ALL SELECT version FROM snapshots)"
 _BY_KEY = (
     "SELECT version, keys.time, keys.author, coalesce(keys.delta, changes.delta) "
     "FROM keys LEFT JOIN changes USING (version) WHERE key = ?"
@@ -42,6 +43,7 @@ class Archive:
         self._place = Place(str(path))
         with self._reading() as connection:
             written = self.written_schema(connection)
+            self._written = self._schema_hash(connection)
         if schema is not None:
             require_extension(written, schema, self._place)
         self._schema = schema or written
@@ -54,9 +56,7 @@ class Archive:
     def newest(self) -> Version:
         """The last world that was committed."""
         with self._reading() as connection:
-            last = connection.execute("SELECT max(version) FROM (SELECT version FROM changes UNION ALL "
-                                      "SELECT version FROM snapshots)").fetchone()[0]  # fmt: skip
-            return self._world(connection, last)
+            return self._world(connection, self._last(connection))
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:  # noqa: ARG002
         """Refused.
@@ -74,10 +74,19 @@ class Archive:
     def changes(self, since: int, until: int) -> list[Change]:
         """The changes after version `since`, up to that which made version `until`."""
         with self._reading() as connection:
-            oldest = connection.execute("SELECT min(version) FROM snapshots").fetchone()[0]
-            if since < oldest:
-                raise gone(since, oldest, self._place)
-            return list(self._changes(connection, since, until))
+            return self._since(connection, since, until)
+
+    def later(self, version: int) -> list[Change]:
+        """What the writer has committed after `version`."""
+        with self._reading() as connection:
+            if self._schema_hash(connection) != self._written:
+                raise StoreError("the writer has a longer schema now; open the store anew", place=self._place)
+            return self._since(connection, version, self._last(connection))
+
+    def oldest(self) -> int:
+        """The first version that is still kept."""
+        with self._reading() as connection:
+            return _oldest(connection)
 
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:  # noqa: ARG002  the file knows
         """The world of that version: a snapshot and the changes after it."""
@@ -129,7 +138,7 @@ class Archive:
             "SELECT version, time, world FROM snapshots WHERE version <= ? ORDER BY version DESC LIMIT 1", (version,)
         ).fetchone()
         if snapshot is None:
-            raise gone(version, connection.execute("SELECT min(version) FROM snapshots").fetchone()[0], self._place)
+            raise gone(version, _oldest(connection), self._place)
         reached, time, text = snapshot
         try:
             state = world_of(json.loads(text), self._schema)
@@ -139,6 +148,17 @@ class Archive:
         except FORM_ERRORS as error:
             self._unreadable(f"what follows version {reached}", error)
         return Version(state, reached, time)
+
+    def _last(self, connection: sqlite3.Connection) -> int:
+        return int(connection.execute(_LAST).fetchone()[0])
+
+    def _schema_hash(self, connection: sqlite3.Connection) -> str:
+        return str(connection.execute("SELECT hash FROM schemas ORDER BY rowid DESC LIMIT 1").fetchone()[0])
+
+    def _since(self, connection: sqlite3.Connection, since: int, until: int) -> list[Change]:
+        if since < (oldest := _oldest(connection)):
+            raise gone(since, oldest, self._place)
+        return list(self._changes(connection, since, until))
 
     def _changes(self, connection: sqlite3.Connection, since: int, until: int) -> Iterator[Change]:
         expected = since
@@ -166,3 +186,7 @@ class Archive:
 
     def _unreadable(self, what: str, error: Exception) -> NoReturn:
         raise StoreError(f"the store is damaged: {what} cannot be read", place=self._place) from error
+
+
+def _oldest(connection: sqlite3.Connection) -> int:
+    return int(connection.execute("SELECT min(version) FROM snapshots").fetchone()[0])

@@ -20,7 +20,7 @@ Durability = Literal["memory", "process", "power"]
 """What a commit outlives: nothing; the death of the process; a power cut (as far as the disk is honest)."""
 
 APPLICATION_ID = 0x6473636B  # "dsck", by which a file is known as ours (SQLite's application_id)
-FORMAT = 1
+FORMAT = 2
 PATIENCE_S = 1.0
 """How long to wait for others who lock the file; there should be none."""
 

@@ -58,6 +58,20 @@ class History(Protocol):
         """
         ...
 
+    def oldest(self) -> int:
+        """The first version that is still kept."""
+        ...
+
+    def later(self, version: int) -> list[Change]:
+        """What somebody else has committed after `version`.
+
+        Raises:
+            ConflictError: nobody else writes here.
+            HistoryError: some of it is not kept any more.
+            StoreError: the schema is not that which it was opened with, or it cannot be read.
+        """
+        ...
+
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
         """The world of that version, as a copy; `newest` tells the present one to those who go back from it.
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from knowledge_base.compatibility import missing_constants, require_extension
-from knowledge_base.errors import InputError, Place
+from knowledge_base.compatibility import missing_constants, require_extension, require_functional
+from knowledge_base.errors import ConflictError, InputError, Place
 from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
 from knowledge_base.journal.archive import Archive
@@ -98,6 +98,14 @@ class Journal(Archive):
         with reported(self._path, "read"):
             return self._by_key(self._connection, key)
 
+    def later(self, version: int) -> list[Change]:
+        """Refused.
+
+        Raises:
+            ConflictError: always.
+        """
+        raise ConflictError(f"{self._place}: version {version} is the newest, as this is the store's only writer")
+
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  the file knows
         """Make version `keep_since` the oldest: a snapshot of it takes the place of all before."""
         with self._reading() as connection:
@@ -141,6 +149,7 @@ class Journal(Archive):
         """Go on with more declarations; new constants come into the world by a change of their own."""
         require_extension(written, self._schema, self._place)
         last = self.newest()
+        require_functional(last.state, self._place)
         constants = missing_constants(last.state, self._place)
         with self._transaction() as connection:
             self._put_schema(last.version + bool(constants))

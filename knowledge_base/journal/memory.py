@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 from typing import NamedTuple
 
-from knowledge_base.errors import StoreError
-from knowledge_base.facts import Change, Delta, Fact
+from knowledge_base.errors import ConflictError, StoreError
+from knowledge_base.facts import Change, Content, Delta, Fact
 from knowledge_base.journal.history import Version, Writer, gone, too_early
 from knowledge_base.state import WorldState
 
@@ -22,11 +22,11 @@ MOST_KEYS = 10_000
 class _Taken(NamedTuple):
     """What a change took away that it does not say itself."""
 
-    numbers: Sequence[float | None] = ()
-    """What its fluents were before, in its order; `None` is not set."""
+    values: Sequence[Content | None] = ()
+    """What its functions were worth before, in its order; `None` is not set."""
     types: Mapping[str, str] = {}
-    fluents: Mapping[Fact, float] = {}
-    """All numbers about the things that it removed."""
+    departed: Mapping[Fact, Content] = {}
+    """All values about the things that it removed."""
 
 
 class _Kept(NamedTuple):
@@ -86,6 +86,19 @@ class MemoryHistory:
             self._require(since)
             return [k.change for k in self._kept if since < k.change.version <= until]
 
+    def oldest(self) -> int:
+        """The first version that is still kept."""
+        with self._lock:
+            return self._oldest[0]
+
+    def later(self, version: int) -> list[Change]:
+        """Refused.
+
+        Raises:
+            ConflictError: always.
+        """
+        raise ConflictError(f"version {version} is the newest; in memory there is no other writer to follow")
+
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
         """The world of that version: the newest with all later changes undone."""
         present = newest()
@@ -129,12 +142,12 @@ class MemoryHistory:
 def _taken(delta: Delta, before: WorldState) -> _Taken:
     if not (delta.values or delta.removed_nodes):
         return _NOTHING
-    numbers = list(map(before.values.get, delta.values))
+    values = list(map(before.values.get, delta.values))
     if not delta.removed_nodes:
-        return _Taken(numbers)
+        return _Taken(values)
     things = set(delta.removed_nodes)
-    fluents = {f: n for f, n in before.values.items() if not things.isdisjoint(f.args)}
-    return _Taken(numbers, {name: before.nodes[name] for name in delta.removed_nodes}, fluents)
+    departed = {f: v for f, v in before.values.items() if not things.isdisjoint(f.args)}
+    return _Taken(values, {name: before.nodes[name] for name in delta.removed_nodes}, departed)
 
 
 def _undone(state: WorldState, later: list[_Kept]) -> WorldState:
@@ -147,10 +160,10 @@ def _undone(state: WorldState, later: list[_Kept]) -> WorldState:
         for name in delta.nodes:
             del nodes[name]
         nodes.update(taken.types)
-        for fluent, number in zip(delta.values, taken.numbers, strict=True):
-            if number is None:
+        for fluent, content in zip(delta.values, taken.values, strict=True):
+            if content is None:
                 del values[fluent]
             else:
-                values[fluent] = number
-        values.update(taken.fluents)
+                values[fluent] = content
+        values.update(taken.departed)
     return WorldState.of(state.schema, nodes, facts, values)

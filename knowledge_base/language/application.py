@@ -1,14 +1,16 @@
-"""An effect applied: which facts and numbers it changes on a given world, as a `Delta`."""
+"""An effect applied: which facts and values it changes on a given world, as a `Delta`."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
 
+from knowledge_base.content import require_content
 from knowledge_base.errors import SchemaError
-from knowledge_base.facts import Delta, Fact, Value
-from knowledge_base.language.asking import NO_BINDINGS, evaluate_term, holds
+from knowledge_base.facts import Content, Delta, Fact, Value
+from knowledge_base.language.asking import NO_BINDINGS, evaluate_argument, evaluate_term, holds
 from knowledge_base.language.check import check_arity
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.expression import Arithmetic, Atom, Call, Constant, TypedVariable
 from knowledge_base.language.terms import Bindings, as_number
@@ -26,7 +28,9 @@ def apply_effect(effect: Effect, world: World, bindings: Mapping[str, Value] = N
     Raises:
         UnknownNameError: a variable is not bound, or a name is not declared.
         SchemaError: contradicting assignments, a wrong number of arguments, arithmetic on no number.
+        InputError: it is nested too deeply.
     """
+    check_depth(effect)
     application = _Application(world)
     application.apply(effect, bindings)
     added = tuple(application.added)
@@ -50,7 +54,7 @@ class _Application:
         self.world = world
         self.added: dict[Fact, None] = {}
         self.removed: dict[Fact, None] = {}
-        self.values: dict[Fact, float] = {}
+        self.values: dict[Fact, Content] = {}
         self.computed: set[Fact] = set()
 
     def apply(self, effect: Effect, bindings: Bindings) -> None:
@@ -72,27 +76,28 @@ class _Application:
                 self.assign(effect, bindings)
 
     def fact(self, atom: Atom, bindings: Bindings) -> Fact:
-        signature = self.world.schema.predicate(atom.predicate, atom.place)
+        signature = self.world.schema.told(atom.predicate, atom.place)
         check_arity(signature, len(atom.args), atom.place)
         return self.instance(atom.predicate, atom, bindings)
 
     def instance(self, name: str, form: Atom | Call, bindings: Bindings) -> Fact:
-        return Fact(name, tuple(evaluate_term(a, self.world, bindings) for a in form.args))
+        return Fact(name, tuple(evaluate_argument(a, self.world, bindings) for a in form.args))
 
     def assign(self, effect: Assign, bindings: Bindings) -> None:
         call, operator = effect.call, effect.operator
         fluent = self.instance(call.function, call, bindings)
         old = self.values.get(fluent, evaluate_term(call, self.world, bindings))
-        change = as_number(evaluate_term(effect.value, self.world, bindings), operator, effect.place)
+        change = evaluate_term(effect.value, self.world, bindings)
         again = fluent in self.values
         if operator == "assign":
+            require_content(change, self.world.schema.result(call.function), fluent, effect.place)
             self.refuse(again and (fluent in self.computed or old != change), fluent, effect)
             self.values[fluent] = change
             return
         self.refuse(again and fluent not in self.computed, fluent, effect)
         self.computed.add(fluent)
-        result = Arithmetic(_ARITHMETIC[operator], (Constant(old), Constant(change)), place=effect.place)
-        self.values[fluent] = as_number(evaluate_term(result, self.world), operator, effect.place)
+        sides = tuple(Constant(as_number(side, operator, effect.place)) for side in (old, change))
+        self.values[fluent] = evaluate_term(Arithmetic(_ARITHMETIC[operator], sides, place=effect.place), self.world)
 
     def refuse(self, contradicts: bool, fluent: Fact, effect: Assign) -> None:  # noqa: FBT001
         if contradicts:

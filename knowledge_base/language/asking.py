@@ -6,13 +6,15 @@ expression again costs no more than the look-ups it needs. Nothing is ever execu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from knowledge_base.facts import VALUE_TYPES, Value
+from knowledge_base.errors import SchemaError
+from knowledge_base.facts import VALUE_TYPES, Content, Value
 from knowledge_base.language.binding import check_answers, check_bound
-from knowledge_base.language.compiler import compile_query, compile_test
+from knowledge_base.language.compiler import Answers, compile_answers, compile_test
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.expression import (
     Constant,
     Expression,
@@ -21,7 +23,6 @@ from knowledge_base.language.expression import (
     free_variables,
     variables_in_order,
 )
-from knowledge_base.language.lookups import Search
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.terms import Bindings, Getter, Test, compile_term
 from knowledge_base.language.world import World
@@ -31,9 +32,19 @@ NO_BINDINGS: Bindings = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
-class _Condition:
+class Asked:
+    """A condition ready to be asked."""
+
+    e: Expression
     free: frozenset[str]
     test: Test
+
+    def holds(self, world: World, bindings: Mapping[str, Value]) -> bool:
+        """Whether it is true of `world`; errors as for `holds`."""
+        for name in self.free:
+            if type(bindings.get(name)) not in VALUE_TYPES:
+                check_bound(self.e, bindings)
+        return self.test(world, bindings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +54,16 @@ class _Term:
 
 
 @dataclass(frozen=True, slots=True)
-class _Query:
-    answers: tuple[str, ...]
-    search: Search
+class Queried:
+    """A query ready to be answered, for certain variables that are bound.
+
+    Attributes:
+        e: the query; it is kept alive with what was made from it.
+        answers: gives the values of the others, as `query` does.
+    """
+
+    e: Expression
+    answers: Answers
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +71,11 @@ class _Queries:
     """The ways to search for an expression's variables, by those that are bound."""
 
     free: frozenset[str]
-    by_bound: dict[frozenset[str], _Query]
+    by_bound: dict[frozenset[str], Queried]
 
 
 _terms: IdentityCache[Term, _Term] = IdentityCache()
-_conditions: IdentityCache[Expression, _Condition] = IdentityCache()
+_conditions: IdentityCache[Expression, Asked] = IdentityCache()
 _queries: IdentityCache[Expression, _Queries] = IdentityCache()
 
 
@@ -67,13 +85,20 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
     Raises:
         UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
         SchemaError: a wrong number of arguments, or `<` and the like met something that is no number.
+        InputError: it is nested too deeply, or something in it cannot be computed.
     """
-    schema = world.schema
-    condition = _conditions.find(e, schema) or _conditions.keep(e, schema, _compiled(e, schema))
-    for name in condition.free:
-        if type(bindings.get(name)) not in VALUE_TYPES:
-            check_bound(e, bindings)
-    return condition.test(world, bindings)
+    return asked(e, world.schema).holds(world, bindings)
+
+
+def asked(e: Expression, schema: Schema) -> Asked:
+    """The condition ready to be asked of worlds with this schema; errors of the text as for `holds`."""
+    return _conditions.find(e, schema) or _conditions.keep(e, schema, _compiled(e, schema))
+
+
+def prepare(e: Expression, schema: Schema) -> None:
+    """Raise now what is wrong with the text of `e`, whatever the world will be; errors as for `holds`."""
+    if _conditions.find(e, schema) is None:
+        _conditions.keep(e, schema, _compiled(e, schema))
 
 
 def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> list[dict[str, Value]]:
@@ -86,17 +111,20 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
         InputError: an unbound variable occurs only under `not` or in a comparison.
         UnknownNameError, SchemaError: as for `holds`.
     """
-    schema = world.schema
-    queries = _queries.find(e, schema) or _queries.keep(e, schema, _Queries(free_variables(e), {}))
-    bound = queries.free.intersection(bindings)
+    return queried(e, world.schema, bindings).answers(world, bindings)
+
+
+def queried(e: Expression, schema: Schema, params: Iterable[str]) -> Queried:
+    """The query ready to be answered when `params` are bound; errors of the text as for `query`."""
+    queries = _queries.find(e, schema) or _queries.keep(e, schema, _unsearched(e))
+    bound = queries.free.intersection(params)
     found = queries.by_bound.get(bound)
     if found is None:
-        found = queries.by_bound[bound] = _compiled_query(e, world.schema, bound)
-    choices = (tuple([b[name] for name in found.answers]) for b in found.search(world, bindings))
-    return [dict(zip(found.answers, choice, strict=True)) for choice in dict.fromkeys(choices)]
+        found = queries.by_bound[bound] = _compiled_query(e, schema, bound)
+    return found
 
 
-def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
+def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Content:
     """What `term` is worth on `world`.
 
     Raises:
@@ -116,15 +144,30 @@ def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_B
     return known.get(world, bindings)
 
 
-def _compiled(e: Expression, schema: Schema) -> _Condition:
-    return _Condition(free_variables(e), compile_test(e, schema))
+def evaluate_argument(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
+    """What `term` is worth as an argument of a fact; errors as for `evaluate_term`, and a geometry is one."""
+    found = evaluate_term(term, world, bindings)
+    if isinstance(found, tuple):
+        raise SchemaError("a geometry can be compared, but nothing is said about it", place=term.place)
+    return found
+
+
+def _unsearched(e: Expression) -> _Queries:
+    check_depth(e)
+    return _Queries(free_variables(e), {})
+
+
+def _compiled(e: Expression, schema: Schema) -> Asked:
+    check_depth(e)
+    return Asked(e, free_variables(e), compile_test(e, schema))
 
 
 def _compiled_term(term: Term, schema: Schema) -> _Term:
+    check_depth(term)
     return _Term(free_variables(term), compile_term(term, schema))
 
 
-def _compiled_query(e: Expression, schema: Schema, bound: frozenset[str]) -> _Query:
-    check_answers(e, bound)
-    answers = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
-    return _Query(answers, compile_query(e, schema, bound))
+def _compiled_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Queried:
+    check_answers(e, bound, schema)
+    names = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
+    return Queried(e, compile_answers(e, schema, bound, names))

@@ -1,65 +1,96 @@
 """Free variables: which of them a condition finds values for, which must be bound, and the errors if not.
 
-An atom finds values; `not`, `imply`, `forall` and comparisons only test, so that a variable occurring
-nowhere else has no answers that could be listed (safe queries in the sense of Datalog).
+An atom finds values, unless it is computed; `not`, `imply`, `forall` and comparisons only test, so that a
+variable occurring nowhere else has no answers that could be listed (safe queries in the sense of Datalog).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
-from knowledge_base.errors import InputError, Place, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import (
     And,
     Atom,
+    Call,
     Exists,
     Expression,
     Or,
     Term,
     Variable,
     free_variables,
+    parts_of,
     variable_place,
 )
+
+if TYPE_CHECKING:  # a schema checks what its computed predicates read
+    from knowledge_base.schema import Schema
 
 _NONE: frozenset[str] = frozenset()
 
 
-def found_variables(e: Expression, bound: frozenset[str] = _NONE) -> frozenset[str]:
+def found_variables(e: Expression, schema: Schema, bound: frozenset[str] = _NONE) -> frozenset[str]:
     """The free variables of `e` that it finds values for, when those in `bound` already have some."""
     match e:
+        case Atom(name, _) if name in schema.computed:
+            return _NONE
         case Atom(_, args):
             return frozenset(a.name for a in args if isinstance(a, Variable))
         case And(parts):
-            return _NONE.union(*(found_variables(p, bound) for p in parts))
+            return _NONE.union(*(found_variables(p, schema, bound) for p in parts))
         case Or(parts) if parts:
-            branches = [found_variables(p, bound) | bound for p in parts]
+            branches = [found_variables(p, schema, bound) | bound for p in parts]
             return branches[0].intersection(*branches[1:])
         case Exists(variables, body):
             own = {v.name for v in variables}
-            return found_variables(body, bound | own) - own
+            return found_variables(body, schema, bound | own) - own
         case _:
             return _NONE
 
 
-def only_tested(e: Expression, bound: frozenset[str] = _NONE) -> frozenset[str]:
+def only_tested(e: Expression, schema: Schema, bound: frozenset[str] = _NONE) -> frozenset[str]:
     """The free variables of `e` beyond `bound` that nothing in it finds values for."""
-    return free_variables(e) - found_variables(e, bound) - bound
+    return free_variables(e) - found_variables(e, schema, bound) - bound
 
 
-def check_answers(e: Expression, bound: frozenset[str]) -> None:
+def check_answers(e: Expression, bound: frozenset[str], schema: Schema) -> None:
     """Raise `InputError` if a free variable of the query `e`, not in `bound`, can only be tested."""
-    for name in sorted(only_tested(e, bound)):
+    for name in sorted(only_tested(e, schema, bound)):
+        kind = next(_types(e, name, schema), "object")
         raise InputError(
-            f"the variable '?{name}' occurs only under 'not', in a comparison or in a part of an 'or', where "
-            f"it finds no values; say what it is, e.g. (object ?{name})",
+            f"the variable '?{name}' occurs only under 'not', in a comparison, in something computed or in a part "
+            f"of an 'or', where it finds no values; say what it is, e.g. ({kind} ?{name})",
             place=variable_place(e, name),
         )
 
 
+def _types(e: Expression | Term, name: str, schema: Schema) -> Iterator[str]:
+    """The types of things that the variable must have where it is written."""
+    for part in parts_of(e):
+        yield from _types(part, name, schema)
+    if isinstance(e, Atom) and schema.is_type(e.predicate, len(e.args)):
+        if e.args == (Variable(name),):
+            yield e.predicate
+    elif isinstance(e, Atom | Call):
+        known = schema.function(e.function) if isinstance(e, Call) else schema.predicate(e.predicate)
+        for parameter, arg in zip(known.parameters, e.args, strict=False):  # their number is checked elsewhere
+            if isinstance(arg, Variable) and arg.name == name:
+                yield from (t for t in parameter.types if t in schema.types)
+
+
 def check_bound(e: Expression | Term, bindings: Mapping[str, Value]) -> None:
-    """Raise `UnknownNameError` if a free variable of `e` has no value that facts and comparisons can be about."""
+    """Raise an error unless all free variables of `e` have values that facts and comparisons can be about.
+
+    Raises:
+        UnknownNameError: one has no value.
+        SchemaError: one is a geometry.
+    """
     for name in sorted(free_variables(e)):
+        if isinstance(bindings.get(name), tuple):
+            hint = "write it into the condition: (geometry ...)"
+            raise SchemaError(f"'?{name}' cannot be a geometry; {hint}", place=variable_place(e, name))
         if not isinstance(bindings.get(name), Value):
             known = [one for one, value in bindings.items() if isinstance(value, Value)]
             raise unbound_error(name, variable_place(e, name), known)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.binding import check_answers, unbound_error
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.expression import (
     And,
@@ -27,7 +29,10 @@ from knowledge_base.language.expression import (
     TypedVariable,
     Variable,
 )
-from knowledge_base.schema import VALUE_TYPES, Schema, Signature
+
+if TYPE_CHECKING:  # a schema checks what its computed predicates read
+    from knowledge_base.computation import Computed
+    from knowledge_base.schema import Schema, Signature
 
 Free = Literal["error", "answers"]
 
@@ -52,12 +57,13 @@ def check(
     Raises:
         UnknownNameError: an undeclared predicate, function, type, variable or object.
         SchemaError: a wrong number of arguments, or a type that can never fit.
-        InputError: a query's variable that occurs only under `not` or in a comparison.
+        InputError: a query's variable that occurs only under `not` or in a comparison; nesting that is too deep.
     """
+    check_depth(e)
     checker = _Checker(schema, objects, variables or {}, free)
     checker.condition(e)
     if free == "answers":
-        check_answers(e, frozenset(variables or ()))
+        check_answers(e, frozenset(variables or ()), schema)
 
 
 def check_effect(
@@ -70,11 +76,13 @@ def check_effect(
 
     Args and errors are those of `check`; a type as effect is a `SchemaError`, since things keep their type.
     """
+    check_depth(effect)
     _Checker(schema, objects, variables or {}, "error").effect(effect)
 
 
 def check_term(term: Term, schema: Schema, variables: Mapping[str, str | None] | None = None) -> None:
     """Raise an error with its place unless `term` has a value on worlds of `schema`; args and errors as `check`."""
+    check_depth(term)
     _Checker(schema, None, variables or {}, "error").term(term)
 
 
@@ -88,9 +96,18 @@ def check_parameters(parameters: tuple[TypedVariable, ...], schema: Schema) -> d
     """
     for parameter in parameters:
         for type_name in parameter.types:
-            if type_name not in VALUE_TYPES:
-                schema.require_type(type_name, parameter.place)
+            schema.require_argument_type(type_name, parameter.place)
     return {p.name: _single(p.types) for p in parameters}
+
+
+def check_reads(computed: Computed[Any], schema: Schema) -> None:
+    """Raise an error with its place unless the computed predicate can read what it declares; errors as `check`."""
+    checker = _Checker(schema, None, check_parameters(computed.parameters, schema), "error")
+    for read in computed.reads:
+        if isinstance(read, Atom):
+            checker.condition(read)
+        else:
+            checker.term(read)
 
 
 def check_arity(signature: Signature, count: int, place: Place | None = None) -> None:
@@ -106,7 +123,9 @@ def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
     """Whether a value that is no thing's name may stand where one of the `wanted` types is expected."""
     if isinstance(value, bool):
         return "boolean" in wanted
-    return ("text" if isinstance(value, str) else "number") in wanted
+    if isinstance(value, str):
+        return "text" in wanted
+    return isinstance(value, int | float) and "number" in wanted
 
 
 def _written(term: Term) -> str:
@@ -166,7 +185,7 @@ class _Checker:
             case Add(atom) | Delete(atom):
                 if self.schema.is_type(atom.predicate, len(atom.args)):
                     raise SchemaError(f"'{atom.predicate}' is a type; things keep theirs", place=atom.place)
-                self.atom(atom)
+                self.arguments(self.schema.told(atom.predicate, atom.place), atom)
             case AllOf(parts):
                 for part in parts:
                     self.effect(part)
@@ -176,9 +195,25 @@ class _Checker:
             case When(condition, inner):
                 self.condition(condition)
                 self.effect(inner)
-            case Assign(_, call, value):
-                self.term(call)
-                self.number(value, effect.operator)
+            case Assign():
+                self.assignment(effect)
+
+    def assignment(self, effect: Assign) -> None:
+        """What is assigned must be what the function may be worth; all else works on numbers."""
+        result = self.schema.result(effect.call.function, effect.call.place)
+        self.term(effect.call)
+        if effect.operator != "assign" or result == "number":
+            self.number(effect.call, effect.operator)
+            self.number(effect.value, effect.operator)
+            return
+        self.term(effect.value)
+        types = self.types_of(effect.value)
+        if types is not None and result not in types:
+            raise SchemaError(
+                f"'{effect.call.function}' is worth a {result}, and {_written(effect.value)} is of type "
+                f"{' or '.join(types)}",
+                place=effect.value.place or effect.place,
+            )
 
     def atom(self, atom: Atom) -> None:
         if self.schema.is_type(atom.predicate, len(atom.args)):
@@ -244,8 +279,10 @@ class _Checker:
                 return self.scope.get(name)
             case Constant(value, quoted):
                 return self.types_of_value(value, quoted=quoted)
-            case _:
-                return ("number",)
+            case Call(function):
+                return (self.schema.result(function, term.place),)
+            case Arithmetic(operator):
+                return (GEOMETRY if operator == GEOMETRY else "number",)
 
     def types_of_value(self, value: Value, *, quoted: bool) -> tuple[str, ...] | None:
         if isinstance(value, bool):

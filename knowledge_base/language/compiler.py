@@ -6,14 +6,17 @@ counterexample, through the index and not by trying all objects.
 
 A search decides at every step anew which condition to look up next: the one with the fewest matches, given
 what is bound by then. What can be prepared for a step depends only on the conditions that are left, and is
-kept (`_Plan`).
+kept (`SearchPlan`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
 
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Fact
 from knowledge_base.language.check import check_arity
 from knowledge_base.language.expression import (
     And,
@@ -30,7 +33,7 @@ from knowledge_base.language.expression import (
     free_variables,
 )
 from knowledge_base.language.joins import Conjunct, Range, Step, candidates, conjuncts, opposite, order
-from knowledge_base.language.lookups import Lookup, Search, alternatives, distinct, smallest, things
+from knowledge_base.language.lookups import Answer, Lookup, Search, alternatives, distinct, smallest, things
 from knowledge_base.language.terms import (
     Bindings,
     Getter,
@@ -43,6 +46,7 @@ from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
 _MOST_STAGES = 1000
+Answers = Callable[[World, Bindings], list[Answer]]
 
 
 def compile_test(e: Expression, schema: Schema) -> Test:
@@ -67,9 +71,9 @@ def compile_test(e: Expression, schema: Schema) -> Test:
         case Imply(premise, conclusion):
             test = _any([_negation(compile_test(premise, schema)), compile_test(conclusion, schema)])
         case Exists():
-            test = _found(witnesses(e, schema))
+            test = _found(_witnessing(e, schema), schema, free_variables(e))
         case Forall():
-            test = _negation(_found(counterexamples(e, schema)))
+            test = _negation(_found(_refuting(e, schema), schema, free_variables(e)))
     return test
 
 
@@ -82,31 +86,88 @@ def compile_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Searc
     return _search(conjuncts(e), schema, bound)
 
 
+def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names: tuple[str, ...]) -> Answers:
+    """All that `compile_query` would find, as dictionaries of the variables `names`, which are those it finds.
+
+    No two are the same: facts and things are found once, and `distinct` sees to the rest.
+    """
+    plan = SearchPlan(conjuncts(e), schema, bound)
+    first_test, only = plan.first.test, plan.first.last
+    template: Answer = dict.fromkeys(names, "")
+    if isinstance(only, Lookup) and first_test is None:
+        return lambda world, bindings: only.all(world, bindings, template)
+
+    def answers(world: World, bindings: Bindings) -> list[Answer]:
+        found: list[Answer] = []
+        if first_test is not None and not first_test(world, bindings):
+            return found
+        for candidate, last in _ends(plan, world, bindings):
+            if last is None:
+                found.append({name: candidate[name] for name in names})
+            elif isinstance(last, Lookup):
+                answer = template.copy()
+                for name in names:
+                    if name in candidate:
+                        answer[name] = candidate[name]
+                found += last.all(world, candidate, answer)
+            else:
+                found += [{name: each[name] for name in names} for each in last(world, candidate)]
+        return found
+
+    return answers
+
+
 def witnesses(e: Exists, schema: Schema) -> Search:
     """A search for the choices of objects that make the body true."""
-    return _quantified(e.variables, e.body, schema, free_variables(e))
+    return _search(_witnessing(e, schema), schema, free_variables(e))
 
 
 def counterexamples(e: Forall, schema: Schema) -> Search:
     """A search for the choices of objects that make the body false."""
-    return _quantified(e.variables, opposite(e.body), schema, free_variables(e))
+    return _search(_refuting(e, schema), schema, free_variables(e))
 
 
-def _quantified(
-    variables: tuple[TypedVariable, ...], body: Expression, schema: Schema, bound: frozenset[str]
-) -> Search:
+def _witnessing(e: Exists, schema: Schema) -> list[Conjunct]:
+    return [*_ranges(e.variables, schema), *conjuncts(e.body)]
+
+
+def _refuting(e: Forall, schema: Schema) -> list[Conjunct]:
+    return [*_ranges(e.variables, schema), *conjuncts(opposite(e.body))]
+
+
+def _ranges(variables: tuple[TypedVariable, ...], schema: Schema) -> list[Range]:
     for variable in variables:
         for type_name in variable.types:
             schema.require_type(type_name, variable.place)
-    return _search([*map(Range, variables), *conjuncts(body)], schema, bound)
+    return [Range(v) for v in variables]
 
 
 def _atom(atom: Atom, schema: Schema) -> Test:
     if schema.is_type(atom.predicate, len(atom.args)):
         return _type_test(compile_term(atom.args[0], schema), (atom.predicate,), schema)
     check_arity(schema.predicate(atom.predicate, atom.place), len(atom.args), atom.place)
+    if atom.predicate in schema.computed:
+        return _computed(atom, schema)
     predicate, arguments = atom.predicate, compile_arguments(atom.args, schema)
     return lambda world, bindings: world.holds(predicate, arguments(world, bindings))
+
+
+def _computed(atom: Atom, schema: Schema) -> Test:
+    of, arguments = schema.computed[atom.predicate], compile_arguments(atom.args, schema)
+    inputs = tuple(
+        compile_test(read, schema) if isinstance(read, Atom) else compile_term(read, schema)
+        for read in of.inputs(atom.args)
+    )
+
+    def test(world: World, bindings: Bindings) -> bool:
+        values = [get(world, bindings) for get in inputs]
+        try:
+            return of.judge(values)
+        except InputError as error:
+            said = Fact(of.name, arguments(world, bindings))
+            raise InputError(f"{said} cannot be computed: {error}", place=atom.place) from error
+
+    return test
 
 
 def _type_test(get: Getter, types: tuple[str, ...], schema: Schema) -> Test:
@@ -143,68 +204,132 @@ def _any(tests: list[Test]) -> Test:
     return test
 
 
-def _found(search: Search) -> Test:
-    return lambda world, bindings: next(search(world, bindings), None) is not None
+def _found(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Test:
+    """Whether a search finds anything; it takes fewer frames than the search, which nested quantifiers pay for."""
+    plan = SearchPlan(conditions, schema, bound)
+    first_test = plan.first.test
+
+    def test(world: World, bindings: Bindings) -> bool:
+        if first_test is not None and not first_test(world, bindings):  # most searches of conditions end here
+            return False
+        for candidate, last in _ends(plan, world, bindings):
+            if last is None or next(last(world, candidate), None) is not None:
+                return True
+        return False
+
+    return test
 
 
 def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Search:
-    plan = _Plan([_as_range(c, schema) for c in conditions], schema, bound)
+    plan = SearchPlan(conditions, schema, bound)
+    first_test = plan.first.test
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
-        """Backtracking with a stack of its own, so that long conjunctions do not recurse."""
-        stack: list[tuple[_Stage, Iterator[Bindings]]] = [(plan.first, iter((bindings,)))]
-        while stack:
-            stage, found = stack[-1]
-            candidate = next(found, None)
-            if candidate is None:
-                stack.pop()
-            elif stage.test(world, candidate):
-                if not stage.choices:
-                    yield candidate
-                    continue
-                i, lookup = smallest(stage.choices, world, candidate)
-                stack.append((plan.after(stage, i), lookup(world, candidate)))
+        if first_test is not None and not first_test(world, bindings):
+            return iter(())
+        return _candidates(plan, world, bindings)
 
     return search
 
 
-@dataclass(frozen=True, slots=True)
-class _Stage:
-    """What to do when these conditions (by number) are left: the tests, then one of the look-ups."""
+def _candidates(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[Bindings]:
+    for candidate, last in _ends(plan, world, bindings):
+        if last is None:
+            yield candidate
+        else:
+            yield from last(world, candidate)
 
-    test: Test
+
+def _ends(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[tuple[Bindings, Lookup | Search | None]]:
+    """All candidates for which only one look-up is left, whatever it finds being right, or nothing at all.
+
+    The plan's first test was passed. Backtracking with a stack of its own, so that long conjunctions do not recurse.
+    """
+    stack: list[tuple[Stage, Iterator[Bindings]]] = [(plan.tested, iter((bindings,)))]
+    while stack:
+        stage, found = stack[-1]
+        for candidate in found:
+            if stage.test is not None and not stage.test(world, candidate):
+                continue
+            if stage.last is not None or not stage.choices:
+                yield candidate, stage.last
+                continue
+            i, lookup = smallest(stage.choices, world, candidate)
+            stack.append((plan.after(stage, i), lookup(world, candidate)))
+            break
+        else:
+            stack.pop()
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """What to do next: the tests, then one of the look-ups.
+
+    Attributes:
+        test: whether the conditions hold that need no more values; `None` if there are none.
+        choices: the look-ups that may come next, by the number of their condition.
+        left: the conditions that are not dealt with then.
+        bound: the variables that have a value.
+        last: the look-up, if it is the last: nothing is left to be tested of what it finds.
+        after: the stages that follow, as far as they are prepared.
+    """
+
+    test: Test | None
     choices: tuple[tuple[int, Lookup | Search], ...]
     left: tuple[int, ...]
     bound: frozenset[str]
+    last: Lookup | Search | None
+    after: dict[int, Stage] = field(default_factory=dict)
 
 
-class _Plan:
-    """The stages of one search, each prepared when it is first reached."""
+class SearchPlan:
+    """The stages of one search, each prepared when it is first reached.
 
-    def __init__(self, conditions: list[Conjunct], schema: Schema, bound: frozenset[str]) -> None:
-        self._steps = order(conditions, bound)
+    Attributes:
+        steps: the conditions; stages have their numbers.
+        first: where the search begins.
+        tested: the same without its test, for who has made it.
+    """
+
+    def __init__(self, conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> None:
+        self.steps = order((_as_range(c, schema) for c in conditions), bound, schema)
         self._schema = schema
-        self._stages: dict[tuple[int, ...], _Stage] = {}
-        self.first = stage = self._stage(tuple(range(len(self._steps))), bound)
+        self._stages: dict[tuple[int, ...], Stage] = {}
+        self.first = stage = self._stage(tuple(range(len(self.steps))), bound)
         while stage.choices:  # one way through, so that every mistake in the text shows now
             stage = self.after(stage, stage.choices[0][0])
+        self.tested = replace(self.first, test=None)
 
-    def after(self, stage: _Stage, chosen: int) -> _Stage:
+    def after(self, stage: Stage, chosen: int) -> Stage:
         """The stage that follows when the condition `chosen` was looked up."""
-        left = tuple([i for i in stage.left if i != chosen])
-        found = self._stages.get(left)
+        found = stage.after.get(chosen)
         if found is None:
-            if len(self._stages) >= _MOST_STAGES:
-                self._stages.clear()
-            found = self._stages[left] = self._stage(left, stage.bound | self._steps[chosen].free)
+            left = tuple([i for i in stage.left if i != chosen])
+            found = self._stages.get(left)
+            if found is None:
+                if len(self._stages) >= _MOST_STAGES:
+                    self._stages.clear()
+                    self.first.after.clear()
+                found = self._stages[left] = self._stage(left, stage.bound | self.steps[chosen].free)
+            stage.after[chosen] = found
         return found
 
-    def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> _Stage:
-        steps = {i: self._steps[i] for i in left}
-        tests = [_conjunct_test(s.conjunct, self._schema) for s in steps.values() if s.free <= bound]
+    def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> Stage:
+        steps = {i: self.steps[i] for i in left}
         open_steps = {i: s for i, s in steps.items() if not s.free <= bound}
-        choices = [(i, _lookup(s, self._schema, bound)) for i, s in candidates(open_steps, bound)]
-        return _Stage(_all(tests), tuple(choices), tuple(open_steps), bound)
+        # By `map` and not in comprehensions, whose frames deep nesting would have to pay for.
+        tests = list(map(self._test, (s.conjunct for i, s in steps.items() if i not in open_steps)))
+        chosen = candidates(open_steps, bound)
+        lookups = map(partial(_lookup, schema=self._schema, bound=bound), (step for _, step in chosen))
+        choices = tuple(zip((i for i, _ in chosen), lookups, strict=True))
+        last = choices[0][1] if len(open_steps) == 1 else None
+        return Stage(_all(tests) if tests else None, choices, tuple(open_steps), bound, last)
+
+    def _test(self, conjunct: Conjunct) -> Test:
+        if not isinstance(conjunct, Range):
+            return compile_test(conjunct, self._schema)
+        variable = conjunct.variable
+        return _type_test(compile_term(Variable(variable.name), self._schema), variable.types, self._schema)
 
 
 def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
@@ -214,13 +339,6 @@ def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
             return Range(TypedVariable(variable, (name,), place=conjunct.place))
         case _:
             return conjunct
-
-
-def _conjunct_test(conjunct: Conjunct, schema: Schema) -> Test:
-    if isinstance(conjunct, Range):
-        variable = conjunct.variable
-        return _type_test(compile_term(Variable(variable.name), schema), variable.types, schema)
-    return compile_test(conjunct, schema)
 
 
 def _lookup(step: Step, schema: Schema, bound: frozenset[str]) -> Lookup | Search:
@@ -234,8 +352,8 @@ def _lookup(step: Step, schema: Schema, bound: frozenset[str]) -> Lookup | Searc
             return Lookup(atom, schema, finds)
         case Or(parts):
             return distinct(alternatives([_search(conjuncts(p), schema, bound) for p in parts]), finds)
-        case Exists(variables, body):
+        case Exists(variables) as exists:
             hidden = frozenset(v.name for v in variables)
-            return distinct(_quantified(variables, body, schema, bound - hidden), finds)
+            return distinct(_search(_witnessing(exists, schema), schema, bound - hidden), finds)
         case _:
             raise AssertionError("only these conditions find values")

@@ -59,7 +59,7 @@ class When(Located):
 
 @dataclass(frozen=True, slots=True)
 class Assign(Located):
-    """A numeric fluent changes: `(increase (failures ?i) 1)`; `operator` is one of `ASSIGNMENTS`."""
+    """What a function is worth changes: `(increase (failures ?i) 1)`; `operator` is one of `ASSIGNMENTS`."""
 
     operator: str
     call: Call

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from knowledge_base.language.application import apply_effect
-from knowledge_base.language.asking import evaluate_term, holds, query
+from knowledge_base.language.asking import evaluate_argument, evaluate_term, holds, query
 from knowledge_base.language.explanation import Explanation, explain
 from knowledge_base.language.world import World
 
-__all__ = ["Explanation", "World", "apply_effect", "evaluate_term", "explain", "holds", "query"]
+__all__ = ["Explanation", "World", "apply_effect", "evaluate_argument", "evaluate_term", "explain", "holds", "query"]

@@ -5,13 +5,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from knowledge_base.computation import Read
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.application import choices
-from knowledge_base.language.asking import NO_BINDINGS, evaluate_term, holds
+from knowledge_base.language.asking import NO_BINDINGS, evaluate_term, holds, prepare
 from knowledge_base.language.binding import check_bound
 from knowledge_base.language.compiler import counterexamples, witnesses
+from knowledge_base.language.depth import check_depth
 from knowledge_base.language.expression import (
     And,
     Arithmetic,
@@ -25,10 +29,14 @@ from knowledge_base.language.expression import (
     Not,
     Or,
     substitute,
+    substitute_term,
 )
 from knowledge_base.language.printer import to_text, value_text
 from knowledge_base.language.terms import Bindings
 from knowledge_base.language.world import World
+
+_Judged = tuple["Explanation", InputError | None]
+"""A part, and why it cannot be computed."""
 
 MOST_TRIED = 200
 """How many choices of a false `exists` are looked at for the one that comes nearest."""
@@ -40,10 +48,11 @@ class Explanation:
 
     Attributes:
         text: the condition in the language.
-        truth: whether it holds.
+        truth: whether it holds; what cannot be computed counts as false where another part decides.
         children: its parts, all of them judged; for `exists` and `forall` the one choice that shows it, if
             there is one (a witness, the nearest miss, a counterexample).
-        detail: for a comparison with computed sides what they are worth; for a choice, what was chosen.
+        detail: for a comparison with computed sides what they are worth, for a computed predicate what its
+            inputs are; for a choice, what was chosen; why something cannot be computed.
         decider: which of the children decides; `None` for a leaf.
     """
 
@@ -81,8 +90,9 @@ def explain(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BIND
 
     Raises:
         UnknownNameError: a free variable is not bound, or a name is not declared.
-        SchemaError: as for `holds`.
+        SchemaError, InputError: as for `holds`.
     """
+    check_depth(e)
     check_bound(e, bindings)
     return _explain(e, world, bindings)
 
@@ -91,18 +101,16 @@ def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
     text = to_text(substitute(e, bindings))
     match e:
         case Atom() | Comparison():
-            detail = _computed(e, world, bindings) if isinstance(e, Comparison) else None
-            found = Explanation(text, holds(e, world, bindings), detail=detail)
+            found = Explanation(text, holds(e, world, bindings), detail=_detail(e, world, bindings))
         case Not(body):
             child = _explain(body, world, bindings)
             found = Explanation(text, not child.truth, (child,), decider=0)
         case And(parts):
-            found = _junction(text, [_explain(p, world, bindings) for p in parts], neutral=True)
+            found = _junction(text, [_judged(p, world, bindings) for p in parts], neutral=True)
         case Or(parts):
-            found = _junction(text, [_explain(p, world, bindings) for p in parts], neutral=False)
+            found = _junction(text, [_judged(p, world, bindings) for p in parts], neutral=False)
         case Imply(premise, conclusion):
-            first, second = (_explain(p, world, bindings) for p in (premise, conclusion))
-            found = _implication(text, first, second)
+            found = _implication(text, *[_judged(p, world, bindings) for p in (premise, conclusion)])
         case Exists():
             found = _existence(text, e, world, bindings)
         case Forall():
@@ -110,17 +118,36 @@ def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
     return found
 
 
-def _junction(text: str, children: Sequence[Explanation], *, neutral: bool) -> Explanation:
+def _judged(e: Expression, world: World, bindings: Bindings) -> _Judged:
+    """A part, whose failure need not matter when another one decides."""
+    try:
+        return _explain(e, world, bindings), None
+    except InputError as error:
+        prepare(e, world.schema)  # a mistake in the text is one even if the part does not matter
+        text = to_text(substitute(e, bindings))
+        return Explanation(text, truth=False, detail=f"cannot be computed: {error}"), error
+
+
+def _junction(text: str, parts: Sequence[_Judged], *, neutral: bool) -> Explanation:
     """`and` (neutral: true) or `or` (neutral: false); the first part that is not neutral decides."""
-    deciding = [i for i, c in enumerate(children) if c.truth is not neutral]
+    children = tuple(child for child, _ in parts)
+    deciding = [i for i, (child, error) in enumerate(parts) if error is None and child.truth is not neutral]
+    error = next((error for _, error in parts if error is not None), None)
+    if error is not None and not deciding:
+        raise error
     truth = not neutral if deciding else neutral
     decider = (deciding or [0])[0] if children else None
-    return Explanation(text, truth, tuple(children), decider=decider)
+    return Explanation(text, truth, children, decider=decider)
 
 
-def _implication(text: str, premise: Explanation, conclusion: Explanation) -> Explanation:
-    truth = conclusion.truth or not premise.truth
-    return Explanation(text, truth, (premise, conclusion), decider=1 if premise.truth else 0)
+def _implication(text: str, premise: _Judged, conclusion: _Judged) -> Explanation:
+    (first, unknown_first), (second, unknown_second) = premise, conclusion
+    by_premise = unknown_first is None and not first.truth
+    by_conclusion = unknown_second is None and second.truth
+    error = unknown_first or unknown_second
+    if error is not None and not (by_premise or by_conclusion):
+        raise error
+    return Explanation(text, by_premise or by_conclusion, (first, second), decider=0 if by_premise else 1)
 
 
 def _existence(text: str, e: Exists, world: World, bindings: Bindings) -> Explanation:
@@ -129,11 +156,11 @@ def _existence(text: str, e: Exists, world: World, bindings: Bindings) -> Explan
     if witness is not None:
         return _shown(text, e.body, names, world, witness, truth=True)
     tried = itertools.islice(choices(e.variables, world), MOST_TRIED)
-    misses = [_explain(e.body, world, {**bindings, **choice}) for choice in tried]
-    if not misses:
+    nearest = max(({**bindings, **one} for one in tried), key=partial(_nearness, e.body, world), default=None)
+    if nearest is None:
         return Explanation(text, truth=False, detail="there is nothing to choose from")
-    nearest = max(misses, key=_nearness)
-    return Explanation(text, truth=False, children=(nearest,), detail="the nearest miss", decider=0)
+    child = _explain(e.body, world, nearest)
+    return Explanation(text, truth=False, children=(child,), detail="the nearest miss", decider=0)
 
 
 def _universality(text: str, e: Forall, world: World, bindings: Bindings) -> Explanation:
@@ -151,12 +178,36 @@ def _shown(
     return Explanation(text, truth, (child,), detail=chosen or None, decider=0)
 
 
-def _nearness(miss: Explanation) -> float:
-    """The share of parts that hold, so that the nearest miss can be shown."""
-    return sum(c.truth for c in miss.children) / len(miss.children) if miss.children else 0.0
+def _nearness(body: Expression, world: World, choice: Bindings) -> int:
+    """How many parts hold; only asked, since explaining all choices multiplies with every nested `exists`."""
+    return sum(_is_so(part, world, choice) for part in body.parts) if isinstance(body, And) else 0
 
 
-def _computed(e: Comparison, world: World, bindings: Bindings) -> str | None:
+def _is_so(e: Expression, world: World, bindings: Bindings) -> bool:
+    try:
+        return holds(e, world, bindings)
+    except InputError:
+        return False
+
+
+def _detail(e: Atom | Comparison, world: World, bindings: Bindings) -> str | None:
+    """What stands behind a leaf that does not just say a fact."""
+    if isinstance(e, Comparison):
+        return _compared(e, world, bindings)
+    of = world.schema.computed.get(e.predicate)
+    if of is None:
+        return None
+    inputs = of.inputs(tuple(substitute_term(arg, bindings) for arg in e.args))
+    return ", ".join(_input(read, world) for read in inputs) or None
+
+
+def _input(read: Read, world: World) -> str:
+    if isinstance(read, Atom):
+        return f"{to_text(read)} is {'true' if holds(read, world) else 'false'}"
+    return f"{to_text(read)} = {value_text(evaluate_term(read, world))}"
+
+
+def _compared(e: Comparison, world: World, bindings: Bindings) -> str | None:
     if not any(isinstance(side, Call | Arithmetic) for side in (e.left, e.right)):
         return None
     left, right = (value_text(evaluate_term(side, world, bindings)) for side in (e.left, e.right))

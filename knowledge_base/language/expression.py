@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
+from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place
 from knowledge_base.facts import Value
 
@@ -81,7 +82,7 @@ class Constant(Located):
 
 @dataclass(frozen=True, slots=True)
 class Call(Located):
-    """A numeric fluent's value: `(failures ?item)`."""
+    """What a function is worth: `(failures ?item)`."""
 
     function: str
     args: tuple[Term, ...] = ()
@@ -89,7 +90,7 @@ class Call(Located):
 
 @dataclass(frozen=True, slots=True)
 class Arithmetic(Located):
-    """`+ - * /` on numbers; `-` with one argument negates."""
+    """Computed from numbers: `+ - * /`, where `-` with one argument negates; `geometry` puts them in a row."""
 
     operator: str
     args: tuple[Term, ...]
@@ -167,6 +168,8 @@ TRUE = And(())
 
 COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
 ARITHMETIC = ("+", "-", "*", "/")
+COMPUTING = (*ARITHMETIC, GEOMETRY)
+"""The words that open a term and are not functions."""
 KEYWORDS = ("and", "or", "not", "imply", "exists", "forall", *COMPARISONS)
 """The words that open a condition and are not predicates."""
 

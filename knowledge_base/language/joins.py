@@ -7,7 +7,10 @@ then `or` and `exists`. Among atoms the one with the fewest matches is taken, if
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+from itertools import islice
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.binding import found_variables
@@ -24,6 +27,7 @@ from knowledge_base.language.expression import (
     free_variables,
     variable_place,
 )
+from knowledge_base.schema import Schema
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +48,22 @@ class Step:
 
     conjunct: Conjunct
     free: frozenset[str]
+    schema: Schema
 
-    def is_ready(self, bound: frozenset[str]) -> bool:
+    def is_ready(self, bound: AbstractSet[str]) -> bool:
         """Whether it can be done when the variables `bound` have values."""
-        return self.free <= bound | _finds(self.conjunct, bound)
+        unbound = self.free - bound
+        return not unbound or unbound <= _finds(self.conjunct, self.free & bound, self.schema)
 
-    def cost(self, bound: frozenset[str]) -> tuple[int, int, int]:
-        """Kind of look-up (tests are 0 to 2), then open arguments, then bound ones; smaller is earlier."""
+    def cost(self, bound: AbstractSet[str]) -> tuple[int, int, int]:
+        """Kind of look-up (tests are 0 to 2), then open arguments, then bound ones; smaller is earlier.
+
+        It never grows with more variables in `bound`.
+        """
         unbound = len(self.free - bound)
         match self.conjunct:
+            case Atom(name, _) if name in self.schema.computed:
+                return (2, 0, 0)
             case Atom(_, args):
                 open_args = sum(isinstance(a, Variable) and a.name not in bound for a in args)
                 found = 3 if open_args < len(args) else 4
@@ -87,23 +98,34 @@ def opposite(e: Expression) -> Expression:
             return Not(e, place=e.place)
 
 
-def order(conditions: Iterable[Conjunct], bound: frozenset[str]) -> list[Step]:
+def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Schema) -> list[Step]:
     """The look-ups in a good order when the variables `bound` have values and no numbers of facts are known.
 
     Raises:
         InputError: a variable is only tested and nothing finds values for it.
     """
-    pending = [Step(c, _free(c)) for c in conditions]
-    steps: list[Step] = []
-    while pending:
-        ready = [s for s in pending if s.is_ready(bound)]
-        if not ready:
-            raise _unfound(pending, bound)
-        best = min(ready, key=lambda s: s.cost(bound))
-        pending.remove(best)
-        steps.append(best)
-        bound |= best.free
-    return steps
+    steps = [Step(c, _free(c), schema) for c in conditions]
+    known = set(bound)
+    users: dict[str, list[int]] = {}
+    for i, step in enumerate(steps):
+        for name in step.free - known:
+            users.setdefault(name, []).append(i)
+    taken: dict[int, Step] = {}
+    agenda = [(s.cost(known), i) for i, s in enumerate(steps) if s.is_ready(known)]
+    heapify(agenda)
+    while agenda:
+        _, i = heappop(agenda)
+        if i in taken:  # it stood there with an earlier, greater cost
+            continue
+        taken[i] = steps[i]
+        found = steps[i].free - known
+        known |= found
+        for user in dict.fromkeys(user for name in found for user in users[name]):
+            if user not in taken and steps[user].is_ready(known):
+                heappush(agenda, (steps[user].cost(known), user))
+    if len(taken) < len(steps):
+        raise _unfound([s for i, s in enumerate(steps) if i not in taken], known)
+    return list(taken.values())
 
 
 def candidates(steps: Mapping[int, Step], bound: frozenset[str]) -> list[tuple[int, Step]]:
@@ -111,9 +133,9 @@ def candidates(steps: Mapping[int, Step], bound: frozenset[str]) -> list[tuple[i
 
     Only a few, because they are compared by number of matches each time.
     """
-    ready = [(i, s) for i, s in steps.items() if s.is_ready(bound)]
-    atoms = [(i, s) for i, s in ready if isinstance(s.conjunct, Atom)]
-    return atoms[:_MOST_COMPARED] or ready[:1]
+    atoms = ((i, s) for i, s in steps.items() if isinstance(s.conjunct, Atom) and s.is_ready(bound))
+    others = ((i, s) for i, s in steps.items() if s.is_ready(bound))
+    return list(islice(atoms, _MOST_COMPARED)) or list(islice(others, 1))
 
 
 def _free(conjunct: Conjunct) -> frozenset[str]:
@@ -122,11 +144,11 @@ def _free(conjunct: Conjunct) -> frozenset[str]:
     return free_variables(conjunct)
 
 
-def _finds(conjunct: Conjunct, bound: frozenset[str]) -> frozenset[str]:
-    return _free(conjunct) if isinstance(conjunct, Range) else found_variables(conjunct, bound)
+def _finds(conjunct: Conjunct, bound: frozenset[str], schema: Schema) -> frozenset[str]:
+    return _free(conjunct) if isinstance(conjunct, Range) else found_variables(conjunct, schema, bound)
 
 
-def _unfound(pending: list[Step], bound: frozenset[str]) -> InputError:
+def _unfound(pending: list[Step], bound: AbstractSet[str]) -> InputError:
     stuck = [s.conjunct for s in pending if not isinstance(s.conjunct, Range)]
     names = sorted(frozenset().union(*map(free_variables, stuck)) - bound)
     place = next((p for e in stuck if (p := variable_place(e, names[0])) is not None), None)

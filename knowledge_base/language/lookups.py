@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import Atom, TypedVariable, Variable, free_variables
-from knowledge_base.language.terms import Bindings, Getter, compile_term
+from knowledge_base.language.terms import Argument, Bindings, compile_argument
 from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
 Search = Callable[[World, Bindings], Iterator[Bindings]]
+Answer = dict[str, Value]
 
 
 class Lookup:
@@ -19,36 +20,76 @@ class Lookup:
     def __init__(self, atom: Atom, schema: Schema, finds: frozenset[str]) -> None:
         first: dict[str, int] = {}
         self._repeated: list[tuple[int, int]] = []
-        self._computed: list[tuple[int, Getter]] = []
-        self._getters: list[Getter | None] = []
+        self._computed: list[tuple[int, Argument]] = []
+        getters: list[Argument | None] = []
         self._predicate = atom.predicate
         for position, arg in enumerate(atom.args):
             if isinstance(arg, Variable) and arg.name in finds:
-                self._getters.append(None)
+                getters.append(None)
                 if first.setdefault(arg.name, position) != position:
                     self._repeated.append((first[arg.name], position))
             elif free_variables(arg).isdisjoint(finds):
-                self._getters.append(compile_term(arg, schema))
+                getters.append(compile_argument(arg, schema))
             else:  # computed from what the other arguments find
-                self._getters.append(None)
-                self._computed.append((position, compile_term(arg, schema)))
+                getters.append(None)
+                self._computed.append((position, compile_argument(arg, schema)))
         self._found = tuple(first.items())
+        self._single = self._found[0] if len(first) == 1 else None
+        self._pattern = _pattern(getters)
 
     def __call__(self, world: World, bindings: Bindings) -> Iterator[Bindings]:
-        """`bindings` with the values of the open variables, for every fact that matches."""
-        for args in world.match(self._predicate, self._pattern(world, bindings)):
-            if all(args[i] == args[j] for i, j in self._repeated):
-                found = {**bindings, **{name: args[i] for name, i in self._found}}
-                if not self._computed or all(args[i] == get(world, found) for i, get in self._computed):
-                    yield found
+        """`bindings` with the values of the open variables, for every fact that matches; looked up one by one."""
+        matches = self._matches(world, bindings)
+        if self._single is not None:
+            name, i = self._single
+            return ({**bindings, name: args[i]} for args in matches)
+        return (self._extended(bindings, args) for args in matches)
+
+    def all(self, world: World, bindings: Bindings, answer: Answer) -> list[Answer]:
+        """`answer`, which has places for them, with the values of the open variables, for every fact that matches."""
+        matches = self._matches(world, bindings)
+        if self._single is not None:
+            name, i = self._single
+            if len(answer) == 1:
+                return [{name: args[i]} for args in matches]
+            return [{**answer, name: args[i]} for args in matches]
+        return [self._extended(answer, args) for args in matches]
 
     def size(self, world: World, bindings: Bindings) -> int:
         """At most how many facts match; 0 if the world cannot say so cheaply."""
         estimate = getattr(world, "estimate", None)
         return estimate(self._predicate, self._pattern(world, bindings)) if estimate else 0
 
-    def _pattern(self, world: World, bindings: Bindings) -> tuple[Value | None, ...]:
-        return tuple([get and get(world, bindings) for get in self._getters])
+    def _matches(self, world: World, bindings: Bindings) -> Iterable[tuple[Value, ...]]:
+        matches = world.match(self._predicate, self._pattern(world, bindings))
+        if not (self._repeated or self._computed):
+            return matches
+        return (args for args in matches if self._agrees(args, world, bindings))
+
+    def _agrees(self, args: tuple[Value, ...], world: World, bindings: Bindings) -> bool:
+        if any(args[i] != args[j] for i, j in self._repeated):
+            return False
+        found = self._extended(bindings, args)
+        return all(args[i] == get(world, found) for i, get in self._computed)
+
+    def _extended(self, bindings: Bindings, args: tuple[Value, ...]) -> Answer:
+        found = dict(bindings)
+        for name, i in self._found:
+            found[name] = args[i]
+        return found
+
+
+def _pattern(getters: Sequence[Argument | None]) -> Callable[[World, Bindings], tuple[Value | None, ...]]:
+    """What to look for; most look-ups go from one end of an arc to the other."""
+    match getters:
+        case [None, None]:
+            return lambda _world, _bindings: (None, None)
+        case [None, end] if end:
+            return lambda world, bindings: (None, end(world, bindings))
+        case [start, None] if start:
+            return lambda world, bindings: (start(world, bindings), None)
+        case _:
+            return lambda world, bindings: tuple([get and get(world, bindings) for get in getters])
 
 
 def smallest(
@@ -57,7 +98,13 @@ def smallest(
     """The choice with the fewest matches; the first of them, or the only one without counting."""
     if len(choices) == 1:
         return choices[0]
-    return min(choices, key=lambda c: c[1].size(world, bindings) if isinstance(c[1], Lookup) else 0)
+    found, least = choices[0], -1
+    for choice in choices:
+        lookup = choice[1]
+        size = lookup.size(world, bindings) if isinstance(lookup, Lookup) else 0
+        if least < 0 or size < least:
+            found, least = choice, size
+    return found
 
 
 def things(variable: TypedVariable) -> Search:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+from knowledge_base.content import GEOMETRY, MOST_NUMBERS
 from knowledge_base.errors import ParseError, Place, nearest
 from knowledge_base.language.effect import (
     ASSIGNMENTS,
@@ -22,8 +23,8 @@ from knowledge_base.language.effect import (
     When,
 )
 from knowledge_base.language.expression import (
-    ARITHMETIC,
     COMPARISONS,
+    COMPUTING,
     KEYWORDS,
     TRUTH_VALUES,
     And,
@@ -47,7 +48,8 @@ from knowledge_base.language.typed_list import parse_typed_list, parse_variables
 
 __all__ = ["parse_condition", "parse_effect", "parse_term", "parse_typed_list", "parse_variables"]
 
-_LONGEST_NUMBER = 40
+LONGEST_NUMBER = 40
+"""Characters of a number; longer ones are more likely a mistake, and slow to read."""
 
 
 def parse_condition(text: str | Node, source: str | None = None) -> Expression:
@@ -83,7 +85,7 @@ def parse_effect(text: str | Node, source: str | None = None) -> Effect:
 
 
 def parse_term(text: str | Node, source: str | None = None) -> Term:
-    """A variable, name, number, quoted text, numeric fluent or arithmetic.
+    """A variable, name, number, quoted text, function, arithmetic or geometry.
 
     Raises:
         ParseError: the form is wrong.
@@ -155,7 +157,7 @@ def _keyword_effect(head: str, args: Sequence[Node], group: Group) -> Effect:
         condition, effect = _take(args, 2, group, "(when CONDITION EFFECT)")
         return When(parse_condition(condition), parse_effect(effect), place=place)
     fluent, value = _take(args, 2, group, f"({head} (FUNCTION ...) NUMBER)")
-    return Assign(head, _call(_group(fluent, "a numeric fluent")), parse_term(value), place=place)
+    return Assign(head, _call(_group(fluent, "a function")), parse_term(value), place=place)
 
 
 def _effect_atom(node: Node) -> Atom:
@@ -199,8 +201,8 @@ def _simple_term(word: Word) -> Term:
 
 
 def _number(word: Word) -> int | float:
-    if len(word.text) > _LONGEST_NUMBER:
-        raise ParseError(f"a number has at most {_LONGEST_NUMBER} characters", place=word.place)
+    if len(word.text) > LONGEST_NUMBER:
+        raise ParseError(f"a number has at most {LONGEST_NUMBER} characters", place=word.place)
     try:
         return int(word.text)
     except ValueError:
@@ -211,10 +213,14 @@ def _number(word: Word) -> int | float:
 
 
 def _compound_term(group: Group) -> Term:
-    head = _head(group, "a function's name or one of + - * /")
-    if head not in ARITHMETIC:
+    head = _head(group, "a function's name or one of " + " ".join(COMPUTING))
+    if head not in COMPUTING:
         return _call(group)
     args = tuple(parse_term(a) for a in group.items[1:])
+    if head == GEOMETRY:
+        if len(args) > MOST_NUMBERS:
+            raise ParseError(f"a geometry has at most {MOST_NUMBERS} numbers; found {len(args)}", place=group.place)
+        return Arithmetic(head, args, place=group.place)
     fewest, most = (1 if head == "-" else 2), (2 if head in "-/" else len(args))
     if not fewest <= len(args) <= most:
         raise ParseError(f"'{head}' takes two numbers; found {len(args)}", place=group.place)
@@ -223,6 +229,6 @@ def _compound_term(group: Group) -> Term:
 
 def _call(group: Group) -> Call:
     head = _head(group, "a function's name")
-    if head in (*KEYWORDS, *ARITHMETIC):
-        raise ParseError(f"'{head}' is not a function; a name, number or numeric fluent is expected", place=group.place)
+    if head in (*KEYWORDS, *COMPUTING):
+        raise ParseError(f"'{head}' is not a function; a name, number or function is expected", place=group.place)
     return Call(head, tuple(parse_term(a) for a in group.items[1:]), place=group.place)

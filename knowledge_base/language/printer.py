@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from knowledge_base.facts import Value
+from knowledge_base.content import GEOMETRY
+from knowledge_base.facts import Content
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.expression import (
     And,
@@ -44,8 +45,10 @@ def to_text(node: Expression | Term | Effect) -> str:
             return "(" + " ".join([head, *map(to_text, parts)]) + ")"
 
 
-def value_text(value: Value, *, quoted: bool = False) -> str:
-    """A value as the language writes it: `cup1`, `0.5`, `true`, `"red cup"`."""
+def value_text(value: Content, *, quoted: bool = False) -> str:
+    """A value as the language writes it: `cup1`, `0.5`, `true`, `"red cup"`, `(geometry 0.4 0.1)`."""
+    if isinstance(value, tuple):
+        return "(" + " ".join([GEOMETRY, *map(value_text, value)]) + ")"
     if isinstance(value, bool):
         return "true" if value else "false"
     if not isinstance(value, str):

@@ -3,7 +3,8 @@ r"""Text to nested groups of words: the outer form of all PDDL text.
 A word is a run of characters other than blanks, parentheses, quotes and semicolons, and `?` begins a new one
 (`(on?x ?y)` is found in files); `;` starts a comment; `"..."` is text with the escapes `\"`, `\\` and `\n`. Reading
 is iterative; nesting is limited to `MAX_DEPTH` because everything that follows recurses, and nobody writes conditions
-that deep.
+that deep. Compiling nested quantifiers takes most, seven Python frames for each, so that with a caller that has used
+150 of the 1,000 frames Python allows, about 120 would be the end.
 """
 
 from __future__ import annotations

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
+from operator import itemgetter
+from typing import cast
 
+from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import InputError, Place, SchemaError
-from knowledge_base.facts import Value
+from knowledge_base.facts import Content, Value
 from knowledge_base.language.check import check_arity
 from knowledge_base.language.expression import Arithmetic, Call, Comparison, Constant, Term, Variable
 from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
 Bindings = Mapping[str, Value]
-Getter = Callable[[World, Bindings], Value]
+Getter = Callable[[World, Bindings], Content]
+Argument = Callable[[World, Bindings], Value]
 Test = Callable[[World, Bindings], bool]
 Number = int | float
 
@@ -54,8 +58,24 @@ def compile_arguments(terms: tuple[Term, ...], schema: Schema) -> Callable[[Worl
     constants = tuple(t.value for t in terms if isinstance(t, Constant))
     if len(constants) == len(terms):
         return lambda _world, _bindings: constants
-    getters = tuple(compile_term(t, schema) for t in terms)
+    names = [t.name for t in terms if isinstance(t, Variable)]
+    if len(names) == len(terms) > 1:
+        pick = itemgetter(*names)
+        return lambda _world, bindings: pick(bindings)
+    getters = tuple(compile_argument(t, schema) for t in terms)
     return lambda world, bindings: tuple([get(world, bindings) for get in getters])
+
+
+def compile_argument(term: Term, schema: Schema) -> Argument:
+    """As `compile_term`, for what facts are about.
+
+    Raises:
+        SchemaError: it would be a geometry.
+    """
+    geometry = isinstance(term, Arithmetic) and term.operator == GEOMETRY
+    if geometry or (isinstance(term, Call) and schema.result(term.function, term.place) == GEOMETRY):
+        raise SchemaError("a geometry can be compared, but nothing is said about it", place=term.place)
+    return cast("Argument", compile_term(term, schema))
 
 
 def compile_comparison(e: Comparison, schema: Schema) -> Test:
@@ -81,16 +101,16 @@ def compile_comparison(e: Comparison, schema: Schema) -> Test:
     return test
 
 
-def same(left: Value, right: Value) -> bool:
+def same(left: Content, right: Content) -> bool:
     """Equality of values; a truth value is no number, though Python takes `True` for 1."""
     return left == right and isinstance(left, bool) == isinstance(right, bool)
 
 
-def as_number(value: Value, used_by: str, place: Place | None) -> Number:
+def as_number(value: Content, used_by: str, place: Place | None) -> Number:
     """`value` as a number.
 
     Raises:
-        SchemaError: it is a name, text or truth value.
+        SchemaError: it is anything else.
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise SchemaError(f"'{used_by}' works on numbers, not on '{value}'", place=place)
@@ -105,9 +125,12 @@ def _call(call: Call, schema: Schema) -> Getter:
 
 def _arithmetic(term: Arithmetic, schema: Schema) -> Getter:
     name, place = term.operator, term.place
+    if name == GEOMETRY:
+        numbers = compile_arguments(term.args, schema)
+        return lambda world, bindings: tuple([as_number(v, name, place) for v in numbers(world, bindings)])
     combine, arguments = _FOLD[name], compile_arguments(term.args, schema)
 
-    def compute(world: World, bindings: Bindings) -> Value:
+    def compute(world: World, bindings: Bindings) -> Number:
         first, *rest = (as_number(v, name, place) for v in arguments(world, bindings))
         try:
             if not rest:

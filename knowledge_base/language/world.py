@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol
 
-from knowledge_base.facts import Value
+from knowledge_base.facts import Content, Value
 from knowledge_base.schema import Schema
 
 
 class World(Protocol):
     """A state of the world: the store, pending changes on top of it, a planner's state.
 
-    Predicates are the declared ones; types as predicates, quantifiers and comparisons are the language's
-    affair and are built from these five answers. A world that also has `estimate(predicate, pattern) -> int`,
-    at most how many facts match, lets conjunctions begin with the rarest.
+    Predicates are the told ones; types as predicates, computed predicates, quantifiers and comparisons are the
+    language's affair and are built from these answers. A world that also has `estimate(predicate, pattern) -> int`,
+    at most how many facts match, lets conjunctions begin with the rarest. One that has `reference(function, args) ->
+    str | None`, where what the function is worth comes from, refuses to have it set.
     """
 
     @property
@@ -30,8 +31,8 @@ class World(Protocol):
         """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
         ...
 
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value; 0 until it is set."""
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth; until it is set, what `content.UNSET` says."""
         ...
 
     def objects(self, type_name: str) -> Iterable[str]:

@@ -14,7 +14,7 @@ from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Fact
 from knowledge_base.language.application import apply_effect, choices
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When, substitute_effect
-from knowledge_base.language.evaluation import World, evaluate_term, holds
+from knowledge_base.language.evaluation import World, evaluate_argument, holds
 from knowledge_base.language.expression import (
     And,
     Atom,
@@ -132,7 +132,7 @@ def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> 
 def ground(form: Atom | Call, world: World) -> Fact:
     """The fact or fluent that a form without variables names."""
     name = form.predicate if isinstance(form, Atom) else form.function
-    return Fact(name, tuple(t.value if isinstance(t, Constant) else evaluate_term(t, world) for t in form.args))
+    return Fact(name, tuple(t.value if isinstance(t, Constant) else evaluate_argument(t, world) for t in form.args))
 
 
 def _is_conjunction(e: Expression, *, wanted: bool) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from planning.quantities import Bound, fluents
+from planning.quantities import Bound, fluents, worth
 from planning.strips import GroundAction, Problem
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Assembly:
         types = {one: world.type_of(one) for one in mentioned}
         objects = {one: kind for one, kind in types.items() if kind is not None}
         asked = _fluents(actions, bounds) if self._numbering.fluents else ()
-        numbers = {one: world.value(one.predicate, one.args) for one in asked}
+        numbers = {one: worth(world, one) for one in asked}
         return Problem(domain, objects, init, goal, actions, numbers=numbers, bounds=bounds, notes=notes)
 
     def _action(self, way: Way) -> GroundAction:

@@ -1,8 +1,8 @@
 """Conditions after everything that cannot change was evaluated: what is left for a planner to decide.
 
 Quantifiers are expanded over the known objects; types, equality, numbers and predicates that no action
-changes are evaluated on the world (partial evaluation). What remains is in negation normal form, its leaves
-literals and bounds on numbers that actions change.
+changes, computed ones too, are evaluated on the world (partial evaluation). What remains is in negation normal form,
+its leaves literals and bounds on numbers that actions change.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
-from knowledge_base.language.evaluation import World, evaluate_term, holds
+from knowledge_base.language.evaluation import World, evaluate_argument, evaluate_term, holds
 from knowledge_base.language.expression import (
     And,
     Arithmetic,
@@ -261,7 +261,7 @@ class Grounder:
                     raise InputError(f"{to_text(term)} cannot be computed: {error}", place=term.place) from None
             case _:
                 number = evaluate_term(term, self.world, bindings)
-                if isinstance(number, str):
+                if not isinstance(number, int | float):
                     raise InputError(f"'{number}' is no number", place=term.place)
                 return number
 
@@ -302,13 +302,17 @@ class Grounder:
                     place=term.place,
                 )
             case _:
-                return evaluate_term(term, self.world, bindings)
+                return evaluate_argument(term, self.world, bindings)
 
     def _atom(self, atom: Atom, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:
-        if atom.predicate not in self.world.schema.predicates:  # a type
+        schema = self.world.schema
+        if schema.is_type(atom.predicate, len(atom.args)):
             return holds(atom, self.world, bindings) is wanted
         ground = self.fact(atom, bindings)
         if atom.predicate in self.changing:
             return Literal(ground, wanted)
-        so = self.world.holds(ground.predicate, ground.args) is wanted
+        if atom.predicate in schema.computed:
+            so = holds(atom, self.world, bindings) is wanted
+        else:
+            so = self.world.holds(ground.predicate, ground.args) is wanted
         return Literal(ground, wanted) if self.keep_false and not so else so

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING
 
-from knowledge_base.facts import Fact, Value
+from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.effect import ForEach, effect_conditions, effect_parts
 from knowledge_base.language.expression import Exists, Expression, Forall, Term, Variable, parts_of
 from knowledge_base.schema import ROOT_TYPE
@@ -40,7 +40,7 @@ class Consulted:
     def __init__(self, world: World) -> None:
         self._world = world
         self._truths: dict[Fact, bool] = {}
-        self._numbers: dict[Fact, float] = {}
+        self._contents: dict[Fact, Content] = {}
         self.things = things_of(world)
 
     def agrees(self, world: World) -> bool:
@@ -48,7 +48,7 @@ class Consulted:
         return (
             all(self.things.get(name, own) == own for name, own in things_of(world).items())
             and all(world.holds(f.predicate, f.args) is truth for f, truth in self._truths.items())
-            and all(world.value(f.predicate, f.args) == number for f, number in self._numbers.items())
+            and all(world.value(f.predicate, f.args) == number for f, number in self._contents.items())
         )
 
     def follow(self, world: World) -> bool:
@@ -67,10 +67,10 @@ class Consulted:
         truth = self._truths[Fact(predicate, args)] = self._world.holds(predicate, args)
         return truth
 
-    def value(self, function: str, args: tuple[Value, ...]) -> float:
-        """The numeric fluent's value."""
-        number = self._numbers[Fact(function, args)] = self._world.value(function, args)
-        return number
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth."""
+        content = self._contents[Fact(function, args)] = self._world.value(function, args)
+        return content
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
         """The facts that agree with the pattern; not remembered: grounding asks for one fact after the other."""

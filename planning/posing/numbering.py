@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
 from planning.posing.conditions import Leaf, Literal
-from planning.quantities import Bound
+from planning.quantities import Bound, worth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -87,7 +87,7 @@ class Numbering:
 
     def present(self, world: World) -> set[int]:
         """The numbers of all literals and bounds that hold in `world`; fluents have no truth."""
-        values = {one: world.value(one.predicate, one.args) for one in map(self.fact, sorted(self.fluents))}
+        values = {one: worth(world, one) for one in map(self.fact, sorted(self.fluents))}
         held: set[int] = set()
         for i, one in enumerate(self._named):
             if isinstance(one, Bound):

@@ -27,6 +27,7 @@ from planning.posing.groundwork import Groundwork, numbered, things_of
 from planning.posing.interchange import spared
 from planning.posing.reduction import Task, pruned, reachable
 from planning.posing.relevance import Relevant, relevant
+from planning.posing.unforeseeable import refuse_unforeseeable
 from planning.posing.ways import Ways
 from planning.quantities import Bound
 from planning.strips import Problem
@@ -57,7 +58,7 @@ def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Metric 
     Raises:
         InputError: the goal has a free variable, or names something that is not declared or not known.
         UnsupportedGoalError: the goal states a fact about a number that actions change, or asks for a derived
-            predicate that cannot be planned with.
+            predicate that cannot be planned with, or for what no engine can foresee (`unforeseeable`).
         UnsupportedActionError: so does an action that matters, or it has too many alternatives.
     """
     poser = _posers.find(domain, None) or _posers.keep(domain, None, Poser(domain))
@@ -130,6 +131,7 @@ class Poser:
         goal = self._derivation.expand(goal)
         matters = relevant(goal, metric, self._domain.actions.values())
         self._derivation.require_supported(goal, matters.actions)
+        refuse_unforeseeable(goal, matters.actions, self._domain)
         grounder = Grounder(world, matters.changing, keep_false=True)
         try:
             wanted = grounder.residual(goal, {})

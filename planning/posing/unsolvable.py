@@ -18,7 +18,7 @@ from planning.posing.grounding import Reached, Rule
 from planning.posing.numbering import as_fact
 from planning.posing.problem import Poser, check_goal
 from planning.posing.reduction import Task, reachable
-from planning.quantities import Bound
+from planning.quantities import Bound, worth
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -84,7 +84,7 @@ class _Reach:
                 return present or as_fact(condition) in self.facts
             case Bound():
                 asked = set(condition.fluents())
-                numbers = {one: self.world.value(one.predicate, one.args) for one in asked}
+                numbers = {one: worth(self.world, one) for one in asked}
                 return condition.holds(numbers) or not self.fluents.isdisjoint(asked)
             case Every(parts):
                 return all(map(self.allows, parts))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 
 import pytest
@@ -23,7 +24,8 @@ from dsc.model.states import (
 )
 from dsc.model.transitions import Transition
 from dsc.text.plots import parse_plot, plot_to_yaml
-from knowledge_base.language.expression import TRUE, And, Arithmetic, Atom, Comparison, Constant, Variable
+from knowledge_base.language.effect import Add, When
+from knowledge_base.language.expression import TRUE, And, Arithmetic, Atom, Comparison, Constant, Not, Variable
 
 EVERYTHING = plot("""
     plot: everything
@@ -152,6 +154,14 @@ def test_parsed_values_are_as_good_as_text():
     assert Transition(guard=condition) == Transition(guard="(on ?x table)")
     assert Emit(emit="e", arguments={"a": Constant(3)}) == Emit(emit="e", arguments={"a": 3})
     assert Transition(guard=TRUE).model_dump(mode="json", exclude_defaults=True) == {"guard": "(and)"}
+
+
+def test_parsed_values_are_no_deeper_than_text_may_be():
+    deep = functools.reduce(lambda e, _: Not(e), range(100_000), Atom("free"))
+    with pytest.raises(ValidationError, match="nested more than 100 deep"):
+        Transition(to="s", guard=deep)
+    with pytest.raises(ValidationError, match="nested more than 100 deep"):
+        Transition(to="s", tell=When(deep, Add(Atom("free"))))
 
 
 def test_a_list_of_effects_is_all_of_them():

@@ -209,7 +209,7 @@ def test_a_change_of_knowledge_from_outside_is_seen_at_once():
     ran = Ran("{plot: p, states: {a: {always: {to: e, when: (q)}, after: {seconds: 50, to: a}}, e: {final: true}}}", prepare=prepare)
     assert ran.at == pytest.approx(5)
     (change,) = ran.of_type("knowledge")
-    assert (change["author"], change["added"]) == ("somebody", ["(q)"])
+    assert (change["author"], change["added"]) == ("somebody", [["q"]])
 
 
 # -- knowledge and trace -----------------------------------------------------------------------------------
@@ -224,8 +224,8 @@ def test_what_was_observed_is_known_before_the_event_is_handled():
     """)
     assert ran.end.finished
     assert [(change["author"], change["added"]) for change in ran.of_type("knowledge")] == [
-        ("arm", ["(seen cup1)"]),
-        ("chart", ["(told)"]),
+        ("arm", [["seen", "cup1"]]),
+        ("chart", [["told"]]),
     ]
 
 

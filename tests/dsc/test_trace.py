@@ -86,10 +86,11 @@ def traced():
 def test_a_step_is_told_with_what_was_taken_left_and_entered():
     heard, _ = traced()
     steps = [r.data["microsteps"] for r in heard if r.type == "step"]
-    assert steps[0] == [{"event": None, "taken": [], "exited": [], "entered": ["a"]}]
-    assert steps[1] == [
-        {"event": "go", "taken": [{"from": "a", "on": "go", "to": "h"}], "exited": ["a"], "entered": ["h", "h/s"]}
-    ]
+    bound = [{"state": "", "plot": "p", "hash": plot(PLOTS).digest}]
+    assert steps[0] == [{"event": None, "taken": [], "exited": [], "entered": ["a"], "bound": bound}]
+    taken = [{"from": "a", "on": "go", "to": "h"}]
+    bound = [{"state": "h", "plot": "q", "hash": plot(INNER).digest}]
+    assert steps[1] == [{"event": "go", "taken": taken, "exited": ["a"], "entered": ["h", "h/s"], "bound": bound}]
     assert len(steps) == 2  # nothing is said about an event nobody took
 
 
@@ -130,8 +131,8 @@ def test_a_change_of_knowledge_is_told_whole():
     data = heard[-1].data
     assert heard[-1].type == "knowledge"
     assert data == {
-        "version": 7, "author": "camera", "nodes": {"cup1": "cup"}, "removed": ["(p a)"], "added": ["(q b 1)"],
-        "values": {"(f a)": 2.0}, "removed_nodes": ["cup2"],
+        "version": 7, "author": "camera", "nodes": {"cup1": "cup"}, "removed": [["p", "a"]],
+        "added": [["q", "b", 1]], "values": [["f", "a", 2.0]], "removed_nodes": ["cup2"],
     }  # fmt: skip
     tracer.knowledge(Change(7, "camera", Delta()))
     assert heard[-1].data is data

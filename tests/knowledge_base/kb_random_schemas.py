@@ -104,10 +104,10 @@ def conditions(of: Language) -> st.SearchStrategy[ex.Expression]:
 
 
 @st.composite
-def parameters(draw, e: ex.Expression) -> dict:
+def parameters(draw, e: ex.Expression, schema: Schema) -> dict:
     """Values for the variables that need one, and for some others."""
     free = ex.free_variables(e)
-    chosen = [name for name in sorted(free) if name in only_tested(e) or draw(st.integers(0, 2)) == 0]
+    chosen = [name for name in sorted(free) if name in only_tested(e, schema) or draw(st.integers(0, 2)) == 0]
     return {name: draw(st.sampled_from(NUMBERS if name == NUMBER else THINGS)) for name in chosen}
 
 

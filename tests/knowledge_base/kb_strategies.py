@@ -18,7 +18,8 @@ SCHEMA = Schema.parse(
       (:constants home - place)
       (:predicates (quiet) (heavy ?i - item) (on ?i - item ?p - place) (near ?a ?b - place)
                    (between ?i ?j - item ?p - place) (level ?i - item ?n - number))
-      (:functions (weight ?i - item) (distance ?a ?b - place) (time) (gap ?i ?j - item ?p - place)))""",
+      (:functions (weight ?i - item) (distance ?a ?b - place) (time) (gap ?i ?j - item ?p - place) - number
+                  (label ?i - item) - text (closed ?p - place) - boolean (pose ?i - item ?p - place) - geometry))""",
     "small.pddl",
 )
 THINGS = {"cup1": "cup", "cup2": "cup", "can1": "can", "shelf": "place", "home": "place"}
@@ -29,7 +30,7 @@ NAMES = ("x", "y", "z", "event.item")
 
 def _text_names() -> st.SearchStrategy[str]:
     return st.from_regex(r"[a-z][a-z0-9_.-]{0,6}", fullmatch=True).filter(
-        lambda s: s not in (*ex.KEYWORDS, *eff.EFFECT_KEYWORDS, "true", "false")
+        lambda s: s not in (*ex.KEYWORDS, *ex.COMPUTING, *eff.EFFECT_KEYWORDS, "true", "false")
     )
 
 
@@ -49,6 +50,7 @@ def any_terms() -> st.SearchStrategy[ex.Term]:
             st.builds(ex.Call, _text_names(), some)
             | st.builds(ex.Arithmetic, st.sampled_from("+-*/"), pair)
             | st.builds(ex.Arithmetic, st.just("-"), st.tuples(inner))
+            | st.builds(ex.Arithmetic, st.just("geometry"), some)
         )
 
     return st.recursive(variables | _values(), compound, max_leaves=4)
@@ -133,15 +135,24 @@ def deltas() -> st.SearchStrategy[Delta]:
         st.builds(lambda *a: Fact("between", a), items, items, places),
         st.builds(lambda *a: Fact("level", a), items, number),
     )
-    fluents = st.one_of(
+    numeric = st.one_of(
         st.just(Fact("time")),
         st.builds(lambda *a: Fact("weight", a), items),
         st.builds(lambda *a: Fact("distance", a), places, places),
         st.builds(lambda *a: Fact("gap", a), items, items, places),
     )
+    poses = st.builds(lambda *a: Fact("pose", a), items, places)
+    values = st.one_of(
+        st.tuples(numeric, number),
+        st.tuples(st.builds(lambda *a: Fact("label", a), items), st.text(max_size=3)),
+        st.tuples(st.builds(lambda *a: Fact("closed", a), places), st.booleans()),
+        st.tuples(poses, st.lists(number | st.floats(-9, 9), max_size=4).map(tuple)),
+    )
     some = st.lists(facts, max_size=6).map(tuple)
-    values = st.dictionaries(fluents, number, max_size=3)
-    return st.builds(Delta, nodes=st.just(THINGS), removed=some, added=some, values=values)
+    return st.builds(
+        Delta, nodes=st.just(THINGS), removed=some, added=some, values=st.lists(values, max_size=3).map(dict),
+        replaced=st.dictionaries(items, places, max_size=2).map(lambda at: tuple(Fact("on", pair) for pair in at.items())),
+    )  # fmt: skip
 
 
 def removals() -> st.SearchStrategy[Delta]:

@@ -45,3 +45,13 @@ def write(path: str, durability: str, acknowledge: Connection) -> None:
             acknowledge.send(version)
             if version % 97 == 0:
                 kb.compact(keep_since=version - 50)
+
+
+def write_on_demand(path: str, asked: Connection) -> None:
+    """Commit as many versions as is asked for each time, and say the last one; until nobody asks any more."""
+    with KnowledgeBase.open(SCHEMA, path) as kb:
+        asked.send(kb.version)
+        while count := asked.recv():
+            for _ in range(count):
+                kb.apply(change(kb.version + 1), author="writer")
+            asked.send(kb.version)

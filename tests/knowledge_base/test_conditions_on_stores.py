@@ -156,7 +156,7 @@ def test_after_any_history_conditions_are_what_evaluating_anew_says(data):
     commit(before, data.draw(changes(language)))
     kb = KnowledgeBase(language.schema, history=MemoryHistory(Version(before.snapshot(), before.version, 0.0)))
     e = data.draw(conditions(language))
-    params = data.draw(parameters(e))
+    params = data.draw(parameters(e, language.schema))
     try:
         condition = kb.install(e, params)
     except InputError:  # about a thing that was removed

@@ -55,7 +55,7 @@ def test_truth_and_firings_are_those_of_evaluating_anew_in_order(data) -> None:
 
     def install(number) -> None:
         e = data.draw(conditions(language))
-        params = data.draw(parameters(e))
+        params = data.draw(parameters(e, language.schema))
         # What an outermost `exists` chooses is part of the witness, so the set of witnesses is another one.
         fire = "edge" if isinstance(e, ex.Exists) else data.draw(st.sampled_from(["edge", "each"]))
         try:

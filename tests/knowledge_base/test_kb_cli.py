@@ -1,4 +1,4 @@
-"""`dsc kb query` and `dsc kb show`, and what importing them costs."""
+"""`dsc kb` on problems, worlds in JSON and scenarios, and what importing it costs."""
 
 from __future__ import annotations
 

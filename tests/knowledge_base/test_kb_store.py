@@ -94,12 +94,23 @@ def test_one_change_after_the_other_is_their_composition(first, second) -> None:
     one, two = KnowledgeBase(SCHEMA), KnowledgeBase(SCHEMA)
     for kb in (one, two):
         kb.apply(Delta(nodes=THINGS, added=(fact("on", "cup1", "shelf"),)), author="test")
-    second = Delta(THINGS, second.removed, second.added, second.values, second.removed_nodes)
+    second = Delta(THINGS, second.removed, second.added, second.values, second.removed_nodes, second.replaced)
     one.apply(first, author="test")
     one.apply(second, author="test")
     two.apply(first.then(second), author="test")
     assert set(one.facts()) == set(two.facts())
     assert described(one)[2:] == described(two)[2:]
+
+
+def test_who_asks_late_gets_the_same_graph(kb) -> None:
+    early, late = kb, KnowledgeBase.from_json(kb.to_json())
+    followed = early.graph
+    for world in (early, late):
+        with world.transaction(author="test") as tx:
+            tx.retract("on", "cup1", "shelf")
+            tx.set("weight", "cup1", 3)
+            tx.remove_node("cup2")
+    assert graph_content(late.graph) == graph_content(followed)
 
 
 def test_the_graph_is_read_only_and_follows(kb) -> None:

@@ -120,7 +120,7 @@ FOREIGN = {
     "text": (lambda p: p.write_text("(define (domain d))\n" * 100), "file is not a database"),
     "other database": (lambda p: (p.unlink(), database(p, "CREATE TABLE t (x)")), "no knowledge store"),
     "other application": (lambda p: (p.unlink(), database(p, "PRAGMA application_id = 7")), "no knowledge store"),
-    "later format": (lambda p: database(p, "PRAGMA user_version = 9"), "format 9, this program reads format 1"),
+    "later format": (lambda p: database(p, "PRAGMA user_version = 9"), "format 9, this program reads format 2"),
     "folder": (lambda p: (p.unlink(), p.mkdir()), "cannot (open|read) the store"),
     "schema": (lambda p: database(p, "UPDATE schemas SET declarations = '[1]'"), "the schema cannot be read"),
     "change": (lambda p: database(p, "UPDATE changes SET delta = '{' WHERE version = 2"), "the change to version 2 cannot be read"),

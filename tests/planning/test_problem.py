@@ -9,16 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from searching import breadth_first, solution
 
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.computation import computed
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.overlay import Overlay
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.errors import UnsupportedActionError
+from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep
 from planning.posing.problem import Poser, pose
+from planning.posing.unsolvable import why_unsolvable
 from planning.strips import Problem
 from planning.validation import validate
 
@@ -197,6 +199,62 @@ def test_a_disjunct_that_is_undone_later_does_not_count(switches):
 
 def test_conditions_that_no_action_changes_are_decided_at_once(switches):
     assert plan_for(switches, lamps(switches, limit=9), "(on l1)") is None
+
+
+@computed("(in-reach ?l - lamp)", reads=["(height ?l)", "(broken ?l)"])
+def in_reach(height, broken):
+    return height < 2 and not broken
+
+
+@computed("(lit ?l - lamp)", reads=["(in-reach ?l)"])
+def lit(in_reach):
+    return in_reach
+
+
+LAMPS = """(define (domain lamps)
+  (:types lamp)
+  (:predicates (on ?l - lamp) (broken ?l - lamp))
+  (:functions (height ?l - lamp))
+  (:action press :parameters (?l - lamp)
+    :precondition (in-reach ?l)
+    :effect (on ?l))
+  {more})
+"""
+
+
+def test_what_is_computed_from_things_that_stay_is_evaluated_when_the_problem_is_posed():
+    domain = PlanningDomain.parse(LAMPS.format(more=""), None, [in_reach, lit])
+    world = KnowledgeBase(domain.schema)
+    nodes = dict.fromkeys(("low", "high", "dark"), "lamp")
+    values = {fact("height", "high"): 3}
+    world.apply(Delta(nodes=nodes, added=(fact("broken", "dark"),), values=values), author="test")
+    plan = plan_for(domain, world, "(forall (?l - lamp) (imply (lit ?l) (on ?l)))")
+    assert [str(step) for step in plan.steps] == ["(press low)"]
+    assert pose(domain, world, parse_condition("(on high)")).unreachable == ("(on high)",)
+    wanted = parse_condition("(and (on low) (lit dark) (not (lit low)))")
+    assert pose(domain, world, wanted).unreachable == ("(lit dark)", "(not (lit low))")
+    assert why_unsolvable(domain, world, wanted) == (
+        "(lit dark) does not hold, and no planning action makes it true",
+        "(lit low) holds, and no planning action makes it false",
+    )
+
+
+@pytest.mark.parametrize("effect", ["(broken ?l)", "(not (broken ?l))", "(assign (height ?l) 0)"])
+def test_what_is_computed_from_things_that_actions_change_cannot_be_planned_with(effect):
+    more = f"(:action change :parameters (?l - lamp) :effect {effect})"
+    domain = PlanningDomain.parse(LAMPS.format(more=more), "lamps.pddl", [in_reach, lit])
+    world = KnowledgeBase(domain.schema)
+    world.apply(Delta(nodes={"l": "lamp"}, values={fact("height", "l"): 5}), author="test")
+    with pytest.raises(UnsupportedGoalError, match=r"<text>:1:6: .* computed from .*: \(lit l\) reads \("):
+        pose(domain, world, parse_condition("(and (lit l))"))
+    with pytest.raises(UnsupportedActionError, match=r"lamps.pddl:6:19: .*'press' .*: \(in-reach \?l\) reads \("):
+        pose(domain, world, parse_condition("(on l)"))
+
+
+def test_no_planning_action_makes_true_what_is_computed():
+    with pytest.raises(SchemaError, match=r"lamps.pddl:.*'lit' is computed"):
+        PlanningDomain.parse(LAMPS.format(more="(:action a :parameters (?l - lamp) :effect (lit ?l))"), "lamps.pddl",
+                             [in_reach, lit])  # fmt: skip
 
 
 def test_an_action_that_does_not_matter_may_do_anything():

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from itertools import pairwise
 from math import hypot
+from types import MappingProxyType
 
 from dsc.text.diagram.layout import Box, BoxKind, Edge, Point, Text
 from dsc.text.diagram.measure import BOLD, FONT_SIZES
@@ -15,6 +16,9 @@ MARGIN = 12.0
 RADIUS = 7.0
 ARROW = (9.0, 3.6)
 """Length and half width of an arrowhead."""
+
+_SIZE = re.compile(r'width="([\d.]+)" height="([\d.]+)"')
+NO_MARKS: Mapping[str, str] = MappingProxyType({})
 
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _INK, _SOFT = "#1f2937", "#64748b"
@@ -34,16 +38,28 @@ _LOOKS: dict[BoxKind, tuple[str, str]] = {
 _RECOVERY = ("#fbe8f1", _RULE)
 
 
-def to_svg(root: Box) -> str:
-    """The drawing as one SVG document with a background of its own."""
+MARKS = {"active": "#d55e00", "added": "#0072b2", "removed": "#a3195b", "changed": "#b8860b"}
+"""What can be said of a state beyond what it is, each with its colour."""
+
+
+def to_svg(root: Box, marks: Mapping[str, str] = NO_MARKS) -> str:
+    """The drawing as one SVG document with a background of its own; `marks` are by names of states."""
     width, height = _n(root.width + 2 * MARGIN), _n(root.height + 2 * MARGIN)
-    body = "\n".join(_box(root.moved(MARGIN, MARGIN), "#ffffff"))
+    body = "\n".join((*_box(root.moved(MARGIN, MARGIN), "#ffffff"), *_marked(root.moved(MARGIN, MARGIN), marks)))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
         f'viewBox="0 0 {width} {height}" role="img">\n'
         f"<title>{_x(root.name)}</title>\n<style>{_css()}</style>\n"
         f'<rect width="{width}" height="{height}" rx="10" fill="#ffffff"/>\n{body}\n</svg>\n'
     )
+
+
+def above(upper: str, lower: str) -> str:
+    """Two drawings in one, one above the other."""
+    sizes = [tuple(map(float, _SIZE.search(svg).groups())) for svg in (upper, lower)]  # type: ignore[union-attr]
+    width, height = max(w for w, _ in sizes), sizes[0][1] + MARGIN + sizes[1][1]
+    moved = lower.replace("<svg ", f'<svg y="{_n(sizes[0][1] + MARGIN)}" ', 1)
+    return f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}">\n{upper}{moved}</svg>\n'
 
 
 def _css() -> str:
@@ -85,6 +101,17 @@ def _box(box: Box, around: str) -> Iterator[str]:
         yield from _edge(edge)
     for edge in over:
         yield from _label(edge, fill)
+
+
+def _marked(box: Box, marks: Mapping[str, str]) -> Iterator[str]:
+    """A thick border around each marked state, over everything else."""
+    for inner in box.boxes:
+        mark = marks.get(inner.name)
+        if mark is not None:
+            size = f'x="{_n(inner.x - 3)}" y="{_n(inner.y - 3)}" width="{_n(inner.width + 6)}"'
+            border = f'fill="none" stroke="{MARKS[mark]}" stroke-width="3.5"'
+            yield f'<rect class="{mark}" {size} height="{_n(inner.height + 6)}" rx="12" {border}/>'
+        yield from _marked(inner, marks)
 
 
 def _shape(box: Box, fill: str, stroke: str) -> Iterator[str]:

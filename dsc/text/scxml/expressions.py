@@ -7,6 +7,7 @@ import json
 from dsc.engine.membership import asked_states
 from dsc.text.scxml.errors import NotExpressibleError
 from knowledge_base.language.expression import (
+    ARITHMETIC,
     And,
     Arithmetic,
     Atom,
@@ -54,9 +55,9 @@ def term_text(term: Term) -> str:
             return json.dumps(value, ensure_ascii=False)
         case Variable(name):
             return f"_event.data.{identifier(name[6:])}" if name.startswith("event.") else identifier(name)
-        case Arithmetic(sign, args) if len(args) == 1:
-            return f"{sign}({term_text(args[0])})"
-        case Arithmetic(sign, args):
+        case Arithmetic("-", (inner,)):
+            return f"-({term_text(inner)})"
+        case Arithmetic(sign, args) if sign in ARITHMETIC:
             return "(" + f" {sign} ".join(map(term_text, args)) + ")"
         case _:
             raise NotExpressibleError("term", f"SCXML has no fluent such as {to_text(term)}", place=term.place)

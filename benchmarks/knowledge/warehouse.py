@@ -1,0 +1,146 @@
+"""Worlds whose things move from place to place, with conditions installed, for this knowledge base and the floor."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+from timing import Job
+
+from knowledge.floor import Index
+from knowledge_base import Condition, Delta, Fact, KnowledgeBase, Schema, fact
+
+KINDS = 40
+SCHEMA = Schema.parse(
+    f"""(define (domain warehouse)
+    (:types item place - object)
+    (:predicates (on ?i - item ?p - place) (clean ?i - item) (in ?p ?q - place)
+      {" ".join(f"(kind{n} ?i - item)" for n in range(KINDS))})
+    (:functions (weight ?i - item)))"""
+)
+SHAPES = (
+    "(and (on ?x p{0}) (kind{1} ?x))",
+    "(and (on i{0} p{0}) (kind{1} i{0}))",
+    "(and (on ?x p{0}) (clean ?x) (not (kind{1} ?x)))",
+    "(and (on ?x ?p) (in ?p p{0}) (kind{1} ?x) (> (weight ?x) 5))",
+    "(not (exists (?x - item) (and (on ?x p{0}) (kind{1} ?x))))",
+)
+"""Every one reads the predicate that all updates change. 0 stands for a number, 1 for one of the kinds."""
+
+Move = tuple[str, str, str]
+"""An item, where it is, where it will be."""
+
+
+class Warehouse:
+    """So many facts: where items are, which of them are clean or of a kind, which place is in which.
+
+    It moves one item after the other, in leaps, to the next place.
+    """
+
+    def __init__(self, facts: int) -> None:
+        self.places = max(20, facts // 50)
+        self.items = max(1, (facts - self.places) * 2 // 3)
+        self._moves = self._endless()
+
+    def deltas(self) -> Iterator[Delta]:
+        """The world in parts; what a part is about has come before."""
+        places = range(self.places)
+        inside = tuple(fact("in", f"p{n}", f"p{n // 10}") for n in places)
+        yield Delta({f"p{n}": "place" for n in places}, added=inside)
+        for first in range(0, self.items, 1000):
+            numbers = range(first, min(first + 1000, self.items))
+            on = [fact("on", f"i{n}", f"p{n % self.places}") for n in numbers]
+            are = [fact("clean" if n % 4 == 1 else f"kind{n % KINDS}", f"i{n}") for n in numbers if n % 2]
+            heavy: dict[Fact, float] = {fact("weight", f"i{n}"): 7 for n in numbers if n % 4 == 3}
+            yield Delta(dict.fromkeys((f"i{n}" for n in numbers), "item"), added=(*on, *are), values=heavy)
+
+    def moves(self, number: int) -> list[Move]:
+        """The next so many."""
+        return list(islice(self._moves, number))
+
+    def _endless(self) -> Iterator[Move]:
+        at = [n % self.places for n in range(self.items)]
+        item = 0
+        while True:
+            item = (item + 7919) % self.items
+            old, at[item] = at[item], (at[item] + 1) % self.places
+            yield f"i{item}", f"p{old}", f"p{at[item]}"
+
+
+class Bare(Warehouse):
+    """The floor: its index, updated by hand."""
+
+    def __init__(self, facts: int) -> None:
+        super().__init__(facts)
+        self.index = Index()
+        for delta in self.deltas():
+            for one in delta.added:
+                self.index.add(one.predicate, one.args)
+
+    def job(self) -> Job:
+        """To update it."""
+
+        def run(moves: list[Move]) -> None:
+            discard, add = self.index.discard, self.index.add
+            for item, old, new in moves:
+                discard("on", (item, old))
+                add("on", (item, new))
+
+        return Job(run, prepare=self.moves)
+
+
+class Kept(Warehouse):
+    """A knowledge base; with a path in a file."""
+
+    def __init__(self, facts: int, path: Path | None = None, durability: str | None = None) -> None:
+        super().__init__(facts)
+        self.kb = KnowledgeBase.open(SCHEMA, path, durability)
+        self.installed: list[Condition] = []
+        for delta in self.deltas():
+            self.kb.apply(delta, "start")
+
+    def move(self, item: str, old: str, new: str) -> None:
+        """One update."""
+        self.kb.apply(Delta(removed=(fact("on", item, old),), added=(fact("on", item, new),)), "bench")
+
+    def job(self) -> Job:
+        """To update it."""
+
+        def run(moves: list[Move]) -> None:
+            move = self.move
+            for each in moves:
+                move(*each)
+
+        return Job(run, prepare=self.moves)
+
+    def singly(self, number: int) -> list[float]:
+        """Seconds for each of so many updates, shortest first."""
+        found = []
+        for each in self.moves(number):
+            start = time.perf_counter()
+            self.move(*each)
+            found.append(time.perf_counter() - start)
+        return sorted(found)
+
+    def install(self, texts: list[str]) -> float:
+        """Seconds that it takes to install one of them."""
+        start = time.perf_counter()
+        self.installed = [self.kb.install(text) for text in texts]
+        return (time.perf_counter() - start) / len(self.installed)
+
+    def uninstall(self) -> None:
+        """End the conditions that were installed last."""
+        for condition in self.installed:
+            condition.cancel()
+
+    def conditions(self, number: int, shapes: int) -> list[str]:
+        """So many of that many shapes, all over the places."""
+        return [
+            SHAPES[n % len(SHAPES)].format(self._somewhere(n // shapes + n % shapes * 10), n % shapes // len(SHAPES))
+            for n in range(number)
+        ]
+
+    def _somewhere(self, n: int) -> int:
+        return n * 7919 % min(self.places, self.items)

@@ -1,0 +1,111 @@
+"""What the page asks beyond records: the knowledge of a moment, a chart of a moment as a drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from dsc.dynamic.library import Library
+from dsc.model.plot import ActionPlot
+from dsc.text.diagram import draw
+from dsc.viewer.moments import Configuration, configurations, knowledge
+from dsc.viewer.records import RecordLog
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.facts import Fact
+from knowledge_base.language.evaluation import Explanation
+from knowledge_base.language.expression import variables_in_order
+from knowledge_base.language.parser import parse_condition
+from knowledge_base.view import View
+
+Form = Mapping[str, Any]
+
+
+class Answers:
+    """Answers to one page's questions, each a JSON value; a question that makes no sense is an `InputError`."""
+
+    def __init__(self, log: RecordLog) -> None:
+        self._log = log
+        self._knowledge = knowledge(log)
+        self._configurations = configurations(log)
+
+    def query(self, asked: Form) -> dict[str, Any]:
+        """Who makes the expression true, or whether it is true and why."""
+        view = self._view(asked)
+        params = asked.get("params") or {}
+        condition = parse_condition(_text(asked, "expression"), "EXPR")
+        variables = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
+        answers = view.query(condition, params)
+        said = {"variables": variables, "holds": bool(answers), "answers": answers, "version": view.version}
+        return said if variables else {**said, "why": explanation_form(view.explain(condition, params))}
+
+    def facts(self, asked: Form) -> dict[str, Any]:
+        """All that is known, or all that is known about one thing."""
+        view, about = self._view(asked), asked.get("about")
+        things, facts, values = view.nodes(), view.facts(), view.values()
+        if about is not None:
+            if about not in things:
+                raise UnknownNameError(f"there is no object '{about}'", found=str(about), valid=things)
+            facts = [fact for fact in facts if about in fact.args]
+            values = {fluent: value for fluent, value in values.items() if about in fluent.args}
+            near = {arg for fact in (*facts, *values) for arg in fact.args} | {about}
+            things = {name: kind for name, kind in things.items() if name in near}
+        return {
+            "version": view.version,
+            "things": things,
+            "facts": [_listed(fact) for fact in facts],
+            "values": [[*_listed(fluent), value] for fluent, value in values.items()],
+        }
+
+    def svg(self, asked: Form) -> str:
+        """The plot in a state, drawn with its active states marked."""
+        moment = self._configurations.at(_seq(asked))
+        path = str(asked.get("path") or "")
+        if path not in moment.bound:
+            raise UnknownNameError(f"no plot runs in the state '{path}'", found=path, valid=moment.bound)
+        library = _library(moment)
+        plot = library.plot(str(moment.plots[moment.bound[path]]["plot"]))
+        prefix = f"{path}/" if path else ""
+        inside = (state.removeprefix(prefix) for state in moment.active if state.startswith(prefix))
+        return draw(plot, library, marks={name: "active" for name in inside if "/" not in name})
+
+    def _view(self, asked: Form) -> View:
+        known = self._knowledge.at(_seq(asked))
+        return View(known.state, known.version)
+
+
+def explanation_form(why: Explanation) -> dict[str, Any]:
+    """The tree of a condition as JSON data."""
+    parts = [explanation_form(child) for child in why.children]
+    return {"text": why.text, "truth": why.truth, "detail": why.detail, "decider": why.decider, "parts": parts}
+
+
+def _listed(fact: Fact) -> list[Any]:
+    return [fact.predicate, *fact.args]
+
+
+def _seq(asked: Form) -> int:
+    seq = asked.get("seq")
+    if isinstance(seq, bool) or not isinstance(seq, int):
+        raise InputError("'seq' is the number of a record")
+    return seq
+
+
+def _text(asked: Form, name: str) -> str:
+    said = asked.get(name)
+    if not isinstance(said, str):
+        raise InputError(f"'{name}' is a text")
+    return said
+
+
+def _library(moment: Configuration) -> Library:
+    """The plots seen so far, by name; of those with the same name the last, as a plan is made anew."""
+    found: dict[str, ActionPlot] = {}
+    for form in moment.plots.values():
+        try:
+            plot = ActionPlot.model_validate(form)
+        except ValidationError as error:
+            raise InputError(f"a plot of this trace cannot be read: {error.errors()[0]['msg']}") from None
+        found[plot.name] = plot
+    return Library(found.values())

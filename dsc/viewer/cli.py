@@ -1,0 +1,75 @@
+"""`dsc view`, and what `dsc run --view` needs: the page's address first, then whatever there is to see."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from dsc.viewer.control import Control
+    from dsc.viewer.records import RecordLog
+    from dsc.viewer.server import Viewer
+
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Where to listen on this machine; 0 picks a free port.")]
+NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
+
+
+def view_command(
+    trace: Annotated[Path, typer.Argument(metavar="TRACE.jsonl", help="What `--trace` wrote.")],
+    port: Port = 0,
+    no_open: NoOpen = False,
+) -> None:
+    """Look at a recorded run in the browser; Ctrl-C ends it."""
+    viewer_installed()
+    from dsc.viewer.records import read_trace
+
+    with page(read_trace(trace), None, port, opens=not no_open) as viewer:
+        until_interrupt(viewer)
+
+
+@contextmanager
+def page(log: RecordLog, control: Control | None, port: int, *, opens: bool) -> Iterator[Viewer]:
+    """The page in a browser, while the block lasts; its address is printed first.
+
+    Raises:
+        InputError: the port is taken.
+    """
+    from dsc.viewer.server import Viewer
+
+    viewer = Viewer(log, control, port)
+    viewer.start()
+    typer.echo(viewer.url)
+    if opens:
+        import webbrowser
+
+        webbrowser.open(viewer.url)
+    try:
+        yield viewer
+    finally:
+        viewer.close()
+
+
+def until_interrupt(viewer: Viewer) -> None:
+    """The page stays there until Ctrl-C."""
+    typer.echo("Ctrl-C ends it", err=True)
+    try:
+        viewer.wait()
+    except KeyboardInterrupt:
+        typer.echo("", err=True)
+
+
+def viewer_installed() -> None:
+    """Raise `InputError` unless the extra is there."""
+    from importlib.util import find_spec
+
+    from knowledge_base.errors import InputError
+
+    missing = [name for name in ("starlette", "uvicorn", "websockets") if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"the viewer needs {', '.join(missing)}: pip install 'dynamic-state-charts[viewer]'", found=missing[0]
+        )

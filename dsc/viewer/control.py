@@ -1,0 +1,186 @@
+"""A live run in the hands of who watches it: events and facts handed in, and the run held still at breakpoints."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from dsc.events import Event
+from dsc.sequencer.clock import LoopClock
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.check import check
+from knowledge_base.language.parser import parse_condition
+
+if TYPE_CHECKING:
+    from dsc.engine.steps import Step
+    from dsc.sequencer.sequencer import Sequencer
+    from knowledge_base.language.expression import Expression
+
+AUTHOR = "viewer"
+KINDS = ("state", "event", "condition", "plan_step")
+
+
+@dataclass(frozen=True, slots=True)
+class Breakpoint:
+    """Where a run shall stand still: a state entered, an event taken, a condition true, a plan's step begun."""
+
+    kind: str
+    text: str
+    condition: Expression | None = None
+
+    def __str__(self) -> str:
+        """As people say it: `state clear/execute`."""
+        return f"{self.kind.replace('_', ' ')} {self.text}"
+
+
+class Control:
+    """Commands from the page's thread to a run in another; the run obeys before its next event.
+
+    While it stands still simulated time does too. Real time goes on: skills work and timers fall due, and their
+    events are taken when it goes on.
+    """
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        """`changed` is called when what `paused` says may have changed."""
+        self._changed = changed
+        self._sequencer: Sequencer | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._go: asyncio.Event | None = None
+        self._breaks: dict[int, Breakpoint] = {}
+        self._numbers = 0
+        self._steps: int | None = None  # macrosteps until it stands still; None: none is counted
+        self._was_true: set[int] = set()
+        self._plan_steps: dict[str, str] = {}  # path of a generated plot's state -> the plan's step that it carries out
+        self.paused: str | None = None
+        """Why the run stands still, if it does."""
+
+    def attach(self, sequencer: Sequencer) -> None:
+        """The run begins, in the loop that calls this."""
+        self._sequencer, self._loop, self._go = sequencer, asyncio.get_running_loop(), asyncio.Event()
+        sequencer.listen(self._after_step)
+        sequencer.wait_before_events(self._before_event)
+
+    def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
+        """Do what a page asks for.
+
+        Raises:
+            InputError: it asks for something that is not known, or the run is over.
+        """
+        verbs: dict[str, Callable[[Mapping[str, Any]], object]] = {
+            "event": self._event, "tell": self._tell, "retract": self._tell, "pause": self._pause,
+            "resume": self._resume, "step": self._step, "break": self._break, "unbreak": self._unbreak,
+            "breaks": lambda _: None,
+        }  # fmt: skip
+        verb = command.get("do")
+        if verb not in verbs:
+            raise UnknownNameError(f"there is nothing to do called '{verb}'", found=str(verb), valid=verbs)
+        verbs[verb](command)
+        self._changed()
+        return {"ok": True, "breaks": [{"number": n, "on": str(b)} for n, b in self._breaks.items()]}
+
+    # --- in the page's thread
+
+    def _event(self, command: Mapping[str, Any]) -> None:
+        event = Event(str(command.get("name")), dict(command.get("attributes") or {}))
+        self._in_run(lambda run: run.post(event))
+
+    def _tell(self, command: Mapping[str, Any]) -> None:
+        from knowledge_base.statements import retracted, told  # noqa: PLC0415  read where somebody controls a run
+
+        meaning = told if command["do"] == "tell" else retracted
+        said = command.get("statements")
+        if not isinstance(said, list) or not all(isinstance(one, str) for one in said):
+            raise InputError("'statements' is a list of texts such as (on cup1 table)")
+        run = self._run()
+        delta = meaning(said, run.knowledge, "FACT")
+        self._in_run(lambda run: run.change(delta, AUTHOR))
+
+    def _pause(self, _: Mapping[str, Any]) -> None:
+        self._steps = 0
+        self._in_run(lambda _: None)
+
+    def _resume(self, _: Mapping[str, Any]) -> None:
+        self._steps = None
+        self._in_run(lambda _: self._release())
+
+    def _step(self, _: Mapping[str, Any]) -> None:
+        self._steps = 1
+        self._in_run(lambda _: self._release())
+
+    def _break(self, command: Mapping[str, Any]) -> None:
+        on = command.get("on")
+        if not isinstance(on, dict) or len(on) != 1 or (kind := next(iter(on))) not in KINDS:
+            raise InputError(f"a breakpoint is on one of {', '.join(KINDS)}", found=str(on), valid=KINDS)
+        condition = None
+        if kind == "condition":
+            condition = parse_condition(str(on[kind]), "EXPR")
+            check(condition, self._run().knowledge.schema)
+        self._numbers += 1
+        self._breaks[self._numbers] = Breakpoint(kind, str(on[kind]), condition)
+
+    def _unbreak(self, command: Mapping[str, Any]) -> None:
+        number = command.get("number")
+        if number not in self._breaks:
+            raise InputError(f"there is no breakpoint {number}", found=str(number), valid=map(str, self._breaks))
+        del self._breaks[number]
+
+    def _run(self) -> Sequencer:
+        if self._sequencer is None or self._loop is None or self._loop.is_closed():
+            raise InputError("the run is over, or has not begun")
+        return self._sequencer
+
+    def _in_run(self, act: Callable[[Sequencer], None]) -> None:
+        """Let the run's own thread act; what is wrong comes back to the one who asked."""
+        run, loop = self._run(), self._loop
+
+        async def acting() -> None:
+            act(run)
+
+        assert loop is not None  # noqa: S101  told apart by _run
+        asyncio.run_coroutine_threadsafe(acting(), loop).result(timeout=10)
+
+    # --- in the run's thread
+
+    def _release(self) -> None:
+        if self._go is not None:
+            self._go.set()
+
+    def _after_step(self, step: Step) -> None:
+        for bound in (bound for micro in step.microsteps for bound in micro.bound if bound.plot.generated):
+            prefix = f"{bound.state}/" if bound.state else ""
+            for name, state in bound.plot.states.items():
+                self._plan_steps[prefix + name] = state.about or ""
+        if self._steps:
+            self._steps -= 1
+        for number, one in self._breaks.items():
+            if self._is_met(number, one, step):
+                self._steps = 0
+                self.paused = str(one)
+
+    def _is_met(self, number: int, one: Breakpoint, step: Step) -> bool:
+        entered = {name for micro in step.microsteps for name in micro.entered}
+        match one.kind:
+            case "state":
+                return one.text in entered
+            case "event":
+                return any(micro.event is not None and micro.event.name == one.text for micro in step.microsteps)
+            case "plan_step":
+                return any(self._plan_steps.get(name) == one.text for name in entered)
+        now = one.condition is not None and self._run().knowledge.ask(one.condition)
+        rose = now and number not in self._was_true
+        (self._was_true.add if now else self._was_true.discard)(number)
+        return rose
+
+    async def _before_event(self) -> None:
+        """Stand still until somebody says go on."""
+        if self._steps != 0 or self._go is None:
+            return
+        self.paused = self.paused or "asked to"
+        self._go.clear()
+        self._changed()
+        with LoopClock().hold():
+            await self._go.wait()
+        self.paused = None
+        self._changed()

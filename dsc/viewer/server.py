@@ -1,0 +1,163 @@
+"""The program's side of PROTOCOL.md: one Starlette application for one run."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import socket
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocket
+
+from dsc.viewer.access import Access
+from dsc.viewer.answers import Answers
+from dsc.viewer.control import Control
+from dsc.viewer.records import RecordLog
+from dsc.viewer.stream import Stream
+from knowledge_base.errors import InputError
+
+STATIC = Path(__file__).parent / "static"
+MOST_ASKED = 1 << 20
+"""Bytes of a request's body."""
+
+
+class Viewer:
+    """A run in the browser: made with its records, it answers at `url` from `start` to `close`.
+
+    Args:
+        log: the records.
+        control: the run, if whoever looks may change it.
+        port: where to listen on 127.0.0.1; 0 picks a free port.
+
+    Raises:
+        InputError: somebody else listens there.
+    """
+
+    def __init__(self, log: RecordLog, control: Control | None = None, port: int = 0) -> None:
+        self._log, self._control = log, control
+        self._answers = Answers(log)
+        self._socket = _listening(port)
+        self.port: int = self._socket.getsockname()[1]
+        self.token = secrets.token_urlsafe(24)
+        config = uvicorn.Config(
+            self.application(), lifespan="off", ws_max_size=1 << 16, log_level="error", access_log=False
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]}, daemon=True)
+
+    @property
+    def url(self) -> str:
+        """What to open; the token in it is the only key."""
+        return f"http://127.0.0.1:{self.port}/?token={self.token}"
+
+    def application(self) -> ASGIApp:
+        """The application behind the check of who may come in."""
+        routes = [
+            Route("/", self._page),
+            Route("/record/{seq:int}", self._record),
+            Route("/query", self._asked(self._answers.query), methods=["POST"]),
+            Route("/facts", self._asked(self._answers.facts), methods=["POST"]),
+            Route("/svg", self._asked(self._answers.svg), methods=["POST"]),
+            Route("/control", self._controlled, methods=["POST"]),
+            WebSocketRoute("/socket", self._stream),
+            Mount("/", StaticFiles(directory=STATIC, check_dir=False)),
+        ]
+        return Access(Starlette(routes=routes), self.token, self.port)
+
+    def start(self) -> None:
+        """Answer from now on, in a thread of its own."""
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Until it is closed; an interrupt gets through."""
+        while self._thread.is_alive():
+            self._thread.join(timeout=0.5)
+
+    def close(self) -> None:
+        """Answer no longer; whoever looks is told by the end of the socket."""
+        self._server.should_exit = True
+        self._server.force_exit = True
+        if self._thread.is_alive():
+            self._thread.join(timeout=5)
+        self._socket.close()
+
+    async def _page(self, _: Request) -> Response:
+        page = STATIC / "index.html"
+        if not page.exists():
+            return PlainTextResponse("the page has not been built: make viewer", status_code=500)
+        return FileResponse(page)
+
+    async def _record(self, request: Request) -> Response:
+        try:
+            return Response(self._log.line(request.path_params["seq"]), media_type="application/json")
+        except InputError as error:
+            return _wrong(error)
+
+    def _asked(self, answer: Callable[[Mapping[str, Any]], Any]) -> Callable[[Request], Any]:
+        async def asked(request: Request) -> Response:
+            try:
+                said = await run_in_threadpool(answer, await _body(request))
+            except InputError as error:
+                return _wrong(error)
+            return Response(said, media_type="image/svg+xml") if isinstance(said, str) else JSONResponse(said)
+
+        return asked
+
+    async def _controlled(self, request: Request) -> Response:
+        control = self._control
+        if control is None:
+            return PlainTextResponse("this run may only be looked at; see --allow-control", status_code=403)
+        try:
+            return JSONResponse(await run_in_threadpool(control.obey, await _body(request)))
+        except InputError as error:
+            return _wrong(error)
+
+    async def _stream(self, socket: WebSocket) -> None:
+        await socket.accept()
+        await Stream(socket, self._log, self._status, control=self._control is not None).serve()
+
+    def _status(self) -> dict[str, Any]:
+        return {"ended": not self._log.live, "paused": self._control.paused if self._control else None}
+
+
+def _listening(port: int) -> socket.socket:
+    """Bound here, so that the port is known before anybody asks."""
+    made = socket.socket()
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        made.bind(("127.0.0.1", port))
+        made.listen()  # who comes before the server runs waits
+    except OSError as error:
+        made.close()
+        raise InputError(f"cannot listen on port {port}: {error.strerror}") from None
+    return made
+
+
+async def _body(request: Request) -> Mapping[str, Any]:
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > MOST_ASKED:
+            raise InputError(f"a request has at most {MOST_ASKED} bytes")
+    try:
+        said = json.loads(body)
+    except ValueError:
+        said = None
+    if not isinstance(said, dict):
+        raise InputError("a request is one JSON object")
+    return said
+
+
+def _wrong(error: InputError) -> Response:
+    return JSONResponse({"error": str(error)}, status_code=400)

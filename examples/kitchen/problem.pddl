@@ -1,0 +1,5 @@
+(define (problem morning)
+  (:domain kitchen)
+  (:objects mug red_cup - cup muesli - bowl table sink - surface)
+  (:init (on mug table) (on muesli table) (on red_cup sink) (clean muesli) (= (temperature mug) 61.5))
+  (:goal (forall (?t - thing) (clean ?t))))

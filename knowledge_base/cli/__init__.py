@@ -1,0 +1,6 @@
+"""`dsc kb`: a world model on the command line; the commands import what they run, so that help stays light."""
+
+from __future__ import annotations
+
+from knowledge_base.cli.app import app as app
+from knowledge_base.cli.sources import readers as readers

@@ -1,0 +1,99 @@
+"""What the commands print: tables for people, JSON for programs, changes and truth as lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from knowledge_base.facts import Change, Delta
+    from knowledge_base.language.evaluation import Explanation
+
+
+def print_json(said: Any) -> None:
+    """One JSON value, for programs."""
+    import json
+
+    typer.echo(json.dumps(said, indent=2))
+
+
+def print_line(said: Mapping[str, Any]) -> None:
+    """One JSON object on a line of its own, for programs that read while it is going on."""
+    import json
+    import sys
+
+    typer.echo(json.dumps(said))
+    sys.stdout.flush()
+
+
+def print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """A table, as wide as the terminal or what it goes to lets it be."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table()
+    for title in head:
+        table.add_column(Text(title))
+    for row in rows:
+        table.add_row(*(Text(str(cell)) for cell in row))
+    Console().print(table)
+
+
+def change_form(change: Change) -> dict[str, Any]:
+    """A change as JSON data: version, time in seconds, author, and what became different as text."""
+    return {"version": change.version, "time": change.time, "author": change.author, **delta_form(change.delta)}
+
+
+def delta_form(delta: Delta) -> dict[str, Any]:
+    """What became different, in the language."""
+    return {
+        "objects": dict(delta.nodes),
+        "removed_objects": list(delta.removed_nodes),
+        "added": [str(fact) for fact in delta.added],
+        "removed": [str(fact) for fact in delta.removed],
+        "values": {str(fluent): content for fluent, content in delta.values.items()},
+    }
+
+
+def delta_lines(delta: Delta) -> Iterator[str]:
+    """What became different, each with a sign in front: `+ (on cup1 table)`."""
+    from knowledge_base.language.printer import value_text
+
+    yield from (f"- {name} and all about it" for name in delta.removed_nodes)
+    yield from (f"+ ({type_name} {name})" for name, type_name in delta.nodes.items())
+    yield from (f"- {fact}" for fact in delta.removed)
+    yield from (f"+ {fact}" for fact in delta.added)
+    for fluent, content in delta.values.items():
+        yield f"= {fluent} {value_text(content, quoted=isinstance(content, str))}"
+
+
+def clock_time(seconds: float) -> str:
+    """Seconds since 1970 as people and computers read them: `2026-11-21T16:40:03.250Z`."""
+    try:
+        return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    except (OverflowError, ValueError, OSError):  # a clock of its own, e.g. simulated time far ahead
+        return f"{seconds:g} s"
+
+
+def explanation_lines(why: Explanation, depth: int = 0, *, deciding: bool = True) -> Iterator[str]:
+    """The tree of a condition, a line each; an arrow leads to what decides."""
+    indent = "" if depth == 0 else "   " * (depth - 1) + ("-> " if deciding else "   ")
+    detail = f"   [{why.detail}]" if why.detail else ""
+    yield f"{indent}{'true ' if why.truth else 'false'}  {why.text}{detail}"
+    for number, child in enumerate(why.children):
+        yield from explanation_lines(child, depth + 1, deciding=deciding and number == why.decider)
+
+
+def explanation_form(why: Explanation) -> dict[str, Any]:
+    """The tree of a condition as JSON data."""
+    return {
+        "text": why.text,
+        "truth": why.truth,
+        "detail": why.detail,
+        "decider": why.decider,
+        "parts": [explanation_form(child) for child in why.children],
+    }

@@ -1,0 +1,107 @@
+"""What a command is asked to look into or to change: a store, a problem, a world in JSON, a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+if TYPE_CHECKING:
+    from knowledge_base.exchange.pddl import ProblemText
+    from knowledge_base.store import KnowledgeBase
+
+Source = Annotated[
+    Path, typer.Argument(metavar="SOURCE", help="A store, a PDDL problem, a world in JSON, or a scenario (YAML).")
+]
+Store = Annotated[Path, typer.Argument(metavar="STORE", help="A store's file.")]
+Domain = Annotated[
+    Path | None,
+    typer.Option("--domain", metavar="D.pddl", help="A problem's domain.  [default: domain.pddl beside it]"),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+_SQLITE = b"SQLite format 3\0"
+
+readers: dict[str, Callable[[Path], KnowledgeBase]] = {}
+"""More kinds of sources by the ending of their file, e.g. `.yaml`; upper rooms add theirs."""
+
+
+class Opened(NamedTuple):
+    """A world that was opened, and the problem that it is the start of, if it is one."""
+
+    kb: KnowledgeBase
+    problem: ProblemText | None = None
+
+
+@contextmanager
+def opened(source: Path, domain: Path | None = None) -> Iterator[Opened]:
+    """Any source, to be looked into; a store may be written by others meanwhile.
+
+    Raises:
+        InputError: there is no such file, or it is none of these.
+    """
+    found = _opened(source, domain)
+    with found.kb:
+        yield found
+
+
+@contextmanager
+def writable(store: Path) -> Iterator[KnowledgeBase]:
+    """A store that is there, to be changed.
+
+    Raises:
+        StoreError: it is not there, is no store, or somebody else is writing it.
+    """
+    from knowledge_base.store import KnowledgeBase
+
+    with KnowledgeBase.open(None, store, read_only=True):
+        pass  # what is no store gets the message of a reader, and no file is made
+    with KnowledgeBase.open(None, store) as kb:
+        yield kb
+
+
+def is_store(path: Path) -> bool:
+    """Whether the file is a database."""
+    try:
+        with path.open("rb") as file:
+            return file.read(len(_SQLITE)) == _SQLITE
+    except OSError:
+        return False
+
+
+def _opened(source: Path, domain: Path | None) -> Opened:
+    from knowledge_base.exchange.files import read_text
+    from knowledge_base.store import KnowledgeBase
+
+    if is_store(source):
+        return Opened(KnowledgeBase.open(None, source, read_only=True))
+    if source.suffix in readers:
+        return Opened(readers[source.suffix](source))
+    text = read_text(source)  # what was asked for comes first: without it nobody cares for its domain
+    if text.lstrip()[:1] == "{":
+        return Opened(KnowledgeBase.from_json(source))
+    return _problem(source, domain)
+
+
+def _problem(source: Path, domain: Path | None) -> Opened:
+    from knowledge_base.exchange.pddl import read_problem
+    from knowledge_base.schema import Schema
+    from knowledge_base.store import KnowledgeBase
+
+    schema = Schema.from_pddl(domain or _beside(source))
+    problem = read_problem(source, schema)
+    kb = KnowledgeBase(schema)
+    kb.apply(problem.delta(), author=str(source))
+    return Opened(kb, problem)
+
+
+def _beside(problem: Path) -> Path:
+    from knowledge_base.errors import InputError
+
+    domain = problem.parent / "domain.pddl"
+    if not domain.exists():
+        raise InputError(f"there is no '{domain}' beside the problem; name its domain with --domain")
+    return domain

@@ -1,0 +1,99 @@
+"""Commands that make a store and change it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from knowledge_base.cli.printing import change_form, delta_lines, print_json
+from knowledge_base.cli.sources import Json, Store, writable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from knowledge_base.facts import Delta
+    from knowledge_base.language.world import World
+
+Facts = Annotated[
+    list[str],
+    typer.Argument(metavar="FACT...", help="'(on cup1 table)', '(cup cup1)', '(= (weight cup1) 0.2)', any effect."),
+]
+Gone = Annotated[
+    list[str], typer.Argument(metavar="FACT...", help="'(on cup1 table)'; '(cup cup1)' takes the thing away.")
+]
+Author = Annotated[str, typer.Option(help="Who says so; it stands in the history.")]
+Expect = Annotated[int | None, typer.Option(metavar="VERSION", help="Change nothing unless the store is there.")]
+Key = Annotated[str | None, typer.Option(help="A name for this change: the same key again changes nothing.")]
+
+
+def new(
+    store: Annotated[Path, typer.Argument(metavar="STORE", help="The file to make.")],
+    domain: Annotated[Path, typer.Option("--domain", metavar="D.pddl", help="What may be said: a PDDL domain.")],
+) -> None:
+    """Make an empty store whose schema is that of a PDDL domain."""
+    from knowledge_base.errors import StoreError
+    from knowledge_base.schema import Schema
+    from knowledge_base.store import KnowledgeBase
+
+    schema = Schema.from_pddl(domain)
+    if store.exists():
+        raise StoreError(f"'{store}' is there already; a new store takes the place of no file")
+    with KnowledgeBase.open(schema, store) as kb:
+        said = f"{len(schema.types)} types, {len(schema.predicates)} predicates, {len(schema.functions)} functions"
+        typer.echo(f"made {store}: {said}, {len(kb.nodes())} constants")
+
+
+def tell(
+    store: Store,
+    facts: Facts,
+    author: Author = "dsc kb",
+    expect: Expect = None,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Make facts true, set numbers, name things: all of it or, with a mistake, nothing."""
+    from knowledge_base.statements import told
+
+    _change(store, facts, told, author, expect, key, as_json=json)
+
+
+def retract(
+    store: Store,
+    facts: Gone,
+    author: Author = "dsc kb",
+    expect: Expect = None,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Take facts back, or things with all that is about them: all of it or, with a mistake, nothing."""
+    from knowledge_base.statements import retracted
+
+    _change(store, facts, retracted, author, expect, key, as_json=json)
+
+
+def _change(
+    store: Path,
+    statements: list[str],
+    meaning: Callable[[Iterable[str], World, str], Delta],
+    author: str,
+    expect: int | None,
+    key: str | None,
+    *,
+    as_json: bool,
+) -> None:
+    from knowledge_base.errors import ConflictError, InputError
+
+    with writable(store) as kb:
+        try:
+            change = kb.apply(meaning(statements, kb, "FACT"), author, expect=expect, key=key)
+        except ConflictError as error:
+            raise InputError(str(error)) from None
+    if as_json:
+        print_json(change_form(change))
+        return
+    lines = list(delta_lines(change.delta))
+    for line in lines or ["nothing new"]:
+        typer.echo(line)
+    typer.echo(f"version {change.version}")

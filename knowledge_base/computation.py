@@ -1,0 +1,188 @@
+"""Predicates that Python computes from what the world says, e.g. `(near ?a ?b)` from two positions.
+
+They are declared, not guessed: which facts and numbers a computed predicate reads is part of it, so that
+an installed condition is judged anew when one of those changes, and only then.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from graphlib import CycleError, TopologicalSorter
+from typing import Any, Generic, ParamSpec
+
+from knowledge_base.errors import InputError, Place, SchemaError
+from knowledge_base.exchange.domain_text import parse_declaration
+from knowledge_base.language.expression import Arithmetic, Atom, Call, Term, TypedVariable, Variable, free_variables
+from knowledge_base.language.parser import parse_term
+from knowledge_base.language.printer import to_text
+
+Read = Term | Atom
+"""What comes in: a term's value, or whether an atom is true."""
+
+MOST_NESTED = 8
+"""How many may read one through the other; each multiplies what judging the first costs."""
+
+_Inputs = ParamSpec("_Inputs")
+_SOURCE = "@computed"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Computed(Generic[_Inputs]):
+    """A predicate whose truth is what a function of its inputs gives; made by `computed`.
+
+    It can be called like the function. Before a schema has it, a read such as `(clean ?a)` is taken for a
+    function's value; the schema knows which are predicates.
+
+    Attributes:
+        name: the predicate's name.
+        parameters: what it is about.
+        reads: its inputs, over the parameters.
+        function: gets their values in order and gives the truth.
+        place: where it is declared.
+    """
+
+    name: str
+    parameters: tuple[TypedVariable, ...]
+    reads: tuple[Read, ...]
+    function: Callable[_Inputs, bool]
+    place: Place | None = field(default=None, repr=False)
+
+    def __call__(self, *args: _Inputs.args, **kwargs: _Inputs.kwargs) -> bool:
+        """What the function gives."""
+        return self.function(*args, **kwargs)
+
+    def inputs(self, args: tuple[Term, ...]) -> tuple[Read, ...]:
+        """What it reads when it is about `args`."""
+        given = {p.name: arg for p, arg in zip(self.parameters, args, strict=True)}
+        return tuple(_put_in(read, given) for read in self.reads)
+
+    def resolved(self, predicates: Callable[[str, int], bool]) -> Computed[_Inputs]:
+        """The same, with the reads of predicates told from those of functions.
+
+        Args:
+            predicates: whether that name with that many arguments is a predicate or type.
+        """
+        return replace(self, reads=tuple(_resolved(read, predicates) for read in self.reads))
+
+    def refused(self, place: Place | None = None) -> SchemaError:
+        """The error for telling, retracting or watching it."""
+        inputs = ", ".join(map(to_text, self.reads)) or "nothing"
+        return SchemaError(
+            f"'{self.name}' is computed, so that no fact says it; told and watched is what it reads: {inputs}",
+            place=place,
+        )
+
+    def judge(self, values: Sequence[object]) -> bool:
+        """Its truth for these inputs.
+
+        Raises:
+            InputError: the function raised something or gave no truth value.
+        """
+        function: Callable[..., object] = self.function
+        try:
+            truth = function(*values)
+        except Exception as error:
+            raise InputError(f"{type(error).__name__}: {error}") from error
+        if not isinstance(truth, bool):
+            raise InputError(f"true or false is expected, and its function gave {truth!r}")
+        return truth
+
+
+def computed(
+    declaration: str, *, reads: Sequence[str] = ()
+) -> Callable[[Callable[_Inputs, bool]], Computed[_Inputs]]:
+    """Make a function a predicate; `Schema.with_computed` makes it known.
+
+    The function depends on its inputs alone: what else it looks at is not noticed when it changes.
+
+    Args:
+        declaration: the predicate as PDDL declares it: `(near ?a ?b - thing)`.
+        reads: for each of the function's arguments a term, e.g. `(x ?a)`, whose value it gets, or an atom,
+            e.g. `(clean ?a)`, whose truth it gets; their variables are the predicate's parameters.
+
+    Raises:
+        ParseError: the declaration is none, or a read is neither a term nor an atom.
+        SchemaError: a read has another variable, or the function takes another number of arguments.
+    """
+    declared = parse_declaration(declaration, _SOURCE)
+    parsed = tuple(parse_term(read, _SOURCE) for read in reads)
+    names = [p.name for p in declared.parameters]
+    for read in parsed:
+        for name in sorted(free_variables(read) - set(names)):
+            raise SchemaError(
+                f"'?{name}' in {to_text(read)} is no parameter of '{declared.name}'",
+                place=read.place, found=f"?{name}", valid=[f"?{n}" for n in names],
+            )  # fmt: skip
+
+    def declare(function: Callable[_Inputs, bool]) -> Computed[_Inputs]:
+        if not _takes(function, len(parsed)):
+            raise SchemaError(
+                f"the function of '{declared.name}' does not take {len(parsed)} arguments, one for each read",
+                place=declared.place,
+            )
+        return Computed(declared.name, declared.parameters, parsed, function, declared.place)
+
+    return declare
+
+
+def in_reading_order(known: Mapping[str, Computed[Any]]) -> list[Computed[Any]]:
+    """All of them, those that others read first.
+
+    Raises:
+        SchemaError: they read each other in a circle, or more than `MOST_NESTED` one through the other.
+    """
+    read = {
+        name: [r.predicate for r in of.reads if isinstance(r, Atom) and r.predicate in known]
+        for name, of in known.items()
+    }
+    try:
+        names = list(TopologicalSorter(read).static_order())
+    except CycleError as error:
+        circle = error.args[1]
+        said = " - ".join(circle)
+        raise SchemaError(f"computed predicates in a circle: {said}", place=known[circle[0]].place) from None
+    nested: dict[str, int] = {}
+    for name in names:
+        nested[name] = 1 + max((nested[other] for other in read[name]), default=0)
+        if nested[name] > MOST_NESTED:
+            message = f"'{name}' reads computed predicates more than {MOST_NESTED} deep, one through the other"
+            raise SchemaError(message, place=known[name].place)
+    return [known[name] for name in names]
+
+
+def _takes(function: Callable[..., object], count: int) -> bool:
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # written in C, and does not say
+        return True
+    try:
+        signature.bind(*range(count))
+    except TypeError:
+        return False
+    return True
+
+
+def _resolved(read: Read, predicates: Callable[[str, int], bool]) -> Read:
+    if isinstance(read, Call) and predicates(read.function, len(read.args)):
+        return Atom(read.function, read.args, place=read.place)
+    return read
+
+
+def _put_in(read: Read, given: Mapping[str, Term]) -> Read:
+    return replace(read, args=_terms(read.args, given)) if isinstance(read, Atom) else _term(read, given)
+
+
+def _term(term: Term, given: Mapping[str, Term]) -> Term:
+    match term:
+        case Variable(name):
+            return given[name]
+        case Call(_, args) | Arithmetic(_, args):
+            return replace(term, args=_terms(args, given))
+        case _:
+            return term
+
+
+def _terms(terms: tuple[Term, ...], given: Mapping[str, Term]) -> tuple[Term, ...]:
+    return tuple(_term(t, given) for t in terms)

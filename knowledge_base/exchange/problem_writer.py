@@ -1,0 +1,55 @@
+"""A world as a PDDL problem file, which `read_problem` reads back: nothing but the version is lost."""
+
+from __future__ import annotations
+
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Content, Fact
+from knowledge_base.language.expression import TRUE, Expression, is_plain_name
+from knowledge_base.language.parser import LONGEST_NUMBER
+from knowledge_base.language.printer import to_text, value_text
+from knowledge_base.schema import Signature
+from knowledge_base.state import WorldState
+
+
+def problem_to_text(state: WorldState, name: str, domain: str, goal: Expression = TRUE) -> str:
+    """The world as the start of a problem.
+
+    Args:
+        state: the world; constants of its schema are the domain's affair and not listed.
+        name: what the problem is called.
+        domain: the name of its domain.
+        goal: what is wanted.
+
+    Raises:
+        InputError: a name that PDDL cannot spell, such as one with blanks or capitals, or a number that is
+            too long for a file.
+    """
+    for word in (name, domain, *state.nodes):
+        if not is_plain_name(word):
+            raise InputError(f"{word!r} cannot be a name in PDDL, which has lower case and no blanks there")
+    schema = state.schema
+    said = [_fact(fact, schema.predicate(fact.predicate)) for fact in state.facts]
+    values = [
+        f"(= {_fact(fluent, schema.function(fluent.predicate))} {_written(content, quoted=True)})"
+        for fluent, content in state.values.items()
+    ]
+    objects = [f"{thing} - {type_name}" for thing, type_name in state.nodes.items() if thing not in schema.constants]
+    sections = (_section(":objects", objects), _section(":init", [*said, *values]), f"  (:goal {to_text(goal)})")
+    return "\n".join([f"(define (problem {name}) (:domain {domain})", *sections]) + ")\n"
+
+
+def _section(keyword: str, lines: list[str]) -> str:
+    return "\n    ".join([f"  ({keyword}", *lines]) + ")"
+
+
+def _fact(fact: Fact, signature: Signature) -> str:
+    typed = zip(fact.args, signature.parameters, strict=True)
+    # Text without quotes would be read as the name of a thing; a name in quotes is still one.
+    return "(" + " ".join([fact.predicate, *(_written(arg, quoted="text" in p.types) for arg, p in typed)]) + ")"
+
+
+def _written(content: Content, *, quoted: bool) -> str:
+    for number in content if isinstance(content, tuple) else (content,):
+        if not isinstance(number, str) and len(repr(number)) > LONGEST_NUMBER:
+            raise InputError(f"a number in PDDL has at most {LONGEST_NUMBER} characters, not {number}")
+    return value_text(content, quoted=quoted)

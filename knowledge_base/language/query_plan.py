@@ -1,0 +1,185 @@
+"""How a query will run on a world as it is: which conditions are looked up, in which order, and which are tested."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from knowledge_base.facts import Value
+from knowledge_base.language.asking import NO_BINDINGS
+from knowledge_base.language.binding import check_answers
+from knowledge_base.language.compiler import SearchPlan, Stage
+from knowledge_base.language.depth import check_depth
+from knowledge_base.language.expression import (
+    Atom,
+    Exists,
+    Expression,
+    Or,
+    Term,
+    Variable,
+    free_variables,
+    substitute,
+    substitute_term,
+    variables_in_order,
+)
+from knowledge_base.language.joins import Conjunct, Range, Step, conjuncts
+from knowledge_base.language.lookups import Lookup, Search, smallest
+from knowledge_base.language.printer import to_text
+from knowledge_base.language.terms import Bindings
+from knowledge_base.language.world import World
+
+Kind = Literal["test", "computed", "look up", "scan", "things", "alternatives", "witnesses"]
+"""`test`: a condition whose variables all have values, `computed`: one that Python judges; `look up`: facts with
+given arguments, `scan`: all facts of a predicate; `things` of a type; `alternatives`: each part of an `or` in
+turn; `witnesses` of an `exists`."""
+
+
+@dataclass(frozen=True, slots=True)
+class QueryStep:
+    """One condition of a query, at its turn.
+
+    Attributes:
+        kind: what is done with it.
+        text: the condition, with the parameters' values in it.
+        by: for a look-up the arguments that have a value by then.
+        finds: the variables that get their values here.
+        matches: at most how many facts match, or how many things there are; `None` where nobody has counted.
+        varies: the order from here on is decided while running, by the values found before.
+        reached: whether the first candidate got that far.
+    """
+
+    kind: Kind
+    text: str
+    by: tuple[str, ...] = ()
+    finds: tuple[str, ...] = ()
+    matches: int | None = None
+    varies: bool = False
+    reached: bool = True
+
+    def __str__(self) -> str:
+        """One line, e.g. `look up (on ?x table) by table: finds ?x, at most 3 matches`."""
+        what = f"{self.kind} {self.text}" + (f" by {' '.join(self.by)}" if self.by else "")
+        said = [
+            *([f"finds {' '.join(f'?{name}' for name in self.finds)}"] if self.finds else ()),
+            *([f"at most {self.matches} match{'es' * (self.matches != 1)}"] if self.matches is not None else ()),
+            *(["decided while running"] if self.varies else ()),
+            *(["not reached"] if not self.reached else ()),
+        ]
+        return f"{what}: {', '.join(said)}" if said else what
+
+
+@dataclass(frozen=True, slots=True)
+class QueryPlan:
+    """The steps of a query in the order in which its first candidate meets them.
+
+    Attributes:
+        text: the query, with the parameters' values in it.
+        answers: the variables it finds values for.
+        steps: what is done, in order.
+    """
+
+    text: str
+    answers: tuple[str, ...]
+    steps: tuple[QueryStep, ...]
+
+    def __str__(self) -> str:
+        """The query and below it one line for each step."""
+        return "\n".join([self.text, *(f"{number:3}. {step}" for number, step in enumerate(self.steps, start=1))])
+
+    def to_json(self) -> dict[str, Any]:
+        """The same as plain data."""
+        return asdict(self)
+
+
+def plan_query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> QueryPlan:
+    """How `e` will be asked of `world`, found out by following the first candidate.
+
+    Raises:
+        InputError: as for `query`.
+    """
+    check_depth(e)
+    bound = free_variables(e).intersection(bindings)
+    check_answers(e, bound, world.schema)
+    answers = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
+    follower = _Follower(SearchPlan(conjuncts(e), world.schema, bound), world, bindings)
+    return QueryPlan(to_text(substitute(e, bindings)), answers, tuple(follower.steps()))
+
+
+class _Follower:
+    """Goes through the stages of a search as the search itself does, with one candidate and no way back."""
+
+    def __init__(self, plan: SearchPlan, world: World, params: Bindings) -> None:
+        self._plan = plan
+        self._world = world
+        self._params = params
+        self._varies = False
+        self._candidate: Bindings | None = params
+
+    def steps(self) -> Iterator[QueryStep]:
+        stage = self._plan.first
+        yield from self._tests(range(len(self._plan.steps)), stage, iter((self._params,)))
+        while stage.choices:
+            candidate = self._candidate
+            self._varies |= stage is not self._plan.first and len(stage.choices) > 1
+            chosen, lookup = stage.choices[0] if candidate is None else smallest(stage.choices, self._world, candidate)
+            yield self._lookup(self._plan.steps[chosen], stage.bound, lookup)
+            found = iter(()) if candidate is None else lookup(self._world, candidate)
+            left = [i for i in stage.left if i != chosen]
+            stage = self._plan.after(stage, chosen)
+            yield from self._tests(left, stage, found)
+
+    def _tests(self, numbers: Iterable[int], stage: Stage, found: Iterator[Bindings]) -> Iterator[QueryStep]:
+        """The tests of a stage; then the candidate is the first of those `found` that passes them."""
+        self._candidate = next(found, None)
+        left = set(stage.left)
+        for conjunct in (self._plan.steps[i].conjunct for i in numbers if i not in left):
+            computed = isinstance(conjunct, Atom) and conjunct.predicate in self._world.schema.computed
+            yield self._step("computed" if computed else "test", conjunct)
+        if stage.test is not None:
+            while self._candidate is not None and not stage.test(self._world, self._candidate):
+                self._candidate = next(found, None)
+
+    def _lookup(self, step: Step, bound: frozenset[str], lookup: Lookup | Search) -> QueryStep:
+        match step.conjunct:
+            case Atom(_, args):
+                unknown = step.free - bound
+                by = tuple(self._text(arg) for arg in args if free_variables(arg).isdisjoint(unknown))
+                return self._step("look up" if by else "scan", step.conjunct, bound, by, self._matches(lookup))
+            case Range(variable):
+                things = {thing for t in variable.types or ("object",) for thing in self._world.objects(t)}
+                return self._step("things", step.conjunct, bound, matches=len(things))
+            case Exists():
+                return self._step("witnesses", step.conjunct, bound)
+            case _:
+                return self._step("alternatives", step.conjunct, bound)
+
+    def _matches(self, lookup: Lookup | Search) -> int | None:
+        if self._candidate is None or not isinstance(lookup, Lookup) or not hasattr(self._world, "estimate"):
+            return None
+        return lookup.size(self._world, self._candidate)
+
+    def _step(
+        self,
+        kind: Kind,
+        conjunct: Conjunct,
+        bound: frozenset[str] | None = None,
+        by: tuple[str, ...] = (),
+        matches: int | None = None,
+    ) -> QueryStep:
+        """A step; a look-up is given what was `bound` before it."""
+        e = _expression(conjunct)
+        finds = () if bound is None else tuple(dict.fromkeys(n for n in variables_in_order(e) if n not in bound))
+        reached = self._candidate is not None
+        return QueryStep(kind, self._text(e), by, finds, matches, self._varies, reached)
+
+    def _text(self, e: Expression | Term) -> str:
+        return to_text(substitute_term(e, self._params) if isinstance(e, Term) else substitute(e, self._params))
+
+
+def _expression(conjunct: Conjunct) -> Expression:
+    if not isinstance(conjunct, Range):
+        return conjunct
+    variable = conjunct.variable
+    kinds = tuple(Atom(t, (Variable(variable.name),)) for t in variable.types or ("object",))
+    return kinds[0] if len(kinds) == 1 else Or(kinds)

@@ -1,0 +1,167 @@
+"""Sensor streams and transforms by reference: they stay outside, the latest value is known (S4.9).
+
+A fluent that is bound to a source is worth what the source was fed last. That is seen at once by whoever asks
+and by installed conditions, at the present version; no version, change or journal ever has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from threading import RLock
+from types import TracebackType
+from typing import Self
+
+from knowledge_base.admission import check_fluent
+from knowledge_base.announcement import Announcer
+from knowledge_base.conditions.installed import Installed
+from knowledge_base.content import require_content
+from knowledge_base.errors import ConflictError, InputError, SchemaError
+from knowledge_base.facts import Content, Fact
+from knowledge_base.state import WorldState
+from knowledge_base.world_graph import WorldGraph
+
+
+class Source:
+    """Feeds one fluent, from any thread; made by `KnowledgeBase.bind_source`.
+
+    As a context manager it is closed at the end of the block.
+
+    Attributes:
+        fluent: the function with its arguments.
+        reference: where the values come from, e.g. `tf:map/cup1`.
+    """
+
+    def __init__(self, owner: Sources, fluent: Fact, reference: str) -> None:
+        self._owner = owner
+        self.fluent = fluent
+        self.reference = reference
+        self._latest: Content | None = None
+        self._closed = False
+
+    @property
+    def latest(self) -> Content | None:
+        """What it was fed last; `None` before the first time."""
+        return self._latest
+
+    @property
+    def closed(self) -> bool:
+        """Whether it feeds no longer: it was closed, its thing was removed, or the knowledge base was closed."""
+        return self._closed
+
+    def update(self, content: Content) -> None:
+        """The fluent is worth this now. While somebody's transaction is open, this waits for its end.
+
+        Raises:
+            SchemaError: it is not of the type of the function's result.
+            InputError: a number that is not finite.
+            ConflictError: the source is closed.
+        """
+        self._owner.feed(self, content)
+
+    def close(self) -> None:
+        """Feed no longer: the fluent reads as if it had never been bound; repeating it is fine."""
+        self._owner.close(self)
+
+    def __repr__(self) -> str:
+        return f"<Source {self.fluent} from {self.reference}: {'closed' if self._closed else self._latest}>"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # --- called by its owner, under the lock
+
+    def take(self, content: Content) -> None:
+        """It was fed."""
+        self._latest = content
+
+    def end(self) -> None:
+        """It feeds no longer."""
+        self._closed = True
+
+
+class Sources:
+    """All open sources of a knowledge base, in the order in which they were bound."""
+
+    def __init__(
+        self,
+        state: WorldState,
+        graph: Callable[[], WorldGraph | None],
+        installed: Installed,
+        announcer: Announcer,
+        lock: RLock,
+    ) -> None:
+        self._state, self._graph, self._installed = state, graph, installed
+        self._announcer, self._lock = announcer, lock
+        self._open: dict[Fact, Source] = {}
+
+    def bind(self, fluent: Fact, reference: str) -> Source:
+        """Make a source for a fluent that has none; see `KnowledgeBase.bind_source`."""
+        if not isinstance(reference, str) or not reference:
+            raise InputError(f"a source's reference is text that says where values come from, not {reference!r}")
+        with self._lock:
+            check_fluent(fluent, self._state)
+            if fluent in self._open:
+                raise SchemaError(f"{fluent} is fed by '{self._open[fluent].reference}' already")
+            source = self._open[fluent] = Source(self, fluent, reference)
+            self._state.bind(fluent, reference)
+            self._show(fluent, reference, self._value(fluent))
+        return source
+
+    def listed(self) -> list[Source]:
+        """Those that are open."""
+        with self._lock:
+            return list(self._open.values())
+
+    def feed(self, source: Source, content: Content) -> None:
+        """Take in a value; see `Source.update`."""
+        fluent = source.fluent
+        require_content(content, self._state.schema.result(fluent.predicate), fluent)
+        with self._lock:
+            if source.closed:
+                raise ConflictError(f"the source '{source.reference}' of {fluent} is closed")
+            before = self._value(fluent)
+            source.take(content)
+            self._state.feed(fluent, content)
+            self._show(fluent, source.reference, content)
+            self._tell(fluent, before)
+        self._announcer.deliver()
+
+    def close(self, source: Source) -> None:
+        """See `Source.close`."""
+        with self._lock:
+            if source.closed:
+                return
+            before = self._value(source.fluent)
+            self._drop(source)
+            self._tell(source.fluent, before)
+        self._announcer.deliver()
+
+    def close_about(self, things: Iterable[str]) -> None:
+        """Things go, and with them what feeds values about them; conditions are told by whoever removes them."""
+        gone = set(things)
+        if gone:  # nearly every commit takes nothing away
+            for source in [s for s in self._open.values() if not gone.isdisjoint(s.fluent.args)]:
+                self._drop(source)
+
+    def _drop(self, source: Source) -> None:
+        source.end()
+        del self._open[source.fluent]
+        self._state.unbind(source.fluent)
+        if (graph := self._graph()) is not None:
+            graph.unfeed(source.fluent, self._state.values.get(source.fluent))
+
+    def _show(self, fluent: Fact, reference: str, content: Content) -> None:
+        if (graph := self._graph()) is not None:  # nobody has looked at it otherwise
+            graph.feed(fluent, reference, content)
+
+    def _tell(self, fluent: Fact, before: Content) -> None:
+        if self._value(fluent) != before:
+            self._installed.refreshed(fluent)
+
+    def _value(self, fluent: Fact) -> Content:
+        return self._state.value(fluent.predicate, fluent.args)

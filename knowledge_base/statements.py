@@ -1,0 +1,118 @@
+"""What people say of a world, as text: facts told, numbers set and things named, each a change (`Delta`).
+
+A statement is an effect of the language (`(on cup1 table)`, `(not (on cup1 table))`, `(increase (failures cup1) 1)`),
+a number as problems write it (`(= (weight cup1) 0.2)`), or a thing with its type, told like a fact (`(cup cup1)`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from knowledge_base.errors import InputError, ParseError, SchemaError, UnknownNameError
+from knowledge_base.facts import Delta, Fact
+from knowledge_base.language.application import apply_effect
+from knowledge_base.language.check import check, check_effect
+from knowledge_base.language.effect import Add, Assign, Effect
+from knowledge_base.language.expression import Atom, Call, Comparison, Constant, Expression
+from knowledge_base.language.parser import parse_condition, parse_effect
+from knowledge_base.language.sexpr import Group, read
+from knowledge_base.language.world import World
+from knowledge_base.overlay import Overlay
+from knowledge_base.schema import ROOT_TYPE
+
+
+def told(statements: Iterable[str], world: World, source: str | None = None) -> Delta:
+    """The change that makes all the statements true, one after the other; nothing is changed yet.
+
+    Things may be used in front of the statement that names their type.
+
+    Args:
+        statements: the texts, one statement each.
+        world: what they are said of.
+        source: what to call them in messages; their number follows it.
+
+    Raises:
+        ParseError: a text is no statement.
+        UnknownNameError: an undeclared type, predicate or function, or a thing that is neither there nor named.
+        SchemaError: a wrong number of arguments or a wrong type, or a thing of another type.
+    """
+    effects = [_effect(text, _called(source, number)) for number, text in enumerate(statements, 1)]
+    view = Overlay(world)
+    for effect in effects:
+        if (thing := _thing(effect, world)) is not None:
+            view.apply(Delta(nodes=thing))
+    known = _known(view)
+    for effect in effects:
+        if _thing(effect, world) is None:
+            check_effect(effect, world.schema, objects=known)
+            view.apply(apply_effect(effect, view))
+    return view.delta
+
+
+def retracted(statements: Iterable[str], world: World, source: str | None = None) -> Delta:
+    """The change that takes the facts back; of a thing with its type it takes the thing and all that is said of it.
+
+    Raises:
+        InputError: as for `told`; also a fact that does not hold, since something else was meant then.
+    """
+    view = Overlay(world)
+    known = _known(view)
+    for number, text in enumerate(statements, 1):
+        atom = _atom(parse_condition(text, _called(source, number)))
+        check(atom, world.schema, objects=known)
+        view.apply(_taken_back(atom, view))
+    return view.delta
+
+
+def _called(source: str | None, number: int) -> str | None:
+    return None if source is None else f"{source} {number}"
+
+
+def _effect(text: str, source: str | None) -> Effect:
+    """The statement as an effect; a number said with `=` is assigned."""
+    groups = read(text, source)
+    if len(groups) != 1 or not isinstance(groups[0], Group) or groups[0].head() != "=":
+        return parse_effect(text, source)
+    said = parse_condition(groups[0])
+    if not isinstance(said, Comparison) or not isinstance(said.left, Call):
+        raise ParseError("a number is said of a function: (= (FUNCTION ...) NUMBER)", place=said.place)
+    return Assign("assign", said.left, said.right, place=said.place)
+
+
+def _thing(effect: Effect, world: World) -> Mapping[str, str] | None:
+    """The thing that the statement names with its type, if it is that."""
+    if not isinstance(effect, Add) or not world.schema.is_type(effect.atom.predicate, len(effect.atom.args)):
+        return None
+    (arg,) = effect.atom.args
+    if not isinstance(arg, Constant) or not isinstance(arg.value, str):
+        raise SchemaError(f"a thing is told by its name: ({effect.atom.predicate} NAME)", place=effect.place)
+    return {arg.value: effect.atom.predicate}
+
+
+def _known(world: World) -> dict[str, str]:
+    return {name: world.type_of(name) or ROOT_TYPE for name in world.objects(ROOT_TYPE)}
+
+
+def _atom(e: Expression) -> Atom:
+    if not isinstance(e, Atom):
+        raise InputError("what is taken back is a fact or a thing: (on cup1 table), (cup cup1)", place=e.place)
+    return e
+
+
+def _taken_back(atom: Atom, world: World) -> Delta:
+    args = tuple(arg.value for arg in atom.args if isinstance(arg, Constant))
+    if world.schema.is_type(atom.predicate, len(args)):
+        return Delta(removed_nodes=(_of_type(atom, str(args[0]), world),))
+    fact = Fact(atom.predicate, args)
+    if not world.holds(atom.predicate, args):
+        held = [str(Fact(atom.predicate, other)) for other in world.match(atom.predicate, (None,) * len(args))]
+        raise InputError(f"{fact} does not hold", place=atom.place, found=str(fact), valid=held)
+    return Delta(removed=(fact,))
+
+
+def _of_type(atom: Atom, name: str, world: World) -> str:
+    own = world.type_of(name)
+    if own is None or not world.schema.is_a(own, atom.predicate):
+        valid = world.objects(atom.predicate)
+        raise UnknownNameError(f"there is no {atom.predicate} '{name}'", place=atom.place, found=name, valid=valid)
+    return name

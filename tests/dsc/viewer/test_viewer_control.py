@@ -1,0 +1,122 @@
+"""A live run in the hands of who watches it: held still, stepped, told things; only when that was allowed."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
+
+from domains.clean_up_table.deployment import deploy
+from domains.clean_up_table.scenario import Scenario
+from dsc.viewer.control import Control
+from dsc.viewer.records import RecordLog
+from knowledge_base import InputError
+
+
+class Watched:
+    """A run in a thread of its own that stands still at its first event."""
+
+    def __init__(self, breakpoint_: dict | None = None) -> None:
+        self.log = RecordLog(live=True)
+        self._changed = threading.Condition()
+        self.control = Control(self._change)
+        self.report = None
+        table = deploy(Scenario.parse("table: {cups: 2, cans: 1, crisp_cans: [small]}"), 1, 0.0, listener=self.log.hear)
+
+        def attach(sequencer) -> None:
+            self.control.attach(sequencer)
+            self.control._steps = 0
+
+        def run() -> None:
+            with table.executive:
+                self.report = table.run(prepare=attach)
+            self._change()
+
+        self.thread = threading.Thread(target=run, daemon=True)
+        self.thread.start()
+        self.until(lambda: self.control.paused)
+
+    def _change(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def until(self, met) -> None:
+        with self._changed:
+            assert self._changed.wait_for(met, timeout=60)
+
+    def to_the_end(self):
+        self.control.obey({"do": "resume"})
+        self.until(lambda: self.report is not None)
+        self.thread.join()
+        return self.report
+
+    def types(self) -> list[str]:
+        return [self.log.record(seq)["type"] for seq in range(1, len(self.log) + 1)]
+
+
+def test_a_run_that_is_held_still_and_stepped_ends_like_any_other() -> None:
+    watched = Watched()
+    seen = watched.types()
+    assert seen.count("step") == 1  # the start; the first event waits
+    watched.control.obey({"do": "step"})
+    watched.until(lambda: watched.control.paused and watched.types().count("step") > 1)
+    assert watched.types().count("event") == 1
+    report = watched.to_the_end()
+    assert report.goal_reached
+    undisturbed = deploy(Scenario.parse("table: {cups: 2, cans: 1, crisp_cans: [small]}"), 1, 0.0)
+    with undisturbed.executive:
+        assert undisturbed.run().simulated_s == report.simulated_s  # simulated time stood still, too
+
+
+@pytest.mark.parametrize(
+    ("on", "record"),
+    [
+        ({"state": "clear/execute"}, lambda r: any("clear/execute" in m["entered"] for m in r.get("microsteps", ()))),
+        ({"event": "plan_found"}, lambda r: r.get("name") == "plan_found"),
+        ({"condition": "(exists (?i - item) (holding ?i))"}, lambda r: "holding" in str(r.get("added"))),
+        ({"plan_step": "(pick-up can1 table)"}, lambda r: "clear/execute/step_1" in str(r.get("microsteps"))),
+    ],
+)
+def test_a_breakpoint_holds_the_run_where_it_says(on, record) -> None:
+    watched = Watched()
+    watched.control.obey({"do": "break", "on": on})
+    watched.control.obey({"do": "resume"})
+    watched.until(lambda: watched.control.paused)
+    assert next(iter(on.values())) in watched.control.paused
+    met = [seq for seq in range(1, len(watched.log) + 1) if record(watched.log.record(seq))]
+    assert met
+    watched.control.obey({"do": "unbreak", "number": 1})
+    assert watched.to_the_end().goal_reached
+
+
+def test_events_and_facts_are_handed_in() -> None:
+    watched = Watched()
+    watched.control.obey({"do": "tell", "statements": ["(cup spare)", "(seen spare)"]})
+    watched.control.obey({"do": "event", "name": "stop"})
+    watched.to_the_end()
+    events = [watched.log.record(n) for n in range(1, len(watched.log) + 1)]
+    assert [e["source"] for e in events if e.get("name") == "stop"] == ["outside"]
+    assert [e["nodes"] for e in events if e.get("author") == "viewer"] == [{"spare": "cup"}]
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ({"do": "stepp"}, "there is nothing to do called 'stepp'; did you mean 'step'"),
+        ({"do": "break", "on": {"stat": "clear"}}, "a breakpoint is on one of"),
+        ({"do": "break", "on": {"condition": "(holdin cup1)"}}, "did you mean 'holding'"),
+        ({"do": "unbreak", "number": 9}, "there is no breakpoint 9"),
+        ({"do": "tell", "statements": ["(onn a b)"]}, "there is no predicate 'onn'"),
+        ({"do": "tell", "statements": "(on a b)"}, "'statements' is a list of texts"),
+        ({"do": "event", "name": "done"}, "is fired by the executive itself"),
+    ],
+)
+def test_what_makes_no_sense_changes_nothing(command, message) -> None:
+    watched = Watched()
+    with pytest.raises(InputError, match=message.replace("(", r"\(")):
+        watched.control.obey(command)
+    assert watched.to_the_end().goal_reached
+    with pytest.raises(InputError, match="the run is over"):
+        watched.control.obey({"do": "pause"})
