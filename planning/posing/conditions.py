@@ -144,6 +144,13 @@ class Change:
     what: Literal | Assignment
 
 
+def is_so(fact: Fact, world: World) -> bool:
+    """Whether the fact holds; worlds keep no facts of computed predicates."""
+    if fact.predicate in world.schema.computed:
+        return holds(Atom(fact.predicate, tuple(map(Constant, fact.args))), world)
+    return world.holds(fact.predicate, fact.args)
+
+
 @dataclass(frozen=True, slots=True)
 class Grounder:
     """Evaluates what cannot change.
@@ -311,8 +318,5 @@ class Grounder:
         ground = self.fact(atom, bindings)
         if atom.predicate in self.changing:
             return Literal(ground, wanted)
-        if atom.predicate in schema.computed:
-            so = holds(atom, self.world, bindings) is wanted
-        else:
-            so = self.world.holds(ground.predicate, ground.args) is wanted
+        so = is_so(ground, self.world) is wanted
         return Literal(ground, wanted) if self.keep_false and not so else so

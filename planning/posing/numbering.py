@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from planning.posing.conditions import Leaf, Literal
+from planning.posing.conditions import Leaf, Literal, is_so
 from planning.quantities import Bound, worth
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class Numbering:
             if isinstance(one, Bound):
                 held.update((2 * i,) if one.holds(values) else ())
             else:
-                held.add(2 * i + (not world.holds(one.predicate, one.args)))
+                held.add(2 * i + (not is_so(one, world)))
         return held
 
     def images(self, name: str, other: str) -> Mapping[int, int]:

@@ -12,7 +12,7 @@ from knowledge_base.language.evaluation import World, explain
 from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
 from knowledge_base.language.printer import to_text
 from planning.plan import PlanStep
-from planning.posing.conditions import Every, Grounder, Literal, Residual, Some
+from planning.posing.conditions import Every, Grounder, Literal, Residual, Some, is_so
 from planning.posing.derived import derivation
 from planning.posing.grounding import Reached, Rule
 from planning.posing.numbering import as_fact
@@ -80,7 +80,7 @@ class _Reach:
             case bool():
                 return condition
             case Literal(fact, positive):
-                present = self.world.holds(fact.predicate, fact.args) is positive
+                present = is_so(fact, self.world) is positive
                 return present or as_fact(condition) in self.facts
             case Bound():
                 asked = set(condition.fluents())

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 
-from knowledge_base.facts import Delta, Fact
+from knowledge_base.exchange.forms import delta_of
+from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import And, Not, substitute
 from knowledge_base.language.parser import parse_condition
@@ -78,17 +79,16 @@ class Replay:
             self._look(t)
 
     def _change(self, record):
-        removed, added = ([_fact(text) for text in record.data[key]] for key in ("removed", "added"))
+        delta = delta_of(dict(record.data))
         for number in self.running:
             if self.works_for(record.data["author"], self.steps[number]):
                 continue
             for condition in self._needs(number):
-                undone = added if isinstance(condition, Not) else removed
+                undone = delta.added if isinstance(condition, Not) else delta.removed
                 atom = condition.body if isinstance(condition, Not) else condition
                 if Fact(atom.predicate, tuple(arg.value for arg in atom.args)) in undone:
                     self.problems.append(f"{record.t:g}: {condition} undone during {self.steps[number]}")
-        values = {_fact(text): value for text, value in record.data["values"].items()}
-        self.world.apply(Delta(removed=tuple(removed), added=tuple(added), values=values))
+        self.world.apply(delta)
         self._look(record.t)
 
     def _look(self, t):
@@ -131,7 +131,3 @@ def _state(path):
     found = STATE.fullmatch(path)
     return (found[1], int(found[2])) if found else ("", 0)
 
-
-def _fact(text):
-    step = parsed(text)
-    return Fact(step.action, step.args)
