@@ -25,7 +25,7 @@ $(BENCH)/.peers: pyproject.toml   # apart, so that what the peers pin does not d
 	@touch $@
 
 demo: $(VENV)/.run   ## clear a table: designed where foreseen, planned where not
-	$(BIN)/dsc run clean-up-table --seed 7 --faults 0.2
+	$(BIN)/dsc run clean-up-table --seed 1 --faults 0.2
 
 test: $(VENV)/.test check   ## static checks, then all tests, on all cores
 	$(BIN)/python -m pytest -n auto
