@@ -85,7 +85,7 @@ class Trigger:
         said = Atom(self._occurrence.name, tuple(Variable(name) for _, name in places))  # it is true by the change
         settled = {name for _, name in places}
         parts = [part for part in conjuncts(self._shape.body) if part != said and free_variables(part) <= settled]
-        return compile_test(parts[0] if len(parts) == 1 else And(tuple(parts)), self._schema)
+        return compile_test(And(tuple(parts)), self._schema)
 
     @cached_property
     def search(self) -> Search:

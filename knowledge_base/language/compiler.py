@@ -180,6 +180,9 @@ def _negation(test: Test) -> Test:
 
 
 def _all(tests: list[Test]) -> Test:
+    if len(tests) == 1:
+        return tests[0]
+
     def test(world: World, bindings: Bindings) -> bool:
         for part in tests:  # noqa: SIM110  a generator costs twice as much here
             if not part(world, bindings):
