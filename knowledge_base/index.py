@@ -45,7 +45,8 @@ class FactIndex:
         it is iterated, so the set must not change until then.
         """
         listed = self._listed(predicate, pattern)
-        return listed if pattern.count(None) >= len(pattern) - 1 else _agreeing(listed, pattern)
+        exact = len(pattern) < 3 or pattern.count(None) >= len(pattern) - 1
+        return listed if exact else _agreeing(listed, pattern)
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
         """At most how many facts agree with `pattern`, without looking through them."""

@@ -21,10 +21,11 @@ _MOST_KEPT = 4096
 
 _Key = tuple[str | int, ...]
 """A text, or the identity of an expression, and the names of the parameters."""
+_K = TypeVar("_K")
 _T = TypeVar("_T")
 
 
-def _keep(kept: dict[_Key, _T], key: _Key, made: _T) -> None:
+def _keep(kept: dict[_K, _T], key: _K, made: _T) -> None:
     if len(kept) >= _MOST_KEPT:
         kept.clear()
     kept[key] = made
@@ -38,13 +39,13 @@ class Questions:
     """
 
     def __init__(self) -> None:
-        self._asked: dict[_Key, Asked] = {}
+        self._asked: dict[str | int, Asked] = {}
         self._queried: dict[_Key, Queried] = {}
         self._passed: IdentityCache[Expression, set[tuple[Free, frozenset[str]]]] = IdentityCache(1024)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value], world: World) -> bool:
         """Whether the condition is true of `world`; errors as for `condition`."""
-        key = (text if isinstance(text, str) else id(text), *params)
+        key = text if isinstance(text, str) else id(text)  # which parameters are missing it finds out itself
         found = self._asked.get(key)
         if found is None:
             found = asked(self.condition(text, params, world), world.schema)

@@ -102,6 +102,8 @@ class Relation:
             return
         bindings = trigger.bindings(args)
         try:
+            if not trigger.may(self._world, bindings):
+                return
             if len(rows) == 1 or not trigger.finds:
                 for row in tuple(rows):
                     self._complete(row, trigger, bindings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Content, Fact, Value
@@ -103,7 +104,8 @@ def row_fact(row: Row) -> Fact:
     return Fact(ROWS, row.key)
 
 
+@lru_cache(maxsize=64)
 def schema_with_rows(schema: Schema, params: tuple[str, ...]) -> Schema:
-    """`schema` with the relation of rows declared, for compiling joins with it."""
+    """`schema` with the relation of rows declared, for compiling joins with it; most shapes name their values alike."""
     rows = Signature(ROWS, tuple(map(TypedVariable, params)))
     return replace(schema, predicates={**schema.predicates, ROWS: rows})

@@ -9,9 +9,11 @@ from knowledge_base.conditions.readers import Readers, picker
 from knowledge_base.conditions.rows import ROWS, Row, schema_with_rows
 from knowledge_base.conditions.shape import Args, Shape
 from knowledge_base.facts import Value
-from knowledge_base.language.compiler import compile_query
-from knowledge_base.language.expression import And, Atom, Variable
+from knowledge_base.language.compiler import compile_query, compile_test
+from knowledge_base.language.expression import And, Atom, Variable, free_variables
+from knowledge_base.language.joins import conjuncts
 from knowledge_base.language.lookups import Search
+from knowledge_base.language.terms import Test
 from knowledge_base.schema import Schema
 
 
@@ -75,6 +77,15 @@ class Trigger:
             del self._open[values][self]
             if not self._open[values]:
                 del self._open[values]
+
+    @cached_property
+    def may(self) -> Test:
+        """Whether what the change alone settles of the condition is true: most changes end here."""
+        places = sorted((position, name) for name, position in self._occurrence.bound)
+        said = Atom(self._occurrence.name, tuple(Variable(name) for _, name in places))  # it is true by the change
+        settled = {name for _, name in places}
+        parts = [part for part in conjuncts(self._shape.body) if part != said and free_variables(part) <= settled]
+        return compile_test(And(tuple(parts)), self._schema)
 
     @cached_property
     def search(self) -> Search:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
@@ -33,7 +34,7 @@ from knowledge_base.language.expression import (
     free_variables,
 )
 from knowledge_base.language.joins import Conjunct, Range, Step, candidates, conjuncts, opposite, order
-from knowledge_base.language.lookups import Answer, Lookup, Search, alternatives, distinct, smallest, things
+from knowledge_base.language.lookups import Answer, Answering, Lookup, Search, alternatives, distinct, smallest, things
 from knowledge_base.language.terms import (
     Bindings,
     Getter,
@@ -91,28 +92,22 @@ def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names:
 
     No two are the same: facts and things are found once, and `distinct` sees to the rest.
     """
-    plan = SearchPlan(conjuncts(e), schema, bound)
-    first_test, only = plan.first.test, plan.first.last
-    template: Answer = dict.fromkeys(names, "")
-    if isinstance(only, Lookup) and first_test is None:
-        return lambda world, bindings: only.all(world, bindings, template)
+    plan = SearchPlan(conjuncts(e), schema, bound, names)
+    first_test, only = plan.first.test, plan.first.answering
+    if only is not None and first_test is None:
+        return lambda world, bindings: only(world, (bindings,))
 
     def answers(world: World, bindings: Bindings) -> list[Answer]:
-        found: list[Answer] = []
+        answers: list[Answer] = []
         if first_test is not None and not first_test(world, bindings):
-            return found
-        for candidate, last in _ends(plan, world, bindings):
-            if last is None:
-                found.append({name: candidate[name] for name in names})
-            elif isinstance(last, Lookup):
-                answer = template.copy()
-                for name in names:
-                    if name in candidate:
-                        answer[name] = candidate[name]
-                found += last.all(world, candidate, answer)
+            return answers
+        for stage, found in _ends(plan, world, bindings):
+            if stage.answering is not None:
+                answers += stage.answering(world, found)
             else:
-                found += [{name: each[name] for name in names} for each in last(world, candidate)]
-        return found
+                every = found if stage.last is None else chain.from_iterable(map(partial(stage.last, world), found))
+                answers += [{name: each[name] for name in names} for each in every]
+        return answers
 
     return answers
 
@@ -185,6 +180,9 @@ def _negation(test: Test) -> Test:
 
 
 def _all(tests: list[Test]) -> Test:
+    if len(tests) == 1:
+        return tests[0]
+
     def test(world: World, bindings: Bindings) -> bool:
         for part in tests:  # noqa: SIM110  a generator costs twice as much here
             if not part(world, bindings):
@@ -212,9 +210,15 @@ def _found(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]
     def test(world: World, bindings: Bindings) -> bool:
         if first_test is not None and not first_test(world, bindings):  # most searches of conditions end here
             return False
-        for candidate, last in _ends(plan, world, bindings):
-            if last is None or next(last(world, candidate), None) is not None:
-                return True
+        for stage, found in _ends(plan, world, bindings):
+            last = stage.last
+            if last is None:
+                if next(found, None) is not None:
+                    return True
+                continue
+            for candidate in found:
+                if next(last(world, candidate), None) is not None:
+                    return True
         return False
 
     return test
@@ -233,32 +237,31 @@ def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str
 
 
 def _candidates(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[Bindings]:
-    for candidate, last in _ends(plan, world, bindings):
-        if last is None:
-            yield candidate
+    for stage, found in _ends(plan, world, bindings):
+        if stage.last is None:
+            yield from found
         else:
-            yield from last(world, candidate)
+            for candidate in found:
+                yield from stage.last(world, candidate)
 
 
-def _ends(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[tuple[Bindings, Lookup | Search | None]]:
-    """All candidates for which only one look-up is left, whatever it finds being right, or nothing at all.
+def _ends(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[tuple[Stage, Iterator[Bindings]]]:
+    """The stages with at most one look-up left, and the candidates that passed all tests, to be gone through at once.
 
     The plan's first test was passed. Backtracking with a stack of its own, so that long conjunctions do not recurse.
     """
     stack: list[tuple[Stage, Iterator[Bindings]]] = [(plan.tested, iter((bindings,)))]
     while stack:
         stage, found = stack[-1]
-        for candidate in found:
-            if stage.test is not None and not stage.test(world, candidate):
-                continue
-            if stage.last is not None or not stage.choices:
-                yield candidate, stage.last
-                continue
-            i, lookup = smallest(stage.choices, world, candidate)
-            stack.append((plan.after(stage, i), lookup(world, candidate)))
-            break
-        else:
+        if stage.last is not None or not stage.choices:
             stack.pop()
+            yield stage, found
+        elif (candidate := next(found, None)) is None:
+            stack.pop()
+        else:
+            i, lookup = smallest(stage.choices, world, candidate)
+            after, found = plan.after(stage, i), lookup(world, candidate)
+            stack.append((after, found if after.test is None else filter(partial(after.test, world), found)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,6 +274,7 @@ class Stage:
         left: the conditions that are not dealt with then.
         bound: the variables that have a value.
         last: the look-up, if it is the last: nothing is left to be tested of what it finds.
+        answering: gives the answers that it finds, where they are wanted.
         after: the stages that follow, as far as they are prepared.
     """
 
@@ -279,11 +283,18 @@ class Stage:
     left: tuple[int, ...]
     bound: frozenset[str]
     last: Lookup | Search | None
+    answering: Answering | None
     after: dict[int, Stage] = field(default_factory=dict)
 
 
 class SearchPlan:
     """The stages of one search, each prepared when it is first reached.
+
+    Args:
+        conditions: what has to hold.
+        schema: what may be said.
+        bound: the variables that have a value already.
+        names: the variables whose values are wanted as answers, if they are.
 
     Attributes:
         steps: the conditions; stages have their numbers.
@@ -291,9 +302,16 @@ class SearchPlan:
         tested: the same without its test, for who has made it.
     """
 
-    def __init__(self, conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> None:
+    def __init__(
+        self,
+        conditions: Iterable[Conjunct],
+        schema: Schema,
+        bound: frozenset[str],
+        names: tuple[str, ...] | None = None,
+    ) -> None:
         self.steps = order((_as_range(c, schema) for c in conditions), bound, schema)
         self._schema = schema
+        self._names = names
         self._stages: dict[tuple[int, ...], Stage] = {}
         self.first = stage = self._stage(tuple(range(len(self.steps))), bound)
         while stage.choices:  # one way through, so that every mistake in the text shows now
@@ -323,7 +341,10 @@ class SearchPlan:
         lookups = map(partial(_lookup, schema=self._schema, bound=bound), (step for _, step in chosen))
         choices = tuple(zip((i for i, _ in chosen), lookups, strict=True))
         last = choices[0][1] if len(open_steps) == 1 else None
-        return Stage(_all(tests) if tests else None, choices, tuple(open_steps), bound, last)
+        answering = None
+        if isinstance(last, Lookup) and self._names is not None:
+            answering = last.answering(self._names)
+        return Stage(_all(tests) if tests else None, choices, tuple(open_steps), bound, last, answering)
 
     def _test(self, conjunct: Conjunct) -> Test:
         if not isinstance(conjunct, Range):

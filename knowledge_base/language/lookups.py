@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import Atom, TypedVariable, Variable, free_variables
+from knowledge_base.language.expression import Atom, Term, TypedVariable, Variable, free_variables
 from knowledge_base.language.terms import Argument, Bindings, compile_argument
 from knowledge_base.language.world import World
 from knowledge_base.schema import Schema
 
 Search = Callable[[World, Bindings], Iterator[Bindings]]
 Answer = dict[str, Value]
+Answering = Callable[[World, Iterable[Bindings]], list[Answer]]
 
 
 class Lookup:
@@ -35,7 +36,8 @@ class Lookup:
                 self._computed.append((position, compile_argument(arg, schema)))
         self._found = tuple(first.items())
         self._single = self._found[0] if len(first) == 1 else None
-        self._pattern = _pattern(getters)
+        self._exact = not (self._repeated or self._computed)
+        self._pattern = _pattern(getters, [_name(arg, finds) for arg in atom.args])
 
     def __call__(self, world: World, bindings: Bindings) -> Iterator[Bindings]:
         """`bindings` with the values of the open variables, for every fact that matches; looked up one by one."""
@@ -45,15 +47,30 @@ class Lookup:
             return ({**bindings, name: args[i]} for args in matches)
         return (self._extended(bindings, args) for args in matches)
 
-    def all(self, world: World, bindings: Bindings, answer: Answer) -> list[Answer]:
-        """`answer`, which has places for them, with the values of the open variables, for every fact that matches."""
-        matches = self._matches(world, bindings)
-        if self._single is not None:
-            name, i = self._single
-            if len(answer) == 1:
-                return [{name: args[i]} for args in matches]
-            return [{**answer, name: args[i]} for args in matches]
-        return [self._extended(answer, args) for args in matches]
+    def answering(self, names: tuple[str, ...]) -> Answering:
+        """A function that gives the values of the variables `names` for every candidate and fact that matches it."""
+        if self._single is None or not self._exact:
+            return lambda world, candidates: [
+                {name: found[name] for name in names} for each in candidates for found in self(world, each)
+            ]
+        (own, i), predicate, pattern = self._single, self._predicate, self._pattern
+        if names == (own,):
+            return lambda world, candidates: [
+                {own: args[i]} for each in candidates for args in world.match(predicate, pattern(world, each))
+            ]
+        template: Answer = dict.fromkeys(names, "")  # for the order
+        others = [name for name in names if name != own]
+
+        def answers(world: World, candidates: Iterable[Bindings]) -> list[Answer]:
+            answers: list[Answer] = []
+            for each in candidates:
+                answer = template.copy()
+                for name in others:
+                    answer[name] = each[name]
+                answers += [{**answer, own: args[i]} for args in world.match(predicate, pattern(world, each))]
+            return answers
+
+        return answers
 
     def size(self, world: World, bindings: Bindings) -> int:
         """At most how many facts match; 0 if the world cannot say so cheaply."""
@@ -62,7 +79,7 @@ class Lookup:
 
     def _matches(self, world: World, bindings: Bindings) -> Iterable[tuple[Value, ...]]:
         matches = world.match(self._predicate, self._pattern(world, bindings))
-        if not (self._repeated or self._computed):
+        if self._exact:
             return matches
         return (args for args in matches if self._agrees(args, world, bindings))
 
@@ -79,14 +96,26 @@ class Lookup:
         return found
 
 
-def _pattern(getters: Sequence[Argument | None]) -> Callable[[World, Bindings], tuple[Value | None, ...]]:
-    """What to look for; most look-ups go from one end of an arc to the other."""
+def _name(arg: Term, finds: frozenset[str]) -> str | None:
+    return arg.name if isinstance(arg, Variable) and arg.name not in finds else None
+
+
+def _pattern(
+    getters: Sequence[Argument | None], names: Sequence[str | None]
+) -> Callable[[World, Bindings], tuple[Value | None, ...]]:
+    """What to look for; most look-ups go from one end of an arc, a variable with that name, to the other."""
     match getters:
         case [None, None]:
             return lambda _world, _bindings: (None, None)
         case [None, end] if end:
+            goal = names[1]
+            if goal is not None:
+                return lambda _world, bindings: (None, bindings[goal])
             return lambda world, bindings: (None, end(world, bindings))
         case [start, None] if start:
+            origin = names[0]
+            if origin is not None:
+                return lambda _world, bindings: (bindings[origin], None)
             return lambda world, bindings: (start(world, bindings), None)
         case _:
             return lambda world, bindings: tuple([get and get(world, bindings) for get in getters])

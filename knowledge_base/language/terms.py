@@ -59,7 +59,10 @@ def compile_arguments(terms: tuple[Term, ...], schema: Schema) -> Callable[[Worl
     if len(constants) == len(terms):
         return lambda _world, _bindings: constants
     names = [t.name for t in terms if isinstance(t, Variable)]
-    if len(names) == len(terms) > 1:
+    if len(names) == len(terms):
+        if len(names) == 1:
+            only = names[0]
+            return lambda _world, bindings: (bindings[only],)
         pick = itemgetter(*names)
         return lambda _world, bindings: pick(bindings)
     getters = tuple(compile_argument(t, schema) for t in terms)

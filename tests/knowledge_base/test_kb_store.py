@@ -146,6 +146,16 @@ def test_a_removed_thing_is_asked_about_without_error_once_known(kb) -> None:
     assert not kb.ask("(cup cup2)")
 
 
+@pytest.mark.parametrize("params", [{}, {"other": "cup1"}, {"c": (1, 2)}])
+def test_a_parameter_that_is_missing_or_a_geometry_is_the_same_error_when_the_text_is_known(kb, params) -> None:
+    with pytest.raises(InputError) as first:
+        kb.ask("(heavy ?c)", params)
+    kb.ask("(heavy ?c)", {"c": "cup1"})
+    with pytest.raises(InputError) as later:
+        kb.ask("(heavy ?c)", params)
+    assert str(later.value) == str(first.value)
+
+
 def test_the_effective_change_is_announced_with_version_and_author(kb) -> None:
     heard = []
     kb.subscribe(heard.append)
