@@ -25,7 +25,8 @@ def test_every_case_has_a_figure_and_all_but_a_few_a_floor(rows):
     for case, row in rows.items():
         doers = {"this engine"} if case.startswith(OF_ITS_OWN) else {"floor", "this engine"}
         assert doers <= set(row["cells"]), case
-        assert all(cell["value"] > 0 for cell in row["cells"].values()), case
+        least = 0 if case.startswith("memory") else 1e-12  # a small world may fit into what the process had already
+        assert all(cell["value"] >= least for cell in row["cells"].values()), case
 
 
 def test_conditions_are_updated_in_three_kinds_of_store(rows):
