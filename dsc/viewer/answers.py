@@ -14,7 +14,6 @@ from dsc.viewer.moments import Configuration, configurations, knowledge
 from dsc.viewer.records import RecordLog
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Fact
-from knowledge_base.language.evaluation import Explanation
 from knowledge_base.language.expression import variables_in_order
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.view import View
@@ -38,7 +37,7 @@ class Answers:
         variables = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
         answers = view.query(condition, params)
         said = {"variables": variables, "holds": bool(answers), "answers": answers, "version": view.version}
-        return said if variables else {**said, "why": explanation_form(view.explain(condition, params))}
+        return said if variables else {**said, "why": view.explain(condition, params).to_json()}
 
     def facts(self, asked: Form) -> dict[str, Any]:
         """All that is known, or all that is known about one thing."""
@@ -73,12 +72,6 @@ class Answers:
     def _view(self, asked: Form) -> View:
         known = self._knowledge.at(_seq(asked))
         return View(known.state, known.version)
-
-
-def explanation_form(why: Explanation) -> dict[str, Any]:
-    """The tree of a condition as JSON data."""
-    parts = [explanation_form(child) for child in why.children]
-    return {"text": why.text, "truth": why.truth, "detail": why.detail, "decider": why.decider, "parts": parts}
 
 
 def _listed(fact: Fact) -> list[Any]:

@@ -43,12 +43,12 @@ def ask(
     json: Json = False,
 ) -> None:
     """Say whether EXPR is true. Exit status: 0 yes, 1 no."""
-    from knowledge_base.cli.printing import explanation_form, explanation_lines
+    from knowledge_base.cli.printing import explanation_lines
 
     with opened(source, domain) as (kb, _):
         explanation = kb.explain(_parsed(expression), _params(param))
     if json:
-        print_json({"holds": explanation.truth, "why": explanation_form(explanation)})
+        print_json({"holds": explanation.truth, "why": explanation.to_json()})
     else:
         typer.echo("yes" if explanation.truth else "no")
         if why:

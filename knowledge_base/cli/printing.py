@@ -86,14 +86,3 @@ def explanation_lines(why: Explanation, depth: int = 0, *, deciding: bool = True
     yield f"{indent}{'true ' if why.truth else 'false'}  {why.text}{detail}"
     for number, child in enumerate(why.children):
         yield from explanation_lines(child, depth + 1, deciding=deciding and number == why.decider)
-
-
-def explanation_form(why: Explanation) -> dict[str, Any]:
-    """The tree of a condition as JSON data."""
-    return {
-        "text": why.text,
-        "truth": why.truth,
-        "detail": why.detail,
-        "decider": why.decider,
-        "parts": [explanation_form(child) for child in why.children],
-    }

@@ -76,12 +76,14 @@ class Explanation:
         return f"{said}: {self.detail}" if self.detail else said
 
     def to_json(self) -> dict[str, Any]:
-        """The tree as plain data, without what is empty."""
+        """The tree as plain data, without what is empty; `decider` is the number of the child that decides, from 0."""
         found: dict[str, Any] = {"text": self.text, "truth": self.truth}
         if self.detail:
             found["detail"] = self.detail
         if self.children:
             found["children"] = [c.to_json() for c in self.children]
+        if self.decider is not None:
+            found["decider"] = self.decider
         return found
 
 

@@ -59,7 +59,7 @@ def test_a_question_answers_with_its_exit_status_and_says_why(store) -> None:
     assert (yes.exit_code, yes.output) == (0, "yes\n")
     assert (no.exit_code, no.output) == (1, "no\nfalse  (clean mug)\n")
     why = json.loads(invoke("ask", store, "(and (on mug table) (clean mug))", "--json").output)
-    assert (why["holds"], why["why"]["decider"], [p["truth"] for p in why["why"]["parts"]]) == (False, 1, [True, False])
+    assert (why["holds"], why["why"]["decider"], [p["truth"] for p in why["why"]["children"]]) == (False, 1, [True, False])
 
 
 def test_telling_prints_what_became_different(store) -> None:
