@@ -109,3 +109,28 @@ describe("layout", () => {
     expect(signature(one)).not.toBe(signature(visible(moment({ "": "m" }, "work"), plots, { ...PLAIN, open: new Map([["work", false]]) })));
   });
 });
+
+describe("the gates of a plan", () => {
+  const gated: PlotForm = {
+    plot: "plan_2", generated: true, initial: "before",
+    states: {
+      before: { always: [{ to: "step_1" }] },
+      step_1: { about: "(a)", dynamic: ["d"], on: { done: [{ to: "after_1" }] } },
+      after_1: { always: [{ to: "step_2" }] },
+      step_2: { about: "(b)", dynamic: ["d"] },
+    },
+  };
+  const known = new Map([["g", gated]]);
+
+  it("are passed over while nobody waits at them; the way through ends with the second transition", () => {
+    const { nodes, edges } = visible(moment({ "": "g" }, "step_1"), known, PLAIN);
+    expect(nodes.map((node) => node.id)).toEqual(["step_1", "step_2"]);
+    expect(edges.map((edge) => [edge.id, edge.via])).toEqual([["step_1>step_2", ["after_1>step_2"]]]);
+  });
+
+  it("are there while somebody waits", () => {
+    const { nodes, edges } = visible(moment({ "": "g" }, "after_1"), known, PLAIN);
+    expect(nodes.map((node) => [node.id, node.kind])).toEqual([["step_1", "dynamic"], ["after_1", "gate"], ["step_2", "dynamic"]]);
+    expect(edges.map((edge) => edge.id)).toEqual(["step_1>after_1", "after_1>step_2"]);
+  });
+});

@@ -2,7 +2,8 @@
 
 import { Handle, Position, type Node, type NodeProps } from "@xyflow/react";
 import { memo } from "react";
-import { title } from "./layout";
+import type { StepState } from "../core/plans";
+import { shownName, title } from "./layout";
 import type { ChartNode } from "./visible";
 
 export interface StateData extends Record<string, unknown> {
@@ -10,6 +11,8 @@ export interface StateData extends Record<string, unknown> {
   readonly chosen: boolean;
   /** 0 for what was left last, up to the length of the trail; null if it was not left lately. */
   readonly left: number | null;
+  /** How far the plan's step is that it carries out. */
+  readonly progress: StepState | null;
   readonly select: (path: string) => void;
   readonly toggle: (node: ChartNode) => void;
   readonly zoom: (path: string) => void;
@@ -19,9 +22,10 @@ export interface StateData extends Record<string, unknown> {
 export type StateNodeType = Node<StateData, "state">;
 
 export const StateNode = memo(function StateNode({ data }: NodeProps<StateNodeType>) {
-  const { node, chosen, left } = data;
+  const { node, chosen, left, progress } = data;
   const classes = ["state", node.kind, node.active && "active", node.expanded && "open", node.generated && "generated",
-    chosen && "chosen", left !== null && !node.active && "left"].filter(Boolean).join(" ");
+    chosen && "chosen", left !== null && !node.active && "left",
+    progress && `step-${progress}`].filter(Boolean).join(" ");
   const said = `${node.name}, ${node.kind}${node.active ? ", active" : ""}${node.content ? `, ${node.content} inside` : ""}`;
   return (
     <div className={classes} style={left === null ? undefined : { ["--age" as string]: left }}>
@@ -34,9 +38,11 @@ export const StateNode = memo(function StateNode({ data }: NodeProps<StateNodeTy
             {node.kind === "gate" ? "" : (
               <>
                 {node.initial && <span className="initial" aria-hidden="true">●</span>}
-                {node.kind === "dynamic" && <span className="mark" aria-hidden="true">◆</span>}
+                {node.kind === "dynamic" && progress !== "done" && progress !== "failed" && <span className="mark" aria-hidden="true">◆</span>}
+                {progress === "done" && <span className="mark done" aria-hidden="true">✓</span>}
+                {progress === "failed" && <span className="mark failed" aria-hidden="true">✕</span>}
                 {node.kind === "submachine" && <span className="mark" aria-hidden="true">▣</span>}
-                <span>{node.name}</span>
+                <span>{shownName(node)}</span>
                 {node.expanded && node.content && <em>{node.content}</em>}
               </>
             )}

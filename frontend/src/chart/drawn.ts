@@ -1,6 +1,8 @@
 /** Visible states and their places as React Flow's nodes and edges. */
 
-import type { Trace } from "../core/moment";
+import type { Moment, Trace } from "../core/moment";
+import type { Plan, StepState } from "../core/plans";
+import { joinPath } from "../core/plots";
 import type { Box, Layout, Point } from "./layout";
 import type { StateData, StateNodeType } from "./StateNode";
 import { edgeOf, type ChartEdge, type ChartNode, type Visible } from "./visible";
@@ -8,14 +10,15 @@ import type { WayEdgeType } from "./WayEdge";
 
 export type Acts = Pick<StateData, "select" | "toggle" | "zoom" | "showAll">;
 
-export function drawnNodes({ nodes }: Visible, layout: Layout, trail: readonly Trace[], chosen: string | null, acts: Acts): StateNodeType[] {
+export function drawnNodes({ nodes }: Visible, layout: Layout, { trail, plans }: Moment, chosen: string | null, acts: Acts): StateNodeType[] {
   const depths = depthsOf(nodes);
+  const progress = progressOf(plans);
   const left = new Map<string, number>();
   trail.forEach((one, age) => left.set(one.from, Math.min(age, left.get(one.from) ?? age)));
   return nodes.flatMap((node) => {
     const box = layout.boxes.get(node.id);
     if (!box) return [];
-    const data = { node, chosen: node.id === chosen, left: left.get(node.id) ?? null, ...acts };
+    const data = { node, chosen: node.id === chosen, left: left.get(node.id) ?? null, progress: progress.get(node.id) ?? null, ...acts };
     return [{
       id: node.id, type: "state" as const, position: { x: box.x, y: box.y }, data, zIndex: 2 * depths.get(node.id)!,
       width: box.width, height: box.height, style: { width: box.width, height: box.height },
@@ -33,7 +36,7 @@ export function drawnEdges({ nodes, edges }: Visible, layout: Layout, trail: rea
     ages.set(id, Math.min(age, ages.get(id) ?? age));
   });
   return edges.flatMap((edge) => {
-    const age = ages.get(edge.id) ?? null;
+    const age = edge.via.reduce<number | null>((least, one) => least ?? ages.get(one) ?? null, null);
     const line = edge.quiet ? asked(edge, age, chosen) && direct(edge, layout) : layout.lines.get(edge.id);
     if (!line || line.points.length === 0) return [];
     return [{
@@ -41,6 +44,16 @@ export function drawnEdges({ nodes, edges }: Visible, layout: Layout, trail: rea
       data: { edge, points: line.points, label: line.label, age }, focusable: false, selectable: false,
     }];
   });
+}
+
+/** How far the steps of the plans are that run now, by path of their states. */
+function progressOf(plans: readonly Plan[]): Map<string, StepState> {
+  const found = new Map<string, StepState>();
+  for (const plan of plans) {
+    if (plan.ended !== null || plan.at === null) continue;
+    for (const [name, step] of plan.names) found.set(joinPath(plan.at, name), plan.steps[step]!.state);
+  }
+  return found;
 }
 
 function asked(edge: ChartEdge, age: number | null, chosen: string | null): boolean {

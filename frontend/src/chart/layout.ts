@@ -38,8 +38,11 @@ const LAYERED = {
 const WRAPPED = {
   "elk.layered.wrapping.strategy": "MULTI_EDGE",
   "elk.layered.wrapping.additionalEdgeSpacing": "8",
-  "elk.aspectRatio": "1.9",
+  "elk.aspectRatio": "1.6",
 };
+
+/** What everything leads to stands at the end. */
+const LAST = { "elk.layered.layering.layerConstraint": "LAST" };
 
 const HEADER = 30;
 
@@ -57,15 +60,25 @@ export async function layout(elk: ELK, { nodes, edges }: Visible): Promise<Layou
 export function sizeOf(node: ChartNode): { width: number; height: number } {
   if (node.kind === "gate") return { width: 14, height: 14 };
   if (node.kind === "pseudo") return { width: 28, height: 28 };
-  const widest = Math.max(node.name.length * 7.4 + 36, (title(node).length || 0) * 6.4 + 28, 74);
+  const widest = Math.max(shownName(node).length * 7.4 + 42, title(node).length * 6.2 + 20, 74);
   if (node.kind === "final") return { width: Math.min(widest, 150), height: 30 };
-  return { width: Math.min(widest, 230), height: title(node) ? 46 : 34 };
+  return { width: Math.min(widest, 190), height: title(node) ? 46 : 34 };
 }
 
-/** What stands under a state's name: the plan's step that it carries out, or the plot inside it. */
+/** The name as it is written: a plan's step by its action. */
+export function shownName(node: ChartNode): string {
+  const action = stepOf(node)?.[0];
+  return action === undefined ? node.name : `${node.name.match(/\d+$/)?.[0] ?? ""} ${action}`.trim();
+}
+
+/** What stands under a state's name: the arguments of a plan's step, or the plot inside. */
 export function title(node: ChartNode): string {
-  if (node.about?.startsWith("(")) return node.about;
-  return node.content ?? "";
+  return stepOf(node)?.slice(1).join(" ") ?? node.content ?? "";
+}
+
+/** Action and arguments of the plan's step that a state carries out. */
+function stepOf(node: ChartNode): string[] | undefined {
+  return node.about?.startsWith("(") ? node.about.slice(1, -1).split(" ") : undefined;
 }
 
 function asGraph(nodes: readonly ChartNode[], edges: readonly ChartEdge[]): ElkNode {
@@ -76,7 +89,7 @@ function asGraph(nodes: readonly ChartNode[], edges: readonly ChartEdge[]): ElkN
     const padding = { "elk.padding": `[top=${HEADER + 12},left=14,bottom=14,right=14]` };
     const box: ElkNode = inner
       ? { id: node.id, layoutOptions: { ...LAYERED, ...wrapped, ...padding }, children: [], edges: [] }
-      : { id: node.id, ...sizeOf(node) };
+      : { id: node.id, ...sizeOf(node), ...(node.ways > 0 && { layoutOptions: LAST }) };
     if (inner) box.layoutOptions!["elk.nodeSize.constraints"] = "MINIMUM_SIZE";
     if (inner) box.layoutOptions!["elk.nodeSize.minimum"] = `(${node.name.length * 8 + 130}, 60)`;
     made.set(node.id, box);
@@ -94,7 +107,7 @@ function asGraph(nodes: readonly ChartNode[], edges: readonly ChartEdge[]): ElkN
 }
 
 export function labelOf(edge: ChartEdge): string {
-  const said = edge.labels.filter((label) => label !== "always");
+  const said = edge.labels.filter((label) => label !== "always" && (label !== "done" || edge.via.includes(edge.id)));
   const first = said.slice(0, 2).join(", ");
   return said.length > 2 ? `${first} +${said.length - 2}` : first;
 }

@@ -33,6 +33,8 @@ export interface ChartEdge {
   readonly rule: boolean;
   /** Not laid out, and drawn only when asked for. */
   readonly quiet: boolean;
+  /** The transitions that end on it, as `edgeOf` names them. */
+  readonly via: readonly string[];
 }
 
 export interface Visible {
@@ -83,9 +85,14 @@ function show(on: Showing, holder: string, plot: PlotForm, around: string | null
   let hidden = 0;
   const own: PlotState[] = [];
   const closed = new Set<string>();
+  const gates = new Set<string>();
   for (const state of states) {
     const id = joinPath(holder, state.name);
     if (state.parent !== null && (closed.has(state.parent) || !shown.has(state.parent))) continue;
+    if (plot.generated && isGate(state) && !on.moment.active.has(id)) {
+      gates.add(state.name);
+      continue;
+    }
     if (plot.generated && isSpare(on, holder, id, state)) {
       hidden += 1;
       continue;
@@ -94,7 +101,7 @@ function show(on: Showing, holder: string, plot: PlotForm, around: string | null
     own.push(state);
     if ((state.kind === "composite" || state.kind === "orthogonal") && !(on.view.open.get(id) ?? true)) closed.add(state.name);
   }
-  const edges = edgesBetween(holder, states, ways, shown);
+  const edges = edgesBetween(holder, states, throughGates(ways, gates), shown);
   const counts = new Map<string, number>();
   for (const edge of edges) if (edge.quiet) counts.set(edge.to, (counts.get(edge.to) ?? 0) + 1);
   for (const state of own) {
@@ -116,7 +123,7 @@ function showState(
   const expandable = holds ? inner !== undefined : state.kind === "composite" || state.kind === "orthogonal";
   const expanded = expandable ? view.open.get(id) ?? (holds ? byItself : true) : state.kind === "region";
   const place = nodes.length;
-  const gate = plot.generated === true && state.kind === "simple" && /^(before|after)(_\d+)*$/.test(state.name);
+  const gate = plot.generated === true && isGate(state);
   const node: ChartNode = {
     id, parent, kind: gate ? "gate" : state.kind, name: state.name.split(":").at(-1)!, about: state.form.about,
     content: inner?.plot ?? null, generated: inner?.generated === true, initial: state.initial, expandable, expanded, active,
@@ -128,6 +135,26 @@ function showState(
   nodes[place] = { ...node, hidden };
 }
 
+/** Between two steps of a plan: where it is looked whether the next one may begin. */
+function isGate(state: PlotState): boolean {
+  return state.kind === "simple" && /^(before|after)(_\d+)*$/.test(state.name);
+}
+
+interface Through extends Way {
+  readonly via: readonly string[];
+}
+
+/** Ways that lead through gates nobody waits at, as one. */
+function throughGates(ways: readonly Way[], gates: ReadonlySet<string>): Through[] {
+  const id = (way: Way) => `${way.from}>${way.to}`;
+  return ways.flatMap((way): Through[] => {
+    if (gates.has(way.from)) return [];
+    if (!gates.has(way.to)) return [{ ...way, via: [id(way)] }];
+    const onward = ways.filter((next) => next.from === way.to);
+    return onward.map((next) => ({ ...way, to: next.to, via: [id(next)] }));
+  });
+}
+
 /** States that a rule added and that nothing uses now: a generated plot has many. */
 function isSpare(on: Showing, holder: string, id: string, state: PlotState): boolean {
   return state.form.about?.startsWith("rule: ") === true && !on.moment.active.has(id) && !on.view.all.has(holder);
@@ -135,16 +162,17 @@ function isSpare(on: Showing, holder: string, id: string, state: PlotState): boo
 
 /** Ways between what is shown: those between the same two are one, those across a border are lifted to it. */
 function edgesBetween(
-  holder: string, states: readonly PlotState[], ways: readonly Way[], shown: ReadonlyMap<string, string | null>,
+  holder: string, states: readonly PlotState[], ways: readonly Through[], shown: ReadonlyMap<string, string | null>,
 ): ChartEdge[] {
   const parents = new Map(states.map((state) => [state.name, state.parent]));
-  const merged = new Map<string, { from: string; to: string; labels: Set<string>; rule: boolean }>();
+  const merged = new Map<string, { from: string; to: string; labels: Set<string>; rule: boolean; via: string[] }>();
   for (const way of ways) {
     const ends = lifted(way.from, way.to, parents);
     if (ends === null || !shown.has(ends[0]) || !shown.has(ends[1])) continue;
     const key = `${ends[0]}>${ends[1]}`;
-    const edge = merged.get(key) ?? { from: ends[0], to: ends[1], labels: new Set(), rule: true };
+    const edge = merged.get(key) ?? { from: ends[0], to: ends[1], labels: new Set(), rule: true, via: [] };
     edge.labels.add(way.on);
+    edge.via.push(...way.via);
     edge.rule &&= way.rule !== undefined;
     merged.set(key, edge);
   }
@@ -157,6 +185,7 @@ function edgesBetween(
     labels: [...edge.labels],
     rule: edge.rule,
     quiet: into.get(edge.to)! > HUB,
+    via: edge.via.map((one) => joinPath(holder, one)),
   }));
 }
 

@@ -1,7 +1,7 @@
 /** The chart: what is active, what was taken lately; open, close, zoom in. */
 
 import { Controls as Zoom, ReactFlow, ReactFlowProvider, useReactFlow, useStore } from "@xyflow/react";
-import { useCallback, useEffect, useMemo, useState } from "react";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import { drawnEdges, drawnNodes, innermost, type Acts } from "../chart/drawn";
 import { knownLayout, layoutOf } from "../chart/elk";
 import { signature, type Layout } from "../chart/layout";
@@ -14,7 +14,9 @@ import { session, useShown } from "../session";
 const NODES = { state: StateNode };
 const EDGES = { way: WayEdge };
 const PLAIN: View = { focus: "", open: new Map(), all: new Set() };
-const READABLE = 0.62;
+/** Less is too small to read; what does not fit is followed at this scale. */
+const READABLE = 0.6;
+const CLOSE = 0.78;
 
 export function Chart() {
   return (
@@ -33,7 +35,7 @@ function ChartPane() {
   const layout = useLayout(shown);
   const chosen = selection?.kind === "state" ? selection.path : null;
   const acts = useActs(setView);
-  const nodes = useMemo(() => (layout ? drawnNodes(shown, layout, moment.trail, chosen, acts) : []), [shown, layout, moment.trail, chosen, acts]);
+  const nodes = useMemo(() => (layout ? drawnNodes(shown, layout, moment, chosen, acts) : []), [shown, layout, moment, chosen, acts]);
   const edges = useMemo(() => (layout ? drawnEdges(shown, layout, moment.trail, chosen) : []), [shown, layout, moment.trail, chosen]);
   useCamera(shown, layout, follow);
   return (
@@ -93,11 +95,13 @@ function useCamera(shown: Visible, layout: Layout | null, follow: boolean): void
   const width = useStore((state) => state.width);
   const height = useStore((state) => state.height);
   const active = innermost(shown).join("\n");
+  const fitted = useRef(true);
   useEffect(() => {
     if (!follow || !layout || !width || !height) return;
     const whole = union([...layout.boxes.values()]);
     if (!whole) return;
     if (Math.min(width / whole.width, height / whole.height) > READABLE) {
+      fitted.current = true;
       void flow.fitBounds(whole, { padding: 0.04, duration: 250 });
       return;
     }
@@ -105,8 +109,9 @@ function useCamera(shown: Visible, layout: Layout | null, follow: boolean): void
     if (!here) return;
     const { x, y, zoom } = flow.getViewport();
     const inside = here.x * zoom + x > 40 && here.y * zoom + y > 40 && (here.x + here.width) * zoom + x < width - 40 && (here.y + here.height) * zoom + y < height - 40;
-    if (!inside || zoom < READABLE) {
-      void flow.setCenter(here.x + here.width / 2, here.y + here.height / 2, { zoom: Math.max(READABLE, Math.min(1, zoom)), duration: 250 });
+    if (!inside || zoom < READABLE || fitted.current) {
+      void flow.setCenter(here.x + here.width / 2, here.y + here.height / 2, { zoom: zoom < READABLE || fitted.current ? CLOSE : zoom, duration: 250 });
+      fitted.current = false;
     }
   }, [flow, layout, active, follow, width, height]);
 }

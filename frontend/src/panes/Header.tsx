@@ -1,6 +1,7 @@
 /** Which run this is, and how it stands. */
 
 import { useShown } from "../session";
+import { Help } from "./Help";
 
 export function Header() {
   const { header, live, connected, paused, moment, last, expected } = useShown();
@@ -17,6 +18,7 @@ export function Header() {
       <span className="working" aria-label="Skills at work">
         {working.length > 0 && `at work: ${working.join(", ")}`}
       </span>
+      <Help />
     </header>
   );
 }

@@ -16,14 +16,14 @@ export function Timeline() {
   return (
     <footer aria-label="Time">
       <div className="buttons">
-        <button aria-label="To the beginning" title="Home" onClick={() => session.goTo(0)}>⏮</button>
-        <button aria-label="One step back" title="←" onClick={() => session.step(-1)}>◀</button>
+        <button aria-label="To the beginning" title="Home" onClick={() => session.goTo(0)}><Icon d="M3 2v12M13 2 5 8l8 6z" /></button>
+        <button aria-label="One step back" title="←" onClick={() => session.step(-1)}><Icon d="M11 3 4 8l7 5z" /></button>
         <button className="play" aria-label={going ? "Pause" : "Play"} title="space" onClick={() => session.play(!going)}>
-          {going ? "❚❚" : "▶"}
+          <Icon d={going ? "M4 2h3v12H4zM9 2h3v12H9z" : "m4 2 10 6-10 6z"} />
         </button>
-        <button aria-label="One step on" title="→" onClick={() => session.step(1)}>▶</button>
+        <button aria-label="One step on" title="→" onClick={() => session.step(1)}><Icon d="m5 3 7 5-7 5z" /></button>
         <button aria-label="To the end" title="End" onClick={() => session.goTo(session.history.last)}>
-          {live ? "live ⏭" : "⏭"}
+          {live && "live "}<Icon d="M13 2v12M3 2l8 6-8 6z" />
         </button>
         <label className="speed">
           <span className="quiet">speed</span>
@@ -56,6 +56,10 @@ export function Timeline() {
       </div>
     </footer>
   );
+}
+
+function Icon({ d }: { d: string }) {
+  return <svg className="icon" viewBox="0 0 16 16" aria-hidden="true"><path d={d} /></svg>;
 }
 
 const ROWS: readonly (readonly [Mark, number, number])[] = [["decision", 0, 4], ["plan", 4, 8], ["failure", 10, 8]];

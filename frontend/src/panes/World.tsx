@@ -4,7 +4,7 @@ import { memo } from "react";
 import type { Thing } from "../core/records";
 import { session, useShown } from "../session";
 
-const MARGIN = 0.35;
+const MARGIN = 0.12;
 const NESTED = 0.075;
 
 export function World() {
@@ -29,8 +29,8 @@ function driving(busy: ReadonlySet<string>, things: readonly Thing[]): Thing | n
 const Scene = memo(function Scene({ things, busy, moving }: { things: readonly Thing[]; busy: ReadonlySet<string>; moving: Thing | null }) {
   const left = Math.min(...things.map((t) => t.x - (t.width ?? 0.3) / 2)) - MARGIN;
   const right = Math.max(...things.map((t) => t.x + (t.width ?? 0.3) / 2)) + MARGIN;
-  const low = Math.min(...things.map((t) => t.y - (t.depth ?? 0.3) / 2)) - MARGIN;
-  const high = Math.max(...things.map((t) => t.y + (t.depth ?? 0.3) / 2)) + MARGIN + 0.3;
+  const low = Math.min(...things.map((t) => t.y - (t.depth ?? 0.3) / 2)) - MARGIN - 0.3;
+  const high = Math.max(...things.map((t) => t.y + (t.depth ?? 0.3) / 2)) + MARGIN + 0.1;
   const depths = nesting(things);
   const order = [...things].sort((a, b) => rank(a) - rank(b) || (depths.get(a.id) ?? 0) - (depths.get(b.id) ?? 0));
   const robot = things.find((thing) => thing.shape === "robot");
@@ -101,21 +101,22 @@ function Shape({ thing }: { thing: Thing }) {
       </>
     );
   }
-  if (shape.includes("crisp")) return <circle className="body" r={0.1} />;
+  if (shape.includes("crisp")) return <circle className="body" r={0.105} />;
   if (shape === "cup") {
     return (
       <>
         <path className="handle" d="M0.06 -0.03 a0.045 0.045 0 1 1 0 0.06" />
-        <circle className="body" r={0.08} />
+        <circle className="body" r={0.09} />
       </>
     );
   }
-  return <circle className="body" r={0.07} />;
+  return <circle className="body" r={0.075} />;
 }
 
 function Label({ thing, quiet, stacked }: { thing: Thing; quiet: boolean; stacked: boolean }) {
   if (quiet) return null;
-  if (thing.width !== undefined) return <text className="place" y={(thing.depth ?? 0) / 2 + 0.24}>{thing.label}</text>;
-  if (thing.shape === "robot") return <text className="place" x={0.27} y={0.1} textAnchor="start">{thing.label}</text>;
-  return <text className={`item ${stacked ? "stacked" : ""}`} transform="rotate(-52)" x={stacked ? 0.3 : 0.14} y={0.05}>{thing.label}</text>;
+  const left = -(thing.width ?? 0) / 2;
+  if (thing.width !== undefined) return <text className="place" x={left} y={(thing.depth ?? 0) / 2 + 0.26}>{thing.label}</text>;
+  if (thing.shape === "robot") return <text className="place" x={0.26} y={0.26}>{thing.label}</text>;
+  return <text className={`item ${stacked ? "stacked" : ""}`} transform="rotate(-62)" x={stacked ? 0.34 : 0.15} y={0.05}>{thing.label}</text>;
 }

@@ -16,7 +16,7 @@ export function inShort(rec: Rec): string {
     }
     case "step": {
       const taken = (rec as StepRec).microsteps.flatMap((micro) => micro.taken);
-      return taken.length ? `${taken[0]!.from} → ${taken.at(-1)!.to ?? ""}` : "the start";
+      return taken.length ? `${ending(taken[0]!.from)} → ${ending(taken.at(-1)!.to ?? "")}` : "the start";
     }
     case "decision": return `${(rec as DecisionRec).state}: ${(rec as DecisionRec).chosen ?? "no candidate"}`;
     case "knowledge": return `${(rec as KnowledgeRec).author}: ${news(rec as KnowledgeRec)}`;
@@ -26,6 +26,11 @@ export function inShort(rec: Rec): string {
     case "end": return (rec as EndRec).problem ?? "finished";
     default: return "";
   }
+}
+
+/** The last two parts of a path: enough to know it by. */
+function ending(path: string): string {
+  return path.split("/").slice(-2).join("/");
 }
 
 function news(rec: KnowledgeRec): string {
@@ -104,7 +109,7 @@ export function Facts({ title, sign, facts }: { title: string; sign: string; fac
   return (
     <>
       {title && <h3>{title}</h3>}
-      <ul className={`facts ${sign === "−" ? "gone" : ""}`}>{facts.map((fact) => <li key={fact}><code>{`${sign} ${fact}`}</code></li>)}</ul>
+      <ul className={`facts ${sign === "+" ? "" : "gone"}`}>{facts.map((fact) => <li key={fact}><code>{`${sign} ${fact}`}</code></li>)}</ul>
     </>
   );
 }
