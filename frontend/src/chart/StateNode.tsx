@@ -47,6 +47,7 @@ export const StateNode = memo(function StateNode({ data }: NodeProps<StateNodeTy
               </>
             )}
           </button>
+          <span className="own">
           {node.expanded && node.hidden > 0 && (
             <button className="tool" title="Show the states that rules added" onClick={() => data.showAll(node.id)}>{`+${node.hidden}`}</button>
           )}
@@ -59,6 +60,7 @@ export const StateNode = memo(function StateNode({ data }: NodeProps<StateNodeTy
               {node.expanded ? "−" : "+"}
             </button>
           )}
+          </span>
         </div>
       )}
       {!node.expanded && title(node) && node.kind !== "gate" && <div className="under">{title(node)}</div>}

@@ -2,7 +2,7 @@
 
 import type { Moment, Trace } from "../core/moment";
 import type { Plan, StepState } from "../core/plans";
-import { joinPath } from "../core/plots";
+import { joinPath, splitPath } from "../core/plots";
 import type { Box, Layout, Point } from "./layout";
 import type { StateData, StateNodeType } from "./StateNode";
 import { edgeOf, type ChartEdge, type ChartNode, type Visible } from "./visible";
@@ -10,11 +10,11 @@ import type { WayEdgeType } from "./WayEdge";
 
 export type Acts = Pick<StateData, "select" | "toggle" | "zoom" | "showAll">;
 
-export function drawnNodes({ nodes }: Visible, layout: Layout, { trail, plans }: Moment, chosen: string | null, acts: Acts): StateNodeType[] {
+export function drawnNodes({ nodes }: Visible, layout: Layout, moment: Moment, chosen: string | null, acts: Acts): StateNodeType[] {
   const depths = depthsOf(nodes);
-  const progress = progressOf(plans);
+  const progress = progressOf(moment.plans);
   const left = new Map<string, number>();
-  trail.forEach((one, age) => left.set(one.from, Math.min(age, left.get(one.from) ?? age)));
+  trailOf(moment).forEach((one, age) => left.set(one.from, Math.min(age, left.get(one.from) ?? age)));
   return nodes.flatMap((node) => {
     const box = layout.boxes.get(node.id);
     if (!box) return [];
@@ -27,10 +27,10 @@ export function drawnNodes({ nodes }: Visible, layout: Layout, { trail, plans }:
   });
 }
 
-export function drawnEdges({ nodes, edges }: Visible, layout: Layout, trail: readonly Trace[], chosen: string | null): WayEdgeType[] {
+export function drawnEdges({ nodes, edges }: Visible, layout: Layout, moment: Moment, chosen: string | null): WayEdgeType[] {
   const depths = depthsOf(nodes);
   const ages = new Map<string, number>();
-  trail.forEach((one, age) => {
+  trailOf(moment).forEach((one, age) => {
     if (one.to === null) return;
     const id = edgeOf(one.from, one.to);
     ages.set(id, Math.min(age, ages.get(id) ?? age));
@@ -43,6 +43,14 @@ export function drawnEdges({ nodes, edges }: Visible, layout: Layout, trail: rea
       id: edge.id, type: "way" as const, source: edge.from, target: edge.to, zIndex: 2 * (depths.get(edge.from) ?? 0) - 1,
       data: { edge, points: line.points, label: line.label, age }, focusable: false, selectable: false,
     }];
+  });
+}
+
+/** What was taken in plots that still run: another plan may have states of the same names. */
+function trailOf({ trail, active }: Moment): Trace[] {
+  return trail.filter(({ from, seq }) => {
+    const [holder] = splitPath(from);
+    return holder === "" || (active.get(holder)?.seq ?? Infinity) <= seq;
   });
 }
 

@@ -1,8 +1,9 @@
 /** The chart: what is active, what was taken lately; open, close, zoom in. */
 
-import { Controls as Zoom, ReactFlow, ReactFlowProvider, useReactFlow, useStore } from "@xyflow/react";
-import { useCallback, useEffect, useMemo, useRef, useState } from "react";
-import { drawnEdges, drawnNodes, innermost, type Acts } from "../chart/drawn";
+import { Controls as Zoom, ReactFlow, ReactFlowProvider } from "@xyflow/react";
+import { useCallback, useEffect, useMemo, useState } from "react";
+import { useCamera } from "../chart/camera";
+import { drawnEdges, drawnNodes, type Acts } from "../chart/drawn";
 import { knownLayout, layoutOf } from "../chart/elk";
 import { signature, type Layout } from "../chart/layout";
 import { StateNode } from "../chart/StateNode";
@@ -14,9 +15,6 @@ import { session, useShown } from "../session";
 const NODES = { state: StateNode };
 const EDGES = { way: WayEdge };
 const PLAIN: View = { focus: "", open: new Map(), all: new Set() };
-/** Less is too small to read; what does not fit is followed at this scale. */
-const READABLE = 0.6;
-const CLOSE = 0.78;
 
 export function Chart() {
   return (
@@ -36,7 +34,7 @@ function ChartPane() {
   const chosen = selection?.kind === "state" ? selection.path : null;
   const acts = useActs(setView);
   const nodes = useMemo(() => (layout ? drawnNodes(shown, layout, moment, chosen, acts) : []), [shown, layout, moment, chosen, acts]);
-  const edges = useMemo(() => (layout ? drawnEdges(shown, layout, moment.trail, chosen) : []), [shown, layout, moment.trail, chosen]);
+  const edges = useMemo(() => (layout ? drawnEdges(shown, layout, moment, chosen) : []), [shown, layout, moment, chosen]);
   useCamera(shown, layout, follow);
   return (
     <section className="pane chart" aria-label="Chart">
@@ -87,44 +85,6 @@ function useActs(setView: (change: (before: View) => View) => void): Acts {
     zoom: (focus) => setView((before) => ({ ...before, focus })),
     showAll: (path) => setView((before) => ({ ...before, all: new Set(before.all).add(path) })),
   }), [select, setView]);
-}
-
-/** The whole chart if it can be read that way; else what is active, whenever it leaves the pane. */
-function useCamera(shown: Visible, layout: Layout | null, follow: boolean): void {
-  const flow = useReactFlow();
-  const width = useStore((state) => state.width);
-  const height = useStore((state) => state.height);
-  const active = innermost(shown).join("\n");
-  const fitted = useRef(true);
-  useEffect(() => {
-    if (!follow || !layout || !width || !height) return;
-    const whole = union([...layout.boxes.values()]);
-    if (!whole) return;
-    if (Math.min(width / whole.width, height / whole.height) > READABLE) {
-      fitted.current = true;
-      void flow.fitBounds(whole, { padding: 0.04, duration: 250 });
-      return;
-    }
-    const here = union(active.split("\n").flatMap((id) => layout.boxes.get(id) ?? []));
-    if (!here) return;
-    const { x, y, zoom } = flow.getViewport();
-    const inside = here.x * zoom + x > 40 && here.y * zoom + y > 40 && (here.x + here.width) * zoom + x < width - 40 && (here.y + here.height) * zoom + y < height - 40;
-    if (!inside || zoom < READABLE || fitted.current) {
-      void flow.setCenter(here.x + here.width / 2, here.y + here.height / 2, { zoom: zoom < READABLE || fitted.current ? CLOSE : zoom, duration: 250 });
-      fitted.current = false;
-    }
-  }, [flow, layout, active, follow, width, height]);
-}
-
-function union(boxes: readonly { x: number; y: number; width: number; height: number }[]) {
-  if (boxes.length === 0) return null;
-  const x = Math.min(...boxes.map((box) => box.x));
-  const y = Math.min(...boxes.map((box) => box.y));
-  return {
-    x, y,
-    width: Math.max(...boxes.map((box) => box.x + box.width)) - x,
-    height: Math.max(...boxes.map((box) => box.y + box.height)) - y,
-  };
 }
 
 function Crumbs({ focus, go }: { focus: string; go: (path: string) => void }) {
