@@ -20,9 +20,17 @@ export async function serve(...args) {
   for await (const line of lines) {
     if (!line.startsWith("http://")) continue;
     lines.on("line", () => {}); // what else it prints must not fill the pipe
-    return { url: line, stop: () => (program.kill("SIGINT"), ended) };
+    return { url: line, stop: () => stop(program, ended) };
   }
   throw new Error(`dsc ${args.join(" ")} ended without an address`);
+}
+
+/** As Ctrl-C does; what does not end by itself is ended. */
+async function stop(program, ended) {
+  program.kill("SIGINT");
+  const patience = setTimeout(() => program.kill("SIGKILL"), 5000);
+  await ended;
+  clearTimeout(patience);
 }
 
 /** Record a run of the clean-up table as a trace. */
