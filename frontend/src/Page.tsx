@@ -10,12 +10,13 @@ import { Timeline } from "./panes/Timeline";
 import { Why } from "./panes/Why";
 import { World } from "./panes/World";
 import { useKeys } from "./keys";
-import { useShown } from "./session";
+import { useControl, useSelection } from "./session";
 
 const TABS = ["Why", "Knowledge"] as const;
 
 export function Page() {
-  const { selection, control } = useShown();
+  const selection = useSelection();
+  const control = useControl();
   const [tab, setTab] = useState<(typeof TABS)[number] | "Control">("Why");
   useKeys();
   useEffect(() => {

@@ -30,6 +30,8 @@ export interface Shown {
 
 export const SPEEDS = [1, 2, 5, 10, 30, 100];
 
+const LOADING_MS = 250;
+
 export class Session {
   readonly history = new History();
   private shown: Shown = {
@@ -39,6 +41,7 @@ export class Session {
   private readonly listeners = new Set<() => void>();
   private drawing = 0;
   private before = 0;
+  private drawn = 0;
   private clock = 0;
   private wanted: number | null = null;
 
@@ -57,7 +60,7 @@ export class Session {
       status: (said: Status) => this.set({ live: said.live, paused: said.paused, expected: said.last }),
       records: (from, records) => {
         this.history.append(from, records);
-        this.later();
+        if (!this.waits()) this.later();
       },
       lost: () => this.set({ connected: false }),
     });
@@ -113,6 +116,15 @@ export class Session {
     for (const listener of this.listeners) listener();
   }
 
+  /** While a long trace comes in, how much of it is there is drawn a few times a second, not for each batch. */
+  private waits(): boolean {
+    const coming = this.history.last < this.shown.expected && this.shown.moment.seq > 0 && !this.shown.following;
+    const now = performance.now();
+    if (coming && now - this.drawn < LOADING_MS) return true;
+    this.drawn = now;
+    return false;
+  }
+
   /** Draw once for whatever comes in until the next frame. */
   private later(): void {
     this.drawing ||= requestAnimationFrame((now) => {
@@ -151,4 +163,18 @@ export const session = new Session();
 
 export function useShown(): Shown {
   return useSyncExternalStore(session.subscribe, session.get);
+}
+
+/** The moment alone: who uses no more is not drawn anew while records come in. */
+export function useMoment(): Moment {
+  return useSyncExternalStore(session.subscribe, () => session.get().moment);
+}
+
+export function useSelection(): Selection | null {
+  return useSyncExternalStore(session.subscribe, () => session.get().selection);
+}
+
+/** Whether the run may be changed from here. */
+export function useControl(): boolean {
+  return useSyncExternalStore(session.subscribe, () => session.get().control);
 }

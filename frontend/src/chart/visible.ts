@@ -51,17 +51,6 @@ export interface View {
   readonly all: ReadonlySet<string>;
 }
 
-const cache = new WeakMap<PlotForm, { states: PlotState[]; ways: Way[] }>();
-
-export function partsOfPlot(plot: PlotForm): { states: PlotState[]; ways: Way[] } {
-  let found = cache.get(plot);
-  if (found === undefined) {
-    const states = statesOf(plot);
-    cache.set(plot, (found = { states, ways: waysOf(states) }));
-  }
-  return found;
-}
-
 export function visible(moment: Moment, plots: Plots, view: View): Visible {
   const nodes: ChartNode[] = [];
   const edges: ChartEdge[] = [];
@@ -80,7 +69,7 @@ interface Showing {
 
 /** Show the states of the plot that runs in `holder`; returns how many it left out. */
 function show(on: Showing, holder: string, plot: PlotForm, around: string | null, depth: number): number {
-  const { states, ways } = partsOfPlot(plot);
+  const states = statesOf(plot);
   const shown = new Map<string, string | null>(); // name -> parent's id
   let hidden = 0;
   const own: PlotState[] = [];
@@ -101,7 +90,7 @@ function show(on: Showing, holder: string, plot: PlotForm, around: string | null
     own.push(state);
     if ((state.kind === "composite" || state.kind === "orthogonal") && !(on.view.open.get(id) ?? true)) closed.add(state.name);
   }
-  const edges = edgesBetween(holder, states, throughGates(ways, gates), shown);
+  const edges = edgesBetween(holder, states, throughGates(waysOf(plot), gates), shown);
   const counts = new Map<string, number>();
   for (const edge of edges) if (edge.quiet) counts.set(edge.to, (counts.get(edge.to) ?? 0) + 1);
   for (const state of own) {

@@ -45,6 +45,8 @@ export interface Moment {
   /** Skills at work, by the seq of the record that started them. */
   working: Map<number, ActionRec>;
   plans: Plan[];
+  /** Path of a state -> place in `plans` of the plan that is carried out in it. */
+  running: Map<string, number>;
   /** The record that may turn out to be why the plan ends. */
   trouble: number | null;
   version: number;
@@ -60,7 +62,7 @@ export type Plots = ReadonlyMap<string, PlotForm>;
 export function beginning(): Moment {
   return {
     seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [], decisions: new Map(),
-    working: new Map(), plans: [], trouble: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
+    working: new Map(), plans: [], running: new Map(), trouble: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
     scene: null, end: null,
   };
 }
@@ -69,7 +71,7 @@ export function beginning(): Moment {
 export function copyOf(moment: Moment): Moment {
   return {
     ...moment, active: new Map(moment.active), bound: new Map(moment.bound), variables: new Map(moment.variables),
-    decisions: new Map(moment.decisions), working: new Map(moment.working), plans: [...moment.plans],
+    decisions: new Map(moment.decisions), working: new Map(moment.working), plans: [...moment.plans], running: new Map(moment.running),
     nodes: new Map(moment.nodes), facts: new Map(moment.facts), values: new Map(moment.values),
   };
 }
@@ -137,11 +139,13 @@ function planBound(moment: Moment, rec: Rec, at: string, name: string, form: Plo
   const plan = moment.plans[number]!;
   const texts = plan.steps.map((step) => step.text);
   moment.plans[number] = { ...plan, at, names: stepsOf(form, texts) };
+  moment.running.set(at, number);
 }
 
 function planLeft(moment: Moment, rec: Rec, path: string): void {
-  const number = moment.plans.findLastIndex((plan) => plan.at === path && plan.ended === null);
-  if (number < 0) return;
+  const number = moment.running.get(path);
+  if (number === undefined) return;
+  moment.running.delete(path);
   const plan = moment.plans[number]!;
   moment.plans[number] = withEnd(plan, moment.trouble !== null && moment.trouble > plan.seq ? moment.trouble : rec.seq, rec.t);
 }
@@ -156,10 +160,11 @@ function planStepLeft(moment: Moment, rec: Rec, path: string, taken: readonly Ta
 
 function changeStep(moment: Moment, path: string, change: (step: Plan["steps"][number]) => Partial<Plan["steps"][number]>): void {
   const [holder, name] = splitPath(path);
-  const number = moment.plans.findLastIndex((plan) => plan.at === holder && plan.ended === null);
-  const plan = moment.plans[number];
-  const step = plan?.names.get(name);
-  if (plan === undefined || step === undefined) return;
+  const number = moment.running.get(holder);
+  if (number === undefined) return;
+  const plan = moment.plans[number]!;
+  const step = plan.names.get(name);
+  if (step === undefined) return;
   moment.plans[number] = withStep(plan, step, change(plan.steps[step]!));
 }
 

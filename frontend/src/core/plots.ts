@@ -70,8 +70,27 @@ export function kindOf(form: StateForm): Kind {
   return form.history !== undefined || form.choice !== undefined || form.select !== undefined ? "pseudo" : "simple";
 }
 
+const states = new WeakMap<PlotForm, readonly PlotState[]>();
+const ways = new WeakMap<PlotForm, readonly Way[]>();
+
 /** All states of a plot in document order; regions are there too, named `STATE:REGION`. */
-export function statesOf(plot: PlotForm): PlotState[] {
+export function statesOf(plot: PlotForm): readonly PlotState[] {
+  return kept(states, plot, () => foundStates(plot));
+}
+
+/** The transitions between the states of a plot. */
+export function waysOf(plot: PlotForm): readonly Way[] {
+  return kept(ways, plot, () => foundWays(statesOf(plot)));
+}
+
+/** A plot never changes: what was found in it is kept. */
+function kept<T>(cache: WeakMap<PlotForm, T>, plot: PlotForm, find: () => T): T {
+  let found = cache.get(plot);
+  if (found === undefined) cache.set(plot, (found = find()));
+  return found;
+}
+
+function foundStates(plot: PlotForm): PlotState[] {
   const found: PlotState[] = [];
   const walk = (states: Readonly<Record<string, StateForm>>, parent: string | null, first: string | undefined) => {
     const initial = first ?? Object.keys(states)[0];
@@ -90,8 +109,7 @@ export function statesOf(plot: PlotForm): PlotState[] {
   return found;
 }
 
-/** The transitions between the states of a plot. */
-export function waysOf(states: readonly PlotState[]): Way[] {
+function foundWays(states: readonly PlotState[]): Way[] {
   const found: Way[] = [];
   const known = new Set(states.map((state) => state.name));
   for (const { name, form } of states) {

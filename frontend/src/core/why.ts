@@ -1,8 +1,7 @@
 /** What can be told about a plan from the records: who broke it, what its steps changed. */
 
 import type { History } from "./history";
-import { splitPath, type PlotForm } from "./plots";
-import { statesOf, waysOf } from "./plots";
+import { splitPath, statesOf, waysOf, type PlotForm } from "./plots";
 import { written, type Fact, type KnowledgeRec, type PlanBrokenRec } from "./records";
 
 /** So far back is looked for who changed something. */
@@ -41,7 +40,7 @@ export function changesBetween(history: History, after: number, since: number, u
 
 /** What has to hold for a state of a plot to be entered, as its ways in say it. */
 export function conditionsInto(plot: PlotForm, name: string): string[] {
-  const ways = waysOf(statesOf(plot)).filter((way) => way.to === name && way.rule === undefined);
+  const ways = waysOf(plot).filter((way) => way.to === name && way.rule === undefined);
   return [...new Set(ways.map((way) => way.when).filter((when) => when !== undefined))];
 }
 

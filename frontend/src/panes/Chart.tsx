@@ -10,7 +10,7 @@ import { StateNode } from "../chart/StateNode";
 import { visible, type View, type Visible } from "../chart/visible";
 import { WayEdge } from "../chart/WayEdge";
 import { svg } from "../link/requests";
-import { session, useShown } from "../session";
+import { session, useMoment, useSelection } from "../session";
 
 const NODES = { state: StateNode };
 const EDGES = { way: WayEdge };
@@ -25,7 +25,8 @@ export function Chart() {
 }
 
 function ChartPane() {
-  const { moment, selection } = useShown();
+  const moment = useMoment();
+  const selection = useSelection();
   const [view, setView] = useState(PLAIN);
   const [follow, setFollow] = useState(true);
   const focus = moment.bound.has(view.focus) ? view.focus : "";

@@ -3,7 +3,7 @@
 import { useEffect, useMemo, useState } from "react";
 import { written, type Fact, type KnowledgeRec, type Value } from "../core/records";
 import { query, type Answer } from "../link/requests";
-import { session, useShown } from "../session";
+import { session, useMoment, useSelection } from "../session";
 import { Neighbourhood } from "./Neighbourhood";
 import { changed, RecordLink, Tree } from "./parts";
 
@@ -12,7 +12,8 @@ const CHANGES = 25;
 const VIEWS = ["facts", "changes"] as const;
 
 export function Knowledge() {
-  const { moment, selection } = useShown();
+  const moment = useMoment();
+  const selection = useSelection();
   const [view, setView] = useState<(typeof VIEWS)[number]>("facts");
   const [text, setText] = useState("");
   const thing = selection?.kind === "thing" ? selection.id : null;
@@ -38,7 +39,7 @@ export function Knowledge() {
 }
 
 function Table({ word, about }: { word: string; about: string | null }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const [latest] = session.history.before(moment.seq, "knowledge", 1) as KnowledgeRec[];
   const fresh = useMemo(() => new Set(latest ? changed(latest).added : []), [latest]);
   const rows = useMemo(() => {
@@ -67,7 +68,7 @@ export function Thing({ id, known }: { id: string; known: boolean }) {
 }
 
 function Feed() {
-  const { moment } = useShown();
+  const moment = useMoment();
   const changes = session.history.before(moment.seq, "knowledge", CHANGES) as KnowledgeRec[];
   return (
     <ul className="records feed" aria-label="Changes">

@@ -1,14 +1,14 @@
 /** What is said of a thing, drawn: the thing in the middle, what it is related to around it. */
 
 import { written, type Fact } from "../core/records";
-import { session, useShown } from "../session";
+import { session, useMoment } from "../session";
 
 const WIDE = 340;
 const HIGH = 250;
 const MOST = 12;
 
 export function Neighbourhood({ about }: { about: string }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const facts = [...moment.facts.values()].filter((fact) => fact.includes(about));
   const near = new Map<string, string[]>();
   for (const fact of facts) {

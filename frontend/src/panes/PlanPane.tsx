@@ -3,13 +3,14 @@
 import { useEffect, useRef } from "react";
 import { nextStep, type Plan, type PlanStep } from "../core/plans";
 import { lanesOf } from "../core/why";
-import { session, useShown } from "../session";
+import { session, useMoment, useSelection } from "../session";
 
 const SIGNS = { waiting: "·", running: "▶", done: "✓", failed: "✕", skipped: "»", stopped: "■" } as const;
 const EARLIER = 12;
 
 export function PlanPane() {
-  const { moment, selection } = useShown();
+  const moment = useMoment();
+  const selection = useSelection();
   const plans = moment.plans.map((plan, number) => ({ plan, number }));
   const shown = plans.slice(-EARLIER).reverse();
   const chosen = selection?.kind === "plan" || selection?.kind === "step" ? selection.plan : null;
@@ -28,7 +29,7 @@ export function PlanPane() {
 }
 
 function PlanView({ plan, number, open }: { plan: Plan; number: number; open: boolean }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const finished = plan.steps.every((step) => step.state === "done" || step.state === "skipped");
   const done = plan.steps.filter((step) => step.state === "done").length;
   const end = plan.ended === null ? "" : finished ? "carried out" : "given up";
@@ -71,7 +72,8 @@ function Steps({ plan, number, which }: { plan: Plan; number: number; which: rea
 }
 
 function Step({ plan, number, step, next }: { plan: number; number: number; step: PlanStep; next: boolean }) {
-  const { moment, selection } = useShown();
+  const moment = useMoment();
+  const selection = useSelection();
   const row = useRef<HTMLButtonElement>(null);
   const running = step.state === "running";
   useEffect(() => {

@@ -1,7 +1,7 @@
 /** Why: what is selected and what led to it; with nothing selected, the last decision. */
 
 import type { Rec } from "../core/records";
-import { session, useShown } from "../session";
+import { session, useMoment, useSelection } from "../session";
 import { Causes, RecordLink } from "./parts";
 import { WhyPlan, WhyStep } from "./WhyPlan";
 import { WhyRecord } from "./WhyRecord";
@@ -10,7 +10,8 @@ import { WhyState } from "./WhyState";
 const LATELY = 14;
 
 export function Why() {
-  const { moment, selection } = useShown();
+  const moment = useMoment();
+  const selection = useSelection();
   const { history } = session;
   if (selection?.kind === "state") return <Body close><WhyState path={selection.path} /></Body>;
   if (selection?.kind === "plan") return <Body close><WhyPlan number={selection.plan} /></Body>;

@@ -4,13 +4,13 @@ import type { Plan } from "../core/plans";
 import { joinPath } from "../core/plots";
 import type { DecisionRec, PlanBrokenRec, PlanFoundRec } from "../core/records";
 import { changesBetween, conditionsInto } from "../core/why";
-import { session, useShown } from "../session";
+import { session, useMoment } from "../session";
 import { Causes, changed, Facts, RecordLink } from "./parts";
 import { seconds } from "./Timeline";
 import { Decision, WhyRecord } from "./WhyRecord";
 
 export function WhyPlan({ number }: { number: number }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const { history } = session;
   const plan = moment.plans[number];
   if (!plan) return <p className="quiet">At this moment the plan had not been made yet.</p>;
@@ -39,7 +39,7 @@ export function WhyPlan({ number }: { number: number }) {
 }
 
 export function WhyStep({ plan: at, number }: { plan: number; number: number }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const plan = moment.plans[at];
   const step = plan?.steps[number];
   if (!plan || !step) return <p className="quiet">At this moment the plan had not been made yet.</p>;
@@ -77,7 +77,7 @@ function Links({ plan, number }: { plan: Plan; number: number }) {
 }
 
 function Needed({ plan, name }: { plan: Plan; name: string }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const plot = session.history.plots.get(moment.bound.get(plan.at ?? "-") ?? "");
   const conditions = plot?.generated ? conditionsInto(plot, name) : [];
   if (conditions.length === 0) return null;
@@ -96,7 +96,7 @@ function Needed({ plan, name }: { plan: Plan; name: string }) {
 }
 
 function Brought({ plan, number }: { plan: Plan; number: number }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const step = plan.steps[number]!;
   if (step.since === null) return null;
   const changes = changesBetween(session.history, plan.seq, step.since, step.until ?? moment.t).filter((one) => one.seq <= moment.seq);
@@ -115,7 +115,7 @@ function Brought({ plan, number }: { plan: Plan; number: number }) {
 }
 
 function HowDone({ plan, name }: { plan: Plan; name: string }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const path = joinPath(plan.at ?? "", name);
   const made = session.history.before(moment.seq, "decision", 200).find((rec) => (rec as DecisionRec).state === path && rec.seq > plan.seq);
   return made ? <><h3>How it is done</h3><Decision rec={made as DecisionRec} /></> : null;

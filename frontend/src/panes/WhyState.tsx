@@ -1,19 +1,18 @@
 /** A state: since when, with which parameters and variables, and why its content was chosen. */
 
-import { partsOfPlot } from "../chart/visible";
-import { splitPath, type PlotForm, type StateForm } from "../core/plots";
+import { splitPath, statesOf, type PlotForm, type StateForm } from "../core/plots";
 import type { DecisionRec, Named } from "../core/records";
-import { session, useShown } from "../session";
+import { session, useMoment } from "../session";
 import { Values } from "./parts";
 import { seconds } from "./Timeline";
 import { Decision } from "./WhyRecord";
 
 export function WhyState({ path }: { path: string }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   const { history } = session;
   const [holder, name] = splitPath(path);
   const plot = history.plots.get(moment.bound.get(holder) ?? "");
-  const state = plot && partsOfPlot(plot).states.find((one) => one.name === name);
+  const state = plot && statesOf(plot).find((one) => one.name === name);
   const since = moment.active.get(path);
   const content = history.plots.get(moment.bound.get(path) ?? "");
   const decision = moment.decisions.get(path) ?? lastDecision(path, moment.seq);
@@ -34,7 +33,7 @@ export function WhyState({ path }: { path: string }) {
 }
 
 function Running({ path, content }: { path: string; content: PlotForm }) {
-  const { moment } = useShown();
+  const moment = useMoment();
   return (
     <>
       <h3>{`Inside: ${content.plot}${content.generated ? " (generated)" : ""}`}</h3>

@@ -2,13 +2,13 @@
 
 import { memo } from "react";
 import type { Thing } from "../core/records";
-import { session, useShown } from "../session";
+import { session, useMoment } from "../session";
 
 const MARGIN = 0.12;
 const NESTED = 0.075;
 
 export function World() {
-  const { moment } = useShown();
+  const moment = useMoment();
   const things = moment.scene?.things ?? [];
   const busy = new Set([...moment.working.values()].flatMap((one) => Object.values(one.arguments ?? {}).map(String)));
   return (
