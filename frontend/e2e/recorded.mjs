@@ -84,6 +84,23 @@ test("a state tells its parameters, and its decision", async () => {
   await page.keyboard.press("Escape");
 });
 
+test("a click in the chart selects a state; it is collapsed, opened and zoomed into", async () => {
+  await goTo(first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("look_at_table/look"))).seq);
+  const node = (path) => page.locator(`.react-flow__node[data-id="${path}"]`);
+  await node("look_at_table/look").waitFor();
+  await page.getByRole("button", { name: /^look_at_table, / }).click();
+  await page.getByLabel("State", { exact: true }).getByText("Inside: search").waitFor();
+  await page.getByRole("button", { name: "Collapse look_at_table" }).click();
+  await node("look_at_table/look").waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "Expand look_at_table" }).click();
+  await node("look_at_table/look").waitFor();
+  await page.getByRole("button", { name: "Zoom into look_at_table" }).click();
+  await node("work").waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "Chart", exact: true }).click();
+  await node("work").waitFor();
+  await page.keyboard.press("Escape");
+});
+
 test("the plan is there before and after a replan, with what broke it and who did", async () => {
   const broken = first((rec) => rec.type === "plan.broken");
   const old = records.findLast((rec) => rec.seq < broken.seq && rec.type === "plan.found");

@@ -77,12 +77,12 @@ describe("what is to be seen", () => {
 });
 
 describe("layout", () => {
-  it("puts states inside what holds them, and siblings beside each other", async () => {
+  it("puts states inside what holds them, and siblings below an open one", async () => {
     const { boxes } = await layout(new ELK(), visible(moment({ "": "m", look: "s" }, "work", "look", "look/drive"), plots, PLAIN));
     const [look, drive, clear] = [boxes.get("look")!, boxes.get("look/drive")!, boxes.get("clear")!];
     expect(drive.x).toBeGreaterThan(look.x);
     expect(drive.x + drive.width).toBeLessThan(look.x + look.width);
-    expect(clear.x).toBeGreaterThanOrEqual(look.x + look.width);
+    expect(clear.y).toBeGreaterThanOrEqual(look.y + look.height);
   });
 
   it("leads each line from the border of its source to that of its target", async () => {
@@ -90,6 +90,16 @@ describe("layout", () => {
     const points = lines.get("look>clear")!.points;
     expect(points[0]!.x).toBeCloseTo(boxes.get("look")!.x + boxes.get("look")!.width, 0);
     expect(points.at(-1)!.x).toBeCloseTo(boxes.get("clear")!.x, 0);
+  });
+
+  it("puts regions below each other, in their order", async () => {
+    const inside = { states: { s: {}, e: { final: true } } };
+    const plot: PlotForm = { plot: "o", states: { both: { regions: { one: inside, two: inside, three: inside } } } };
+    const { boxes, lines } = await layout(new ELK(), visible(moment({ "": "o" }, "both"), new Map([["o", plot]]), PLAIN));
+    const tops = ["one", "two", "three"].map((name) => boxes.get(`both:${name}`)!.y);
+    expect(tops).toEqual([...tops].sort((a, b) => a - b));
+    expect(new Set(tops).size).toBe(3);
+    expect([...lines.keys()].filter((id) => !id.startsWith("\u0000"))).toEqual([]);
   });
 
   it("breaks the long chain of a plan into lines", async () => {

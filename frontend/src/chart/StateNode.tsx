@@ -68,4 +68,14 @@ export const StateNode = memo(function StateNode({ data }: NodeProps<StateNodeTy
       <Handle type="source" position={Position.Right} isConnectable={false} />
     </div>
   );
+}, (before, after) => {
+  // Each moment makes its nodes anew; most of them say the same as before.
+  const { node: one, ...rest } = before.data;
+  const { node: other, ...others } = after.data;
+  return shallowly(one, other) && shallowly(rest, others);
 });
+
+function shallowly(one: object, other: object): boolean {
+  const values = other as Readonly<Record<string, unknown>>;
+  return Object.entries(one).every(([name, value]) => Object.is(value, values[name]));
+}

@@ -21,7 +21,7 @@ export function drawnNodes({ nodes }: Visible, layout: Layout, moment: Moment, c
     const data = { node, chosen: node.id === chosen, left: left.get(node.id) ?? null, progress: progress.get(node.id) ?? null, ...acts };
     return [{
       id: node.id, type: "state" as const, position: { x: box.x, y: box.y }, data, zIndex: 2 * depths.get(node.id)!,
-      width: box.width, height: box.height, style: { width: box.width, height: box.height },
+      width: box.width, height: box.height, style: { width: box.width, height: box.height, pointerEvents: "all" as const },
       draggable: false, selectable: false, focusable: false, connectable: false,
     }];
   });

@@ -38,8 +38,12 @@ const LAYERED = {
 const WRAPPED = {
   "elk.layered.wrapping.strategy": "MULTI_EDGE",
   "elk.layered.wrapping.additionalEdgeSpacing": "8",
-  "elk.aspectRatio": "1.6",
+  "elk.aspectRatio": "1.5",
 };
+const LONG = 7;
+
+/** What holds open composites is laid out downwards: they are wide. */
+const DOWN = { "elk.direction": "DOWN" };
 
 /** What everything leads to stands at the end. */
 const LAST = { "elk.layered.layering.layerConstraint": "LAST" };
@@ -60,7 +64,7 @@ export async function layout(elk: ELK, { nodes, edges }: Visible): Promise<Layou
 export function sizeOf(node: ChartNode): { width: number; height: number } {
   if (node.kind === "gate") return { width: 14, height: 14 };
   if (node.kind === "pseudo") return { width: 28, height: 28 };
-  const widest = Math.max(shownName(node).length * 7.4 + 42, title(node).length * 6.2 + 20, 74);
+  const widest = Math.max(shownName(node).length * 7.4 + (node.initial ? 62 : 48), title(node).length * 6.2 + 20, 74);
   if (node.kind === "final") return { width: Math.min(widest, 150), height: 30 };
   return { width: Math.min(widest, 190), height: title(node) ? 46 : 34 };
 }
@@ -82,13 +86,12 @@ function stepOf(node: ChartNode): string[] | undefined {
 }
 
 function asGraph(nodes: readonly ChartNode[], edges: readonly ChartEdge[]): ElkNode {
-  const made = new Map<string | null, ElkNode>([[null, { id: "\u0000root", layoutOptions: LAYERED, children: [], edges: [] }]]);
+  const made = new Map<string | null, ElkNode>([[null, { id: "\u0000root", layoutOptions: { ...LAYERED }, children: [], edges: [] }]]);
   for (const node of nodes) {
     const inner = node.expanded && (node.expandable || node.kind === "region");
-    const wrapped = node.generated ? WRAPPED : {};
     const padding = { "elk.padding": `[top=${HEADER + 12},left=14,bottom=14,right=14]` };
     const box: ElkNode = inner
-      ? { id: node.id, layoutOptions: { ...LAYERED, ...wrapped, ...padding }, children: [], edges: [] }
+      ? { id: node.id, layoutOptions: { ...LAYERED, ...padding }, children: [], edges: [] }
       : { id: node.id, ...sizeOf(node), ...(node.ways > 0 && { layoutOptions: LAST }) };
     if (inner) box.layoutOptions!["elk.nodeSize.constraints"] = "MINIMUM_SIZE";
     if (inner) box.layoutOptions!["elk.nodeSize.minimum"] = `(${node.name.length * 8 + 130}, 60)`;
@@ -103,7 +106,23 @@ function asGraph(nodes: readonly ChartNode[], edges: readonly ChartEdge[]): ElkN
     if (text) drawn.labels = [{ text, width: text.length * 5.8 + 6, height: 13 }];
     made.get(parents.get(edge.from) ?? null)?.edges?.push(drawn);
   }
+  for (const box of made.values()) shape(box);
+  for (const node of nodes) if (node.kind === "orthogonal" && node.expanded) stack(made.get(node.id)!);
   return made.get(null)!;
+}
+
+/** The direction of a container follows from what is in it. */
+function shape(box: ElkNode): void {
+  const inside = box.children ?? [];
+  if (inside.some((child) => child.children)) Object.assign(box.layoutOptions!, DOWN);
+  if (inside.length >= LONG) Object.assign(box.layoutOptions!, WRAPPED);
+}
+
+/** Regions stand below each other in their order, as if one led to the next. */
+function stack(box: ElkNode): void {
+  const regions = box.children ?? [];
+  box.edges = regions.slice(1).map((region, i) => ({ id: `\u0000${region.id}`, sources: [regions[i]!.id], targets: [region.id] }));
+  Object.assign(box.layoutOptions!, DOWN);
 }
 
 export function labelOf(edge: ChartEdge): string {

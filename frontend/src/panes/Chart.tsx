@@ -53,7 +53,7 @@ function ChartPane() {
           nodes={nodes} edges={edges} nodeTypes={NODES} edgeTypes={EDGES} minZoom={0.05} maxZoom={2.5}
           nodesDraggable={false} nodesConnectable={false} elementsSelectable={false} edgesFocusable={false} nodesFocusable={false}
           onlyRenderVisibleElements={nodes.length > 150} zoomOnDoubleClick={false} disableKeyboardA11y
-          onMoveStart={(event) => event && setFollow(false)} proOptions={{ hideAttribution: true }}
+          onMove={(event) => event && setFollow(false)} proOptions={{ hideAttribution: true }}
         >
           <Zoom showInteractive={false} />
         </ReactFlow>

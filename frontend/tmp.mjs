@@ -1,0 +1,17 @@
+import { browse, goTo, loaded, open, serve, settled } from "./browser.mjs";
+const browser = await browse();
+let p = await serve("view", "/tmp/wt/v2-big.jsonl", "--no-open");
+let { page } = await open(browser, p.url); await loaded(page, 3); await goTo(page, 3); await page.waitForTimeout(2500);
+await page.screenshot({ path: "/tmp/wt/v2-shots/big.png" });
+await page.locator(".react-flow__controls-fitview").click(); await page.waitForTimeout(800);
+await page.screenshot({ path: "/tmp/wt/v2-shots/big_all.png" });
+await p.stop();
+p = await serve("view", "/tmp/wt/v2-lanes.jsonl", "--no-open");
+({ page } = await open(browser, p.url)); await loaded(page, 6); await goTo(page, 6); await page.getByLabel(/^5 \(throw/).click(); await page.waitForTimeout(700);
+await page.screenshot({ path: "/tmp/wt/v2-shots/lanes.png" });
+await p.stop();
+p = await serve("view", "/tmp/wt/v2-trace.jsonl", "--no-open");
+({ page } = await open(browser, p.url)); await loaded(page, 700); await goTo(page, 14); await page.getByRole("button", { name: /^look_at_table, / }).click(); await page.waitForTimeout(700);
+await page.screenshot({ path: "/tmp/wt/v2-shots/early.png" });
+await p.stop();
+await browser.close();
