@@ -77,7 +77,7 @@ describe("what is to be seen", () => {
 });
 
 describe("layout", () => {
-  it("puts states inside what holds them, and siblings below an open one", async () => {
+  it("puts states inside what holds them, and siblings below each other", async () => {
     const { boxes } = await layout(new ELK(), visible(moment({ "": "m", look: "s" }, "work", "look", "look/drive"), plots, PLAIN));
     const [look, drive, clear] = [boxes.get("look")!, boxes.get("look/drive")!, boxes.get("clear")!];
     expect(drive.x).toBeGreaterThan(look.x);
@@ -88,8 +88,8 @@ describe("layout", () => {
   it("leads each line from the border of its source to that of its target", async () => {
     const { boxes, lines } = await layout(new ELK(), visible(moment({ "": "m" }, "work"), plots, PLAIN));
     const points = lines.get("look>clear")!.points;
-    expect(points[0]!.x).toBeCloseTo(boxes.get("look")!.x + boxes.get("look")!.width, 0);
-    expect(points.at(-1)!.x).toBeCloseTo(boxes.get("clear")!.x, 0);
+    expect(points[0]!.y).toBeCloseTo(boxes.get("look")!.y + boxes.get("look")!.height, 0);
+    expect(points.at(-1)!.y).toBeCloseTo(boxes.get("clear")!.y, 0);
   });
 
   it("puts regions below each other, in their order", async () => {

@@ -22,7 +22,8 @@ export interface Layout {
 
 const LAYERED = {
   "elk.algorithm": "layered",
-  "elk.direction": "RIGHT",
+  "elk.direction": "DOWN",
+  "elk.layered.cycleBreaking.strategy": "MODEL_ORDER",
   "elk.edgeRouting": "ORTHOGONAL",
   "elk.layered.spacing.nodeNodeBetweenLayers": "34",
   "elk.spacing.nodeNode": "20",
@@ -40,10 +41,12 @@ const WRAPPED = {
   "elk.layered.wrapping.additionalEdgeSpacing": "8",
   "elk.aspectRatio": "1.5",
 };
-const LONG = 7;
 
-/** What holds open composites is laid out downwards: they are wide. */
-const DOWN = { "elk.direction": "DOWN" };
+/** Designed charts branch and return, and are broken only if they would not fit at all. */
+const LONG = 16;
+
+/** The steps of a plan are read as a text is. */
+const STEPS = { ...WRAPPED, "elk.direction": "RIGHT" };
 
 /** What everything leads to stands at the end. */
 const LAST = { "elk.layered.layering.layerConstraint": "LAST" };
@@ -106,23 +109,18 @@ function asGraph(nodes: readonly ChartNode[], edges: readonly ChartEdge[]): ElkN
     if (text) drawn.labels = [{ text, width: text.length * 5.8 + 6, height: 13 }];
     made.get(parents.get(edge.from) ?? null)?.edges?.push(drawn);
   }
-  for (const box of made.values()) shape(box);
-  for (const node of nodes) if (node.kind === "orthogonal" && node.expanded) stack(made.get(node.id)!);
+  for (const box of made.values()) if ((box.children?.length ?? 0) >= LONG) Object.assign(box.layoutOptions!, WRAPPED);
+  for (const node of nodes) {
+    if (stepOf(node)) Object.assign(made.get(node.parent)!.layoutOptions!, STEPS);
+    if (node.kind === "orthogonal" && node.expanded) stack(made.get(node.id)!);
+  }
   return made.get(null)!;
-}
-
-/** The direction of a container follows from what is in it. */
-function shape(box: ElkNode): void {
-  const inside = box.children ?? [];
-  if (inside.some((child) => child.children)) Object.assign(box.layoutOptions!, DOWN);
-  if (inside.length >= LONG) Object.assign(box.layoutOptions!, WRAPPED);
 }
 
 /** Regions stand below each other in their order, as if one led to the next. */
 function stack(box: ElkNode): void {
   const regions = box.children ?? [];
   box.edges = regions.slice(1).map((region, i) => ({ id: `\u0000${region.id}`, sources: [regions[i]!.id], targets: [region.id] }));
-  Object.assign(box.layoutOptions!, DOWN);
 }
 
 export function labelOf(edge: ChartEdge): string {
