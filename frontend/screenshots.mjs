@@ -35,7 +35,11 @@ try {
     await page.locator(".one-plan.past .head").first().press("Enter");
     await settled(page);
     await shoot("replan", ".side");
+    await goTo(page, where((rec) => rec.type === "step", records.findLast((rec) => rec.type === "plan.found").seq));
+    await page.keyboard.press("Escape");
+    await page.getByLabel("Moment", { exact: true }).blur();
     await shoot("plans", ".pane.plan");
+    await goTo(page, replanned);
     await page.getByRole("tab", { name: "Knowledge" }).click();
     await page.getByLabel("Filter or ask").fill("(and (lies-at ?i table) (fits ?i cup2))");
     await page.getByLabel("Answers").waitFor();

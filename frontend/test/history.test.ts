@@ -36,6 +36,20 @@ describe("a moment", () => {
     expect(states(15)).toEqual([["done", "stopped"], ["running"]]);
   });
 
+  it("does not blame a rule after which the step was begun again for the end of the plan", () => {
+    const execute = "clear/execute";
+    const again = { event: "slipped", taken: [], exited: [`${execute}/step_1`], entered: [`${execute}/step_1`] };
+    const over = { event: "done", taken: [{ from: `${execute}/step_1`, on: "done", to: `${execute}/finished` }], exited: [`${execute}/step_1`, execute], entered: [] };
+    const rest = [
+      { type: "rule", rule: "slipped: wait, retry", state: `${execute}/step_1` },
+      { type: "step", microsteps: [again] },
+      { type: "step", microsteps: [over] },
+    ].map((data, i) => ({ seq: run.length + 1 + i, t: 6 + i, cause: null, ...data }));
+    const plan = history([...run, ...rest]).at(run.length + 3).plans[1]!;
+    expect(plan.ended).toBe(run.length + 3);
+    expect(plan.steps.map((step) => [step.state, step.tries])).toEqual([["done", 2]]);
+  });
+
   it("has the transitions taken last, the latest first", () => {
     expect(history(run).at(9).trail.map((one) => one.to)).toEqual(["clear/execute/step_2", "clear/execute/step_1", "clear/execute"]);
   });

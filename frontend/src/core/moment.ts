@@ -123,7 +123,10 @@ function microstepped(moment: Moment, rec: StepRec, micro: Micro, plots: Plots):
   }
   for (const path of micro.entered) {
     moment.active.set(path, { seq: rec.seq, t: rec.t });
-    changeStep(moment, path, (step) => ({ state: "running", tries: step.tries + 1, since: step.since ?? rec.t, until: null }));
+    changeStep(moment, path, (step) => {
+      moment.trouble = null; // whatever it was, it was got over
+      return { state: "running", tries: step.tries + 1, since: step.since ?? rec.t, until: null };
+    });
   }
 }
 

@@ -47,3 +47,8 @@ export function nextStep(plan: Plan): number {
   if (plan.ended !== null) return -1;
   return plan.steps.findIndex((step) => step.state === "waiting");
 }
+
+/** Whether nothing of it is left to do. */
+export function isFinished(plan: Plan): boolean {
+  return plan.steps.every((step) => step.state === "done" || step.state === "skipped");
+}

@@ -1,7 +1,7 @@
 /** The plan: what is done, at work, next; plans that were given up are grey. */
 
 import { useEffect, useRef } from "react";
-import { nextStep, type Plan, type PlanStep } from "../core/plans";
+import { isFinished, nextStep, type Plan, type PlanStep } from "../core/plans";
 import { lanesOf } from "../core/why";
 import { session, useMoment, useSelection } from "../session";
 
@@ -30,7 +30,7 @@ export function PlanPane() {
 
 function PlanView({ plan, number, open }: { plan: Plan; number: number; open: boolean }) {
   const moment = useMoment();
-  const finished = plan.steps.every((step) => step.state === "done" || step.state === "skipped");
+  const finished = isFinished(plan);
   const done = plan.steps.filter((step) => step.state === "done").length;
   const end = plan.ended === null ? "" : finished ? "carried out" : "given up";
   const form = session.history.plots.get(moment.bound.get(plan.at ?? "-") ?? "");

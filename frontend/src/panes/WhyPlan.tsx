@@ -1,8 +1,8 @@
 /** A plan: why it ended. A step of it: what it provides to whom, what it needs, what it changed. */
 
-import type { Plan } from "../core/plans";
+import { isFinished, type Plan } from "../core/plans";
 import { joinPath } from "../core/plots";
-import type { DecisionRec, PlanBrokenRec, PlanFoundRec } from "../core/records";
+import type { DecisionRec, PlanFoundRec } from "../core/records";
 import { changesBetween, conditionsInto } from "../core/why";
 import { session, useMoment } from "../session";
 import { Causes, changed, Facts, RecordLink } from "./parts";
@@ -23,10 +23,10 @@ export function WhyPlan({ number }: { number: number }) {
         <span className="quiet">{`plan · ${seconds(found.t)}${plan.engine ? ` · ${plan.engine}` : ""}`}</span>
         <p><b>{plan.name}</b>{`, ${plan.steps.length} steps, ${plan.steps.filter((step) => step.state === "done").length} done`}</p>
       </div>
-      {end && end.type !== "step" && (
+      {end && !isFinished(plan) && (
         <>
           <h3>Why it was given up</h3>
-          <WhyRecord rec={end as PlanBrokenRec} />
+          <WhyRecord rec={end} />
           <Causes seq={end.seq} />
         </>
       )}
