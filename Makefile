@@ -5,7 +5,8 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb soak-kb bench-startup bench-broken bench-engine bench-planning bench-kb pictures clean
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb soak-kb
+.PHONY: bench-startup bench-broken bench-engine bench-planning bench-kb bench-viewer pictures viewer test-viewer screenshots clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -84,5 +85,23 @@ pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show planning/plots/achieve.yaml --svg docs/pictures/achieve.svg
 	$(BIN)/dsc kb draw examples/kitchen/problem.pddl --to docs/pictures/kitchen.svg
 
+NODE_MODULES := frontend/node_modules/.made
+
+$(NODE_MODULES): frontend/package.json   # Node is needed to build the page, never to show it
+	cd frontend && npm install --no-package-lock --no-fund --no-audit
+	@touch $@
+
+viewer: $(NODE_MODULES)   ## build the page that `dsc view` shows (needs Node and npm)
+	cd frontend && npm run --silent build
+
+test-viewer: $(VENV)/.test $(NODE_MODULES)   ## the page's own tests, then the page in Debian's Chromium
+	cd frontend && npm run --silent types && npm test --silent && node --test e2e/*.mjs
+
+screenshots: $(VENV)/.test $(NODE_MODULES)   ## the pictures of the page that the docs show (needs Chromium)
+	cd frontend && node screenshots.mjs
+
+bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watching costs a run, a run of 100,000 records opened
+	$(BIN)/python benchmarks/viewer.py --rounds $(or $(RUNS),5)
+
 clean:   ## forget the environment and caches
-	rm -rf $(VENV) $(BENCH) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) $(BENCH) frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

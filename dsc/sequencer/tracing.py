@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
+from dsc.engine.state import FrameState
 from dsc.engine.steps import (
     Cancel,
     Microstep,
@@ -30,6 +32,7 @@ class StepTracer:
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
         self._known_plots: set[str] = set()
+        self._frames: dict[str, FrameState] = {}
 
     def world(self, knowledge: KnowledgeBase) -> None:
         """All that is known at the start; what follows are changes of it. Left out while nobody listens."""
@@ -64,6 +67,7 @@ class StepTracer:
                 }
                 for micro in step.microsteps
             ],
+            **self._changed_variables(step),
         )
         self._trace.cause = seq
         for taken in (taken for micro in step.microsteps for taken in micro.taken if taken.rule):
@@ -115,6 +119,15 @@ class StepTracer:
         assert isinstance(output, Cancel | StartTimer | SendLater | Revoke)  # noqa: S101
         return None
 
+    def _changed_variables(self, step: Step) -> dict[str, Any]:
+        """Parameters and variables that are new or have another value than before, by path of the plot's holder."""
+        if not self._trace.heard:
+            return {}
+        before, self._frames = self._frames, dict(_frames(step.state.root, ""))
+        changed = {path: _news(before.get(path), frame) for path, frame in self._frames.items()}
+        said = {path: values for path, values in changed.items() if values}
+        return {"variables": said} if said else {}
+
     def _plots(self, step: Step) -> None:
         for bound in (bound for micro in step.microsteps for bound in micro.bound):
             digest = bound.plot.digest
@@ -127,6 +140,26 @@ def _bound(micro: Microstep) -> dict[str, Any]:
     """Which plots became the content of which states; the texts of the plots are records of their own."""
     bound = [{"state": b.state, "plot": b.plot.name, "hash": b.plot.digest} for b in micro.bound]
     return {"bound": bound} if bound else {}
+
+
+def _frames(frame: FrameState | None, path: str) -> Iterator[tuple[str, FrameState]]:
+    """The plots that run, each with the path of the state that holds it."""
+    if frame is not None:
+        yield path, frame
+        for name, child in frame.children.items():
+            yield from _frames(child, f"{path}/{name}" if path else name)
+
+
+def _news(before: FrameState | None, frame: FrameState) -> dict[str, Any]:
+    """The values of a plot that were not there before; another instance of it begins anew."""
+    known = before.variables if before is not None and before.serial == frame.serial else {}
+    if known is frame.variables:
+        return {}
+    return {
+        name: _told_once(value)
+        for name, value in frame.variables.items()
+        if name not in known or known[name] != value
+    }
 
 
 def _told_once(value: Any) -> Any:

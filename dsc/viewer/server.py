@@ -51,7 +51,12 @@ class Viewer:
         self.port: int = self._socket.getsockname()[1]
         self.token = secrets.token_urlsafe(24)
         config = uvicorn.Config(
-            self.application(), lifespan="off", ws_max_size=1 << 16, log_level="error", access_log=False
+            self.application(),
+            lifespan="off",
+            ws_max_size=1 << 16,
+            ws_per_message_deflate=False,  # nothing leaves this machine, and a run would pay for it
+            log_level="error",
+            access_log=False,
         )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]}, daemon=True)

@@ -142,3 +142,24 @@ def test_lines_can_be_read_by_any_json_reader():
     heard, _ = traced()
     for record in heard:
         assert json.loads(record.to_line())["seq"] == record.seq
+
+
+def test_a_step_tells_new_and_changed_variables_by_the_state_that_holds_their_plot():
+    outer = """
+        plot: p
+        parameters: {who: {type: text}}
+        variables: {n: {type: number, initial: 0}}
+        states:
+          a: {on: {go: {to: h, assign: {n: (+ ?n 1)}}}}
+          h: {use: q, with: {m: ?n}, on: {again: {to: h}, still: {do: [{assign: {n: ?n}}]}}}
+    """
+    library = Library([plot(outer), plot("{plot: q, parameters: {m: {type: number}}, states: {s: {}, e: {final: true}}}")])
+    trace, heard = Trace(lambda: 0.0), []
+    trace.listen(heard.append)
+    tracer, machine = StepTracer(trace), Machine(library)
+    situation = KnowledgeSituation(KnowledgeBase(Schema.parse("(define (domain d))")), library)
+    tracer.step(machine.start("p", {"who": "me"}, situation))
+    for name in ("go", "still", "again"):
+        tracer.step(machine.send(Event(name), situation))
+    told = [record.data.get("variables") for record in heard if record.type == "step"]
+    assert told == [{"": {"who": "me", "n": 0}}, {"": {"n": 1}, "h": {"m": 1}}, None, {"h": {"m": 1}}]

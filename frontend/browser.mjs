@@ -1,0 +1,73 @@
+// What screenshots, browser tests and the bench share: a program that serves a page, and Debian's Chromium to look at it.
+import { spawn } from "node:child_process";
+import { existsSync } from "node:fs";
+import { createInterface } from "node:readline";
+import { join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { chromium } from "playwright-core";
+
+export const ROOT = fileURLToPath(new URL("..", import.meta.url));
+const DSC = process.env.DSC ?? join(ROOT, ".venv", "bin", "dsc");
+const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
+const FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+  "--disable-background-networking", "--disable-component-update", "--disable-sync"];
+
+/** Start `dsc` with these arguments; answers the address that it prints, and `stop`. */
+export async function serve(...args) {
+  const program = spawn(DSC, args, { stdio: ["ignore", "pipe", "inherit"] });
+  const lines = createInterface({ input: program.stdout });
+  const ended = new Promise((done) => program.once("exit", done));
+  for await (const line of lines) {
+    if (!line.startsWith("http://")) continue;
+    lines.on("line", () => {}); // what else it prints must not fill the pipe
+    return { url: line, stop: () => stop(program, ended) };
+  }
+  throw new Error(`dsc ${args.join(" ")} ended without an address`);
+}
+
+/** As Ctrl-C does; what does not end by itself is ended. */
+async function stop(program, ended) {
+  program.kill("SIGINT");
+  const patience = setTimeout(() => program.kill("SIGKILL"), 5000);
+  await ended;
+  clearTimeout(patience);
+}
+
+/** Record a run of the clean-up table as a trace. */
+export function record(path, ...args) {
+  const program = spawn(DSC, ["run", "clean-up-table", "--trace", path, "--json", ...args], { stdio: "ignore" });
+  return new Promise((done) => program.once("exit", done));
+}
+
+export async function browse() {
+  if (!existsSync(CHROMIUM)) throw new Error(`no browser at ${CHROMIUM}: apt-get install chromium`);
+  return chromium.launch({ executablePath: CHROMIUM, args: FLAGS });
+}
+
+/** A page at that address, with what it complains about collected. */
+export async function open(browser, url, options = {}) {
+  const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, reducedMotion: "reduce", ...options });
+  const page = await context.newPage();
+  const complaints = [];
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  await page.goto(url);
+  return { page, complaints, context };
+}
+
+/** Until as many records are there. */
+export async function loaded(page, count) {
+  await page.waitForFunction((wanted) => Number(document.querySelector("input[type=range]")?.max ?? 0) >= wanted, count);
+}
+
+/** Show the moment after a record. */
+export async function goTo(page, seq) {
+  await page.getByLabel("Moment", { exact: true }).fill(String(seq));
+  await settled(page);
+}
+
+/** Until the chart that belongs to the moment is drawn and nothing moves. */
+export async function settled(page) {
+  await page.waitForSelector(".react-flow__node .state.active");
+  await page.waitForTimeout(700);
+}

@@ -1,0 +1,195 @@
+// A recorded run in the browser: what the page shows is what the records say, at any moment.
+import assert from "node:assert/strict";
+import { mkdtempSync, readFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { browse, loaded, open, record, serve } from "../browser.mjs";
+
+let program, browser, page, complaints, records;
+
+before(async () => {
+  const trace = join(mkdtempSync(join(tmpdir(), "dsc-")), "run.jsonl");
+  await record(trace, "--seed", "7", "--faults", "0.2");
+  records = readFileSync(trace, "utf8").trim().split("\n").slice(1).map((line) => JSON.parse(line));
+  program = await serve("view", trace, "--no-open");
+  browser = await browse();
+  ({ page, complaints } = await open(browser, program.url));
+  await loaded(page, records.length);
+});
+
+after(async () => {
+  await browser?.close();
+  await program?.stop();
+});
+
+const first = (is, from = 0) => records.find((rec) => rec.seq > from && is(rec));
+const moment = () => page.getByLabel("Moment", { exact: true });
+const goTo = (seq) => moment().fill(String(seq));
+const shown = async () => Number(await moment().inputValue());
+const active = (path) => page.locator(`.react-flow__node[data-id="${path}"] > .state.active`);
+
+/** The configuration after a record, worked out here from the steps alone. */
+function configuration(seq) {
+  const paths = new Set();
+  for (const rec of records.slice(0, seq)) {
+    for (const micro of rec.type === "step" ? rec.microsteps : []) {
+      micro.exited.forEach((path) => paths.delete(path));
+      micro.entered.forEach((path) => paths.add(path));
+    }
+  }
+  return paths;
+}
+
+test("the chart shows the change of the active state, and the transition taken in the trail", async () => {
+  const step = first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_2")));
+  await goTo(step.seq - 1);
+  await active("clear/execute/step_1").waitFor();
+  assert.equal(await active("clear/execute/step_2").count(), 0);
+  await goTo(step.seq);
+  await active("clear/execute/step_2").waitFor();
+  assert.equal(await active("clear/execute/step_1").count(), 0);
+  const taken = page.locator('[data-way="clear/execute/step_1>step_2"].taken');
+  await taken.waitFor({ state: "attached" });
+  assert.equal(await taken.evaluate((way) => way.style.getPropertyValue("--age")), "0");
+});
+
+test("all states that are marked as active are, and the outermost one is marked", async () => {
+  for (const rec of records.filter((one) => one.type === "step").filter((_, i) => i % 25 === 3)) {
+    await goTo(rec.seq);
+    const paths = configuration(rec.seq);
+    await active([...paths][0]).waitFor();
+    const marked = await page.locator(".react-flow__node:has(> .state.active)").evaluateAll((nodes) => nodes.map((node) => node.dataset.id));
+    for (const path of marked) assert.ok(paths.has(path), `${path} after record ${rec.seq}`);
+  }
+});
+
+test("a decision record shows each candidate and the leaf that decided", async () => {
+  const decision = first((rec) => rec.type === "decision" && rec.chosen === "pick_up_from_side");
+  await goTo(decision.seq - 1);
+  await page.getByRole("button", { name: "Next decision" }).click();
+  const why = page.getByLabel("Decision", { exact: true });
+  await why.getByLabel("pick_up_from_side: chosen").waitFor();
+  const rejected = why.getByLabel("pick_up_from_above: rejected");
+  assert.match(await rejected.locator(".leaf.false.decides").innerText(), /\(= \(failures \w+\) 0\)/);
+});
+
+test("a state tells its parameters, and its decision", async () => {
+  const decision = first((rec) => rec.type === "decision" && rec.chosen === "stack");
+  await goTo(decision.seq);
+  await page.getByLabel("Decision", { exact: true }).getByRole("button", { name: decision.state }).click();
+  const state = page.getByLabel("State", { exact: true });
+  await state.getByRole("row", { name: `?item ${decision.arguments.item}` }).first().waitFor();
+  await state.getByLabel("stack: chosen").waitFor();
+  await page.keyboard.press("Escape");
+});
+
+test("a click in the chart selects a state; it is collapsed, opened and zoomed into", async () => {
+  await goTo(first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("look_at_table/look"))).seq);
+  const node = (path) => page.locator(`.react-flow__node[data-id="${path}"]`);
+  await node("look_at_table/look").waitFor();
+  await page.getByRole("button", { name: /^look_at_table, / }).click();
+  await page.getByLabel("State", { exact: true }).getByText("Inside: search").waitFor();
+  await page.getByRole("button", { name: "Collapse look_at_table" }).click();
+  await node("look_at_table/look").waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "Expand look_at_table" }).click();
+  await node("look_at_table/look").waitFor();
+  await page.getByRole("button", { name: "Zoom into look_at_table" }).click();
+  await node("work").waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "Chart", exact: true }).click();
+  await node("work").waitFor();
+  await page.keyboard.press("Escape");
+});
+
+test("the plan is there before and after a replan, with what broke it and who did", async () => {
+  const broken = first((rec) => rec.type === "plan.broken");
+  const old = records.findLast((rec) => rec.seq < broken.seq && rec.type === "plan.found");
+  const found = first((rec) => rec.type === "plan.found", broken.seq);
+  await goTo(broken.seq - 1);
+  await page.getByLabel(old.plot, { exact: false }).first().waitFor();
+  assert.equal(await page.getByLabel(`${old.plot} given up`).count(), 0);
+  await goTo(first((rec) => rec.type === "step", found.seq).seq);
+  await page.getByLabel(`${old.plot} given up`).locator(".head").click();
+  assert.equal(await page.locator(".one-plan").first().locator("ol li").count(), found.steps.length);
+  assert.match(await page.locator(".one-plan").first().innerText(), new RegExp(found.plot));
+  const why = page.getByLabel("Broken plan");
+  assert.ok((await why.innerText()).includes(broken.reason));
+  await why.getByRole("button", { name: /knowledge/ }).waitFor();
+  await page.keyboard.press("Escape");
+});
+
+test("a step of the plan tells what it changed", async () => {
+  const step = first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_2")));
+  await goTo(step.seq);
+  await page.getByLabel(/^1 \(pick-up .*: done$/).click();
+  await page.getByLabel("Step of the plan").getByText(/\+ \(holding/).waitFor();
+  await page.keyboard.press("Escape");
+});
+
+test("the scrubber goes back and shows the past as it was", async () => {
+  const all = async () => (await page.locator(".world, .plan, .clock").allInnerTexts()).join("\n");
+  const places = async () => page.locator(".thing").evaluateAll((things) => things.map((thing) => thing.ariaLabel + thing.style.transform));
+  await goTo(200);
+  const [past, there] = [await all(), await places()];
+  await goTo(records.length);
+  assert.notEqual(await all(), past);
+  assert.notDeepEqual(await places(), there);
+  await goTo(200);
+  assert.equal(await all(), past);
+  assert.deepEqual(await places(), there);
+});
+
+test("a question is answered as of the moment", async () => {
+  await page.getByRole("tab", { name: "Knowledge" }).click();
+  await page.getByLabel("Filter or ask").fill("(holding ?what)");
+  const picked = first((rec) => rec.type === "knowledge" && rec.added?.some(([name]) => name === "holding"));
+  await goTo(picked.seq);
+  await page.getByLabel("Answers").getByText("1 answers").waitFor();
+  await page.getByLabel("Answers").getByText(picked.added.find(([name]) => name === "holding")[1], { exact: true }).waitFor();
+  await goTo(picked.seq - 1);
+  await page.getByLabel("Answers").getByText("0 answers").waitFor();
+  assert.deepEqual(complaints, []);
+  await page.getByLabel("Filter or ask").fill("(holdin ?what)");
+  await page.getByRole("alert").getByText("holding").waitFor();
+  complaints.length = 0; // a refused question is a 400, which the browser reports
+  await page.getByLabel("Filter or ask").fill("");
+  await page.getByRole("tab", { name: "Why" }).click();
+});
+
+test("everything is moved by the keyboard", async () => {
+  await page.getByRole("tab", { name: "Why" }).focus();
+  await page.keyboard.press("Home");
+  assert.equal(await shown(), 0);
+  await page.keyboard.press("]");
+  assert.equal(await shown(), first((rec) => ["rule", "plan.broken", "plan.none"].includes(rec.type)).seq);
+  await page.keyboard.press("ArrowRight");
+  const step = await shown();
+  assert.equal(records[step - 1].type, "step");
+  await page.keyboard.press("ArrowLeft");
+  assert.ok((await shown()) < step);
+  await page.keyboard.press("End");
+  assert.equal(await shown(), records.length);
+  await page.keyboard.press("Home");
+  await page.getByLabel("Moment", { exact: true }).focus();
+  await page.keyboard.press(" ");
+  await page.getByRole("button", { name: "Pause" }).waitFor();
+  await page.waitForFunction(() => Number(document.querySelector("input[type=range]").value) > 20);
+  await page.keyboard.press(" ");
+  await page.getByRole("button", { name: "Play" }).waitFor();
+});
+
+test("every control has a name, and the page asks nobody else for anything", async () => {
+  const nameless = await page.locator("button, input, select, [role=button]").evaluateAll((all) =>
+    all.filter((one) => !(one.ariaLabel || one.title || one.textContent.trim() || one.labels?.length)).map((one) => one.outerHTML));
+  assert.deepEqual(nameless, []);
+  const asked = await page.evaluate(() => performance.getEntriesByType("resource").map((entry) => new URL(entry.name).host));
+  assert.deepEqual([...new Set(asked)], [new URL(program.url).host]);
+  assert.deepEqual(complaints, []);
+});
+
+test("a wrong token is refused", async () => {
+  const other = await browser.newContext();
+  const answer = await (await other.newPage()).goto(program.url.replace(/token=.*/, "token=wrong"));
+  assert.equal(answer.status(), 403);
+  await other.close();
+});

@@ -1,0 +1,61 @@
+// The pictures of the page that the docs show: `make screenshots`. Whole pages where it is about the whole, else a pane.
+import { mkdtempSync, readFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { browse, goTo, loaded, open, record, ROOT, serve, settled } from "./browser.mjs";
+
+const PICTURES = process.env.PICTURES ?? join(ROOT, "docs", "pictures");
+const trace = process.env.TRACE ?? join(mkdtempSync(join(tmpdir(), "dsc-")), "run.jsonl");
+if (!process.env.TRACE) await record(trace, "--seed", "7", "--faults", "0.2");
+const records = readFileSync(trace, "utf8").trim().split("\n").slice(1).map((line) => JSON.parse(line));
+const where = (is, from = 0) => records.find((rec) => rec.seq > from && is(rec)).seq;
+const broken = where((rec) => rec.type === "plan.broken");
+const replanned = where((rec) => rec.type === "step", where((rec) => rec.type === "plan.found", broken));
+
+const program = await serve("view", trace, "--no-open");
+const browser = await browse();
+
+async function looked(colorScheme, shoot) {
+  const { page, context } = await open(browser, program.url, { colorScheme });
+  await loaded(page, records.length);
+  await shoot(page, (name, pane) => (pane ? page.locator(pane) : page).screenshot({ path: join(PICTURES, `viewer_${name}.png`) }));
+  await context.close();
+}
+
+try {
+  await looked("light", async (page, shoot) => {
+    await goTo(page, where((rec) => rec.type === "rule") - 3);
+    await page.getByLabel("Moment", { exact: true }).blur();
+    await shoot("plan");
+    await goTo(page, where((rec) => rec.type === "decision" && rec.chosen === "pick_up_from_side") - 1);
+    await page.getByRole("button", { name: "Next decision" }).click();
+    await settled(page);
+    await shoot("decision", ".side");
+    await goTo(page, replanned);
+    await page.locator(".one-plan.past .head").first().press("Enter");
+    await settled(page);
+    await shoot("replan", ".side");
+    await goTo(page, where((rec) => rec.type === "step", records.findLast((rec) => rec.type === "plan.found").seq));
+    await page.keyboard.press("Escape");
+    await page.getByLabel("Moment", { exact: true }).blur();
+    await shoot("plans", ".pane.plan");
+    await goTo(page, replanned);
+    await page.getByRole("tab", { name: "Knowledge" }).click();
+    await page.getByLabel("Filter or ask").fill("(and (lies-at ?i table) (fits ?i cup2))");
+    await page.getByLabel("Answers").waitFor();
+    await shoot("query", ".side");
+    await page.getByLabel("Filter or ask").fill("");
+    await page.locator(".thing.cup").first().press("Enter");
+    await settled(page);
+    await shoot("thing", ".side");
+  });
+  await looked("dark", async (page, shoot) => {
+    await goTo(page, where((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("look_at_table/look"))));
+    await page.getByRole("button", { name: /^look_at_table, / }).click();
+    await settled(page);
+    await shoot("designed");
+  });
+} finally {
+  await browser.close();
+  await program.stop();
+}

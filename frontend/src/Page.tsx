@@ -1,0 +1,47 @@
+/** The panes, and the time line under all of them. */
+
+import { useEffect, useState } from "react";
+import { Chart } from "./panes/Chart";
+import { Controls } from "./panes/Controls";
+import { Header } from "./panes/Header";
+import { Knowledge } from "./panes/Knowledge";
+import { PlanPane } from "./panes/PlanPane";
+import { Timeline } from "./panes/Timeline";
+import { Why } from "./panes/Why";
+import { World } from "./panes/World";
+import { useKeys } from "./keys";
+import { useControl, useSelection } from "./session";
+
+const TABS = ["Why", "Knowledge"] as const;
+
+export function Page() {
+  const selection = useSelection();
+  const control = useControl();
+  const [tab, setTab] = useState<(typeof TABS)[number] | "Control">("Why");
+  useKeys();
+  useEffect(() => {
+    if (selection) setTab(selection.kind === "thing" ? "Knowledge" : "Why");
+  }, [selection]);
+  const tabs = control ? ([...TABS, "Control"] as const) : TABS;
+  return (
+    <div className="page">
+      <Header />
+      <World />
+      <PlanPane />
+      <Chart />
+      <section className="pane side" aria-label={tab}>
+        <div className="tabs" role="tablist" aria-label="Side">
+          {tabs.map((name) => (
+            <button key={name} role="tab" aria-selected={tab === name} onClick={() => setTab(name)}>
+              {name}
+            </button>
+          ))}
+        </div>
+        {tab === "Why" && <Why />}
+        {tab === "Knowledge" && <Knowledge />}
+        {tab === "Control" && <Controls />}
+      </section>
+      <Timeline />
+    </div>
+  );
+}

@@ -1,0 +1,69 @@
+/** Where the chart is looked at: as much as can be read around what is active, and that always. */
+
+import { useReactFlow, useStore } from "@xyflow/react";
+import { useEffect, useRef } from "react";
+import { innermost } from "./drawn";
+import type { Box, Layout } from "./layout";
+import type { Visible } from "./visible";
+
+/** Less is too small to read; what does not fit is followed at the other scale. */
+const READABLE = 0.6;
+const CLOSE = 0.8;
+const MARGIN = 40;
+
+export function useCamera(shown: Visible, layout: Layout | null, follow: boolean): void {
+  const flow = useReactFlow();
+  const width = useStore((state) => state.width);
+  const height = useStore((state) => state.height);
+  const fitted = useRef("");
+  const active = innermost(shown).join("\n");
+  useEffect(() => {
+    if (!follow || !layout || !width || !height) return;
+    const here = union(active.split("\n").flatMap((id) => layout.boxes.get(id) ?? []));
+    const whole = union([...layout.boxes.values()]);
+    if (!whole || !here) return;
+    const fits = (box: Box) => Math.min(width / box.width, height / box.height) > READABLE;
+    const frame = [whole, ...around(shown, layout, active.split("\n")[0]!)].find((box) => fits(box) && holds(box, here));
+    if (frame) {
+      const name = JSON.stringify([frame, width, height]);
+      if (fitted.current !== name) void flow.fitBounds(frame, { padding: 0.03, duration: 250 });
+      fitted.current = name;
+      return;
+    }
+    const { x, y, zoom } = flow.getViewport();
+    const pane = { x: (MARGIN - x) / zoom, y: (MARGIN - y) / zoom, width: (width - 2 * MARGIN) / zoom, height: (height - 2 * MARGIN) / zoom };
+    if (zoom < READABLE || fitted.current || !holds(pane, here)) {
+      const near = fitted.current || zoom < READABLE ? CLOSE : zoom;
+      void flow.setCenter(here.x + here.width / 2, here.y + here.height / 2, { zoom: near, duration: 250 });
+    }
+    fitted.current = "";
+    // `shown` changes with every record; the picture changes with the layout.
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [flow, layout, active, follow, width, height]);
+}
+
+/** The boxes around a state, the outermost first. */
+function around({ nodes }: Visible, layout: Layout, id: string): Box[] {
+  const parents = new Map(nodes.map((node) => [node.id, node.parent]));
+  const found: Box[] = [];
+  for (let at = parents.get(id) ?? null; at !== null; at = parents.get(at) ?? null) {
+    const box = layout.boxes.get(at);
+    if (box) found.unshift(box);
+  }
+  return found;
+}
+
+function holds(box: Box, inner: Box): boolean {
+  return inner.x >= box.x && inner.y >= box.y && inner.x + inner.width <= box.x + box.width && inner.y + inner.height <= box.y + box.height;
+}
+
+function union(boxes: readonly Box[]): Box | null {
+  if (boxes.length === 0) return null;
+  const x = Math.min(...boxes.map((box) => box.x));
+  const y = Math.min(...boxes.map((box) => box.y));
+  return {
+    x, y,
+    width: Math.max(...boxes.map((box) => box.x + box.width)) - x,
+    height: Math.max(...boxes.map((box) => box.y + box.height)) - y,
+  };
+}

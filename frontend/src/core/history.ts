@@ -1,0 +1,120 @@
+/** All records there are, and the moment after any of them, in a few milliseconds either way. */
+
+import { advance, beginning, copyOf, type Moment } from "./moment";
+import type { PlotForm } from "./plots";
+import type { EndRec, Rec } from "./records";
+
+/** Records that are replayed at most to get to a moment. */
+export const CHECKPOINT_EVERY = 500;
+
+export type Mark = "failure" | "plan" | "decision" | "step" | "knowledge" | "scene";
+
+const MARKS: Readonly<Record<string, Mark>> = {
+  rule: "failure",
+  "plan.broken": "failure",
+  "plan.none": "failure",
+  "plan.gave_up": "failure",
+  "plan.found": "plan",
+  "plan.replaced": "plan",
+  "plan.resumed": "plan",
+  decision: "decision",
+  step: "step",
+  knowledge: "knowledge",
+  scene: "scene",
+};
+
+export class History {
+  readonly plots = new Map<string, PlotForm>();
+  readonly marks: Readonly<Record<Mark, number[]>> = {
+    failure: [], plan: [], decision: [], step: [], knowledge: [], scene: [],
+  };
+  private readonly records: Rec[] = [];
+  private readonly checkpoints: Moment[] = [beginning()];
+  private readonly tip = beginning();
+  private kept = beginning();
+
+  /** Number of the last record. */
+  get last(): number {
+    return this.records.length;
+  }
+
+  /** Take in records that follow those that are there; what is there already is passed over. */
+  append(from: number, records: readonly Rec[]): void {
+    for (const rec of records.slice(Math.max(0, this.last + 1 - from))) {
+      if (rec.seq !== this.last + 1) return;
+      this.records.push(rec);
+      this.note(rec);
+      advance(this.tip, rec, this.plots);
+      if (rec.seq % CHECKPOINT_EVERY === 0) this.checkpoints.push(copyOf(this.tip));
+    }
+  }
+
+  record(seq: number): Rec | undefined {
+    return this.records[seq - 1];
+  }
+
+  /** The moment after the record; nobody else holds it. */
+  at(seq: number): Moment {
+    const wanted = Math.max(0, Math.min(seq, this.last));
+    const checkpoint = this.checkpoints[Math.floor(wanted / CHECKPOINT_EVERY)]!;
+    const ahead = this.kept.seq <= wanted && this.kept.seq >= checkpoint.seq;
+    const moment = ahead ? this.kept : copyOf(checkpoint);
+    for (let next = moment.seq; next < wanted; next++) advance(moment, this.records[next]!, this.plots);
+    this.kept = moment;
+    return copyOf(moment);
+  }
+
+  /** The next marked record after `seq` (`way` 1) or before it (-1). */
+  beside(seq: number, mark: Mark, way: 1 | -1): number | undefined {
+    const marks = this.marks[mark];
+    const place = firstAfter(marks, way > 0 ? seq : seq - 1);
+    return way > 0 ? marks[place] : marks[place - 1];
+  }
+
+  /** The last marked records up to `seq`, the latest first. */
+  before(seq: number, mark: Mark, most: number): Rec[] {
+    const end = firstAfter(this.marks[mark], seq);
+    const found = this.marks[mark].slice(Math.max(0, end - most), end).reverse();
+    return found.map((one) => this.record(one)!);
+  }
+
+  /** The last record at or before a time. */
+  seqAt(t: number): number {
+    let [low, high] = [0, this.last];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.records[middle]!.t <= t) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  /** What led to a record, itself first. */
+  causes(seq: number): Rec[] {
+    const found: Rec[] = [];
+    for (let rec = this.record(seq); rec && found.length < 12; rec = rec.cause === null ? undefined : this.record(rec.cause)) {
+      found.push(rec);
+    }
+    return found;
+  }
+
+  private note(rec: Rec): void {
+    if (rec.type === "plot") {
+      const { hash, plot } = rec as Rec & { hash: string; plot: PlotForm };
+      this.plots.set(hash, plot);
+    }
+    const mark = MARKS[rec.type] ?? (rec.type === "end" && (rec as EndRec).problem ? "failure" : undefined);
+    if (mark) this.marks[mark].push(rec.seq);
+  }
+}
+
+/** Place of the first number greater than `limit` in a sorted list. */
+export function firstAfter(numbers: readonly number[], limit: number): number {
+  let [low, high] = [0, numbers.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (numbers[middle]! <= limit) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}

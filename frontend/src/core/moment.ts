@@ -1,0 +1,199 @@
+/** How things were after a record: a pure function of the records up to it. */
+
+import { newPlan, withEnd, withStep, type Plan } from "./plans";
+import { splitPath, stepsOf, stepTexts, type PlotForm } from "./plots";
+import {
+  written,
+  type ActionRec,
+  type DecisionRec,
+  type EventRec,
+  type Fact,
+  type KnowledgeRec,
+  type Micro,
+  type Named,
+  type PlanFoundRec,
+  type Rec,
+  type SceneRec,
+  type StepRec,
+  type Taken,
+  type Value,
+  type WorldRec,
+} from "./records";
+
+export const TRAIL = 10;
+
+export interface Since {
+  readonly seq: number;
+  readonly t: number;
+}
+
+export interface Trace extends Taken, Since {}
+
+export interface Moment {
+  seq: number;
+  t: number;
+  /** Path of an active state -> when it was entered. */
+  active: Map<string, Since>;
+  /** Path of a state -> hash of the plot that is its content; "" is the outermost plot. */
+  bound: Map<string, string>;
+  /** Path of a plot's holder -> its parameters and variables. */
+  variables: Map<string, Named>;
+  /** The transitions taken last, the latest first. */
+  trail: readonly Trace[];
+  /** Path of a dynamic state -> its last decision record. */
+  decisions: Map<string, number>;
+  /** Skills at work, by the seq of the record that started them. */
+  working: Map<number, ActionRec>;
+  plans: Plan[];
+  /** Path of a state -> place in `plans` of the plan that is carried out in it. */
+  running: Map<string, number>;
+  /** The record that may turn out to be why the plan ends. */
+  trouble: number | null;
+  version: number;
+  nodes: Map<string, string>;
+  facts: Map<string, Fact>;
+  values: Map<string, readonly Value[]>;
+  scene: SceneRec | null;
+  end: number | null;
+}
+
+export type Plots = ReadonlyMap<string, PlotForm>;
+
+export function beginning(): Moment {
+  return {
+    seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [], decisions: new Map(),
+    working: new Map(), plans: [], running: new Map(), trouble: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
+    scene: null, end: null,
+  };
+}
+
+/** An independent moment that says the same. */
+export function copyOf(moment: Moment): Moment {
+  return {
+    ...moment, active: new Map(moment.active), bound: new Map(moment.bound), variables: new Map(moment.variables),
+    decisions: new Map(moment.decisions), working: new Map(moment.working), plans: [...moment.plans], running: new Map(moment.running),
+    nodes: new Map(moment.nodes), facts: new Map(moment.facts), values: new Map(moment.values),
+  };
+}
+
+/** Turn the moment before a record into the one after it. */
+export function advance(moment: Moment, rec: Rec, plots: Plots): void {
+  moment.seq = rec.seq;
+  moment.t = rec.t;
+  const change = CHANGES[rec.type];
+  if (change) change(moment, rec as never, plots);
+}
+
+const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots) => void>> = {
+  step: stepped,
+  decision: (moment, rec: DecisionRec) => void moment.decisions.set(rec.state, rec.seq),
+  world: worldBegins,
+  knowledge: knowledgeChanged,
+  action: (moment, rec: ActionRec) => void (rec.action === "start" && moment.working.set(rec.seq, rec)),
+  event: (moment, rec: EventRec) => void (rec.cause !== null && moment.working.delete(rec.cause)),
+  scene: (moment, rec: SceneRec) => void (moment.scene = rec),
+  rule: (moment, rec: Rec) => void (moment.trouble = rec.seq),
+  end: (moment, rec: Rec) => void (moment.end = rec.seq),
+  "plan.broken": (moment, rec: Rec) => void (moment.trouble = rec.seq),
+  "plan.found": planFound,
+  "plan.skipped": stepsSkipped,
+};
+
+function stepped(moment: Moment, rec: StepRec, plots: Plots): void {
+  for (const micro of rec.microsteps) microstepped(moment, rec, micro, plots);
+  const taken = rec.microsteps.flatMap((micro) => micro.taken.map((one) => ({ ...one, seq: rec.seq, t: rec.t })));
+  if (taken.length) moment.trail = [...taken.reverse(), ...moment.trail].slice(0, TRAIL);
+  for (const [path, said] of Object.entries(rec.variables ?? {})) {
+    moment.variables.set(path, { ...moment.variables.get(path), ...said });
+  }
+}
+
+function microstepped(moment: Moment, rec: StepRec, micro: Micro, plots: Plots): void {
+  for (const path of micro.exited) {
+    planStepLeft(moment, rec, path, micro.taken);
+    moment.active.delete(path);
+    if (moment.bound.delete(path)) planLeft(moment, rec, path);
+    moment.variables.delete(path);
+    moment.decisions.delete(path);
+  }
+  for (const { state, plot, hash } of micro.bound ?? []) {
+    moment.bound.set(state, hash);
+    const form = plots.get(hash);
+    if (form?.generated) planBound(moment, rec, state, plot, form);
+  }
+  for (const path of micro.entered) {
+    moment.active.set(path, { seq: rec.seq, t: rec.t });
+    changeStep(moment, path, (step) => {
+      moment.trouble = null; // whatever it was, it was got over
+      return { state: "running", tries: step.tries + 1, since: step.since ?? rec.t, until: null };
+    });
+  }
+}
+
+function planFound(moment: Moment, rec: PlanFoundRec): void {
+  moment.plans.push(newPlan(rec.plot, rec.seq, rec.steps, rec.links, rec.engine));
+  moment.trouble = null;
+}
+
+/** A generated plot begins to run: the plan of its name, or one that nobody announced. */
+function planBound(moment: Moment, rec: Rec, at: string, name: string, form: PlotForm): void {
+  let number = moment.plans.findLastIndex((plan) => plan.name === name && plan.ended === null);
+  if (number < 0) number = moment.plans.push(newPlan(name, rec.seq, stepTexts(form))) - 1;
+  const plan = moment.plans[number]!;
+  const texts = plan.steps.map((step) => step.text);
+  moment.plans[number] = { ...plan, at, names: stepsOf(form, texts) };
+  moment.running.set(at, number);
+}
+
+function planLeft(moment: Moment, rec: Rec, path: string): void {
+  const number = moment.running.get(path);
+  if (number === undefined) return;
+  moment.running.delete(path);
+  const plan = moment.plans[number]!;
+  moment.plans[number] = withEnd(plan, moment.trouble !== null && moment.trouble > plan.seq ? moment.trouble : rec.seq, rec.t);
+}
+
+function planStepLeft(moment: Moment, rec: Rec, path: string, taken: readonly Taken[]): void {
+  const way = taken.find((one) => one.from === path);
+  changeStep(moment, path, () => {
+    const state = way === undefined ? "stopped" : way.on === "done" ? "done" : "failed";
+    return { state, until: rec.t };
+  });
+}
+
+function changeStep(moment: Moment, path: string, change: (step: Plan["steps"][number]) => Partial<Plan["steps"][number]>): void {
+  const [holder, name] = splitPath(path);
+  const number = moment.running.get(holder);
+  if (number === undefined) return;
+  const plan = moment.plans[number]!;
+  const step = plan.names.get(name);
+  if (step === undefined) return;
+  moment.plans[number] = withStep(plan, step, change(plan.steps[step]!));
+}
+
+function stepsSkipped(moment: Moment, rec: Rec & { plot: string; steps: readonly string[] }): void {
+  const number = moment.plans.findLastIndex((plan) => plan.name === rec.plot);
+  let plan = moment.plans[number];
+  if (plan === undefined) return;
+  plan.steps.forEach((step, i) => {
+    if (step.state === "waiting" && rec.steps.includes(step.text)) plan = withStep(plan!, i, { state: "skipped" });
+  });
+  moment.plans[number] = plan;
+}
+
+function worldBegins(moment: Moment, rec: WorldRec): void {
+  moment.version = rec.version;
+  moment.nodes = new Map(Object.entries(rec.nodes));
+  moment.facts = new Map(rec.facts.map((fact) => [written(fact), fact]));
+  moment.values = new Map(rec.values.map((value) => [written(value.slice(0, -1)), value]));
+}
+
+/** Removals come first. */
+function knowledgeChanged(moment: Moment, rec: KnowledgeRec): void {
+  moment.version = rec.version;
+  for (const node of rec.removed_nodes ?? []) moment.nodes.delete(node);
+  for (const fact of rec.removed ?? []) moment.facts.delete(written(fact));
+  for (const [node, type] of Object.entries(rec.nodes ?? {})) moment.nodes.set(node, type);
+  for (const fact of rec.added ?? []) moment.facts.set(written(fact), fact);
+  for (const value of rec.values ?? []) moment.values.set(written(value.slice(0, -1)), value);
+}

@@ -1,0 +1,138 @@
+/** The records of a trace, as `dsc/viewer/PROTOCOL.md` names them. */
+
+export interface Rec {
+  readonly seq: number;
+  readonly t: number;
+  readonly type: string;
+  readonly cause: number | null;
+}
+
+export type Value = string | number | boolean | null | readonly Value[] | { readonly [name: string]: Value };
+export type Named = Readonly<Record<string, Value>>;
+/** Predicate, then arguments. */
+export type Fact = readonly (string | number)[];
+
+export interface Taken {
+  readonly from: string;
+  readonly on: string;
+  readonly to: string | null;
+}
+
+export interface Micro {
+  readonly event: string | null;
+  readonly taken: readonly Taken[];
+  readonly exited: readonly string[];
+  readonly entered: readonly string[];
+  readonly bound?: readonly { readonly state: string; readonly plot: string; readonly hash: string }[];
+}
+
+export interface StepRec extends Rec {
+  readonly microsteps: readonly Micro[];
+  readonly variables?: Readonly<Record<string, Named>>;
+}
+
+export interface Explanation {
+  readonly text?: string;
+  readonly truth?: boolean | null;
+  readonly detail?: string | null;
+  readonly decider?: boolean;
+  readonly children?: readonly Explanation[];
+  readonly parts?: readonly Explanation[];
+}
+
+export interface Candidate {
+  readonly plot: string;
+  readonly fits: boolean;
+  readonly reason: string;
+  readonly condition: Explanation;
+  readonly score?: number;
+}
+
+export interface DecisionRec extends Rec {
+  readonly state: string;
+  readonly chosen: string | null;
+  readonly satisfied: boolean;
+  readonly arguments: Named;
+  readonly version: number;
+  readonly candidates: readonly Candidate[];
+}
+
+export interface KnowledgeRec extends Rec {
+  readonly version: number;
+  readonly author: string;
+  readonly nodes?: Readonly<Record<string, string>>;
+  readonly removed_nodes?: readonly string[];
+  readonly added?: readonly Fact[];
+  readonly removed?: readonly Fact[];
+  readonly values?: readonly (readonly Value[])[];
+}
+
+export interface WorldRec extends Rec {
+  readonly version: number;
+  readonly nodes: Readonly<Record<string, string>>;
+  readonly facts: readonly Fact[];
+  readonly values: readonly (readonly Value[])[];
+}
+
+export interface Thing {
+  readonly id: string;
+  readonly shape: string;
+  readonly x: number;
+  readonly y: number;
+  readonly label: string;
+  readonly width?: number;
+  readonly depth?: number;
+  readonly in?: string;
+}
+
+export interface SceneRec extends Rec {
+  readonly things: readonly Thing[];
+}
+
+export interface PlanFoundRec extends Rec {
+  readonly plot: string;
+  readonly steps: readonly string[];
+  readonly engine?: string;
+  /** Who brings about what for whom: step number (0: it holds already), fact, step number (one past the last: goal). */
+  readonly links?: readonly (readonly [number, string, number])[];
+}
+
+export interface PlanBrokenRec extends Rec {
+  readonly reason: string;
+  readonly author: string;
+  readonly step: number;
+  readonly version?: number;
+  readonly link?: { readonly fact: string; readonly step: number; readonly user: string };
+}
+
+export interface ActionRec extends Rec {
+  readonly action: string;
+  readonly id?: string;
+  readonly skill?: string;
+  readonly port?: string;
+  readonly value?: Value;
+  readonly component?: string;
+  readonly mode?: string;
+  readonly arguments?: Named;
+}
+
+export interface EventRec extends Rec {
+  readonly name: string;
+  readonly source: string;
+  readonly attributes: Named;
+}
+
+export interface RuleRec extends Rec {
+  readonly rule: string;
+  readonly state: string;
+}
+
+export interface EndRec extends Rec {
+  readonly finished: boolean;
+  readonly problem: string | null;
+}
+
+/** A fact as the language writes it. */
+export function written(fact: Fact | readonly Value[]): string {
+  return `(${fact.map(String).join(" ")})`;
+}

@@ -1,0 +1,49 @@
+/** What the page asks the program beyond records. */
+
+import type { Explanation, Fact, Value } from "../core/records";
+
+export interface Answer {
+  readonly variables: readonly string[];
+  readonly holds: boolean;
+  readonly answers: readonly Readonly<Record<string, Value>>[];
+  readonly version: number;
+  readonly why?: Explanation;
+}
+
+export interface Known {
+  readonly version: number;
+  readonly things: Readonly<Record<string, string>>;
+  readonly facts: readonly Fact[];
+  readonly values: readonly (readonly Value[])[];
+}
+
+export interface Break {
+  readonly number: number;
+  readonly on: string;
+}
+
+export const query = (seq: number, expression: string) => ask<Answer>("query", { seq, expression });
+export const control = (command: object) => ask<{ ok: boolean; breaks?: readonly Break[] }>("control", command);
+
+export async function svg(seq: number, path: string): Promise<Blob> {
+  return (await post("svg", { seq, path })).blob();
+}
+
+async function ask<T>(what: string, body: object): Promise<T> {
+  return (await (await post(what, body)).json()) as T;
+}
+
+async function post(what: string, body: object): Promise<Response> {
+  const answer = await fetch(what, { method: "POST", body: JSON.stringify(body) });
+  if (answer.ok) return answer;
+  const text = await answer.text();
+  throw new Error(errorIn(text) ?? text);
+}
+
+function errorIn(text: string): string | undefined {
+  try {
+    return (JSON.parse(text) as { error?: string }).error;
+  } catch {
+    return undefined;
+  }
+}

@@ -1,0 +1,127 @@
+/** The chart: what is active, what was taken lately; open, close, zoom in. */
+
+import { Controls as Zoom, ReactFlow, ReactFlowProvider } from "@xyflow/react";
+import { useCallback, useEffect, useMemo, useState } from "react";
+import { useCamera } from "../chart/camera";
+import { drawnEdges, drawnNodes, type Acts } from "../chart/drawn";
+import { knownLayout, layoutOf } from "../chart/elk";
+import { signature, type Layout } from "../chart/layout";
+import { StateNode } from "../chart/StateNode";
+import { visible, type View, type Visible } from "../chart/visible";
+import { WayEdge } from "../chart/WayEdge";
+import { svg } from "../link/requests";
+import { session, useMoment, useSelection } from "../session";
+
+const NODES = { state: StateNode };
+const EDGES = { way: WayEdge };
+const PLAIN: View = { focus: "", open: new Map(), all: new Set() };
+
+export function Chart() {
+  return (
+    <ReactFlowProvider>
+      <ChartPane />
+    </ReactFlowProvider>
+  );
+}
+
+function ChartPane() {
+  const moment = useMoment();
+  const selection = useSelection();
+  const [view, setView] = useState(PLAIN);
+  const [follow, setFollow] = useState(true);
+  const focus = moment.bound.has(view.focus) ? view.focus : "";
+  const shown = useMemo(() => visible(moment, session.history.plots, { ...view, focus }), [moment, view, focus]);
+  const layout = useLayout(shown);
+  const chosen = selection?.kind === "state" ? selection.path : null;
+  const acts = useActs(setView);
+  const nodes = useMemo(() => (layout ? drawnNodes(shown, layout, moment, chosen, acts) : []), [shown, layout, moment, chosen, acts]);
+  const edges = useMemo(() => (layout ? drawnEdges(shown, layout, moment, chosen) : []), [shown, layout, moment, chosen]);
+  useCamera(shown, layout, follow);
+  return (
+    <section className="pane chart" aria-label="Chart">
+      <h2>
+        <Crumbs focus={focus} go={(path) => acts.zoom(path)} />
+        <span className="tools">
+          <label><input type="checkbox" checked={follow} onChange={(event) => setFollow(event.target.checked)} /> follow</label>
+          <button onClick={() => setView((before) => ({ ...PLAIN, focus: before.focus }))}>reset</button>
+          <button onClick={() => void save(moment.seq, focus)} title="This chart at this moment, as a drawing">SVG</button>
+        </span>
+      </h2>
+      <div className="flow">
+        <Tips />
+        <ReactFlow
+          nodes={nodes} edges={edges} nodeTypes={NODES} edgeTypes={EDGES} minZoom={0.05} maxZoom={2.5}
+          nodesDraggable={false} nodesConnectable={false} elementsSelectable={false} edgesFocusable={false} nodesFocusable={false}
+          onlyRenderVisibleElements={nodes.length > 150} zoomOnDoubleClick={false} disableKeyboardA11y
+          onMove={(event) => event && setFollow(false)} proOptions={{ hideAttribution: true }}
+        >
+          <Zoom showInteractive={false} />
+        </ReactFlow>
+      </div>
+    </section>
+  );
+}
+
+/** The layout of what is visible, or of what was until it is there. */
+function useLayout(shown: Visible): Layout | null {
+  const [done, setDone] = useState<{ key: string; layout: Layout } | null>(null);
+  const key = useMemo(() => signature(shown), [shown]);
+  const known = done?.key === key ? done.layout : knownLayout(shown);
+  useEffect(() => {
+    if (known || shown.nodes.length === 0) return;
+    let wanted = true;
+    void layoutOf(shown).then((layout) => wanted && setDone({ key, layout }));
+    return () => void (wanted = false);
+    // What is active changes `shown` often; only another picture needs another layout.
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [key, known]);
+  return known ?? done?.layout ?? null;
+}
+
+function useActs(setView: (change: (before: View) => View) => void): Acts {
+  const select = useCallback((path: string) => session.select({ kind: "state", path }), []);
+  return useMemo(() => ({
+    select,
+    toggle: (node) => setView((before) => ({ ...before, open: new Map(before.open).set(node.id, !node.expanded) })),
+    zoom: (focus) => setView((before) => ({ ...before, focus })),
+    showAll: (path) => setView((before) => ({ ...before, all: new Set(before.all).add(path) })),
+  }), [select, setView]);
+}
+
+function Crumbs({ focus, go }: { focus: string; go: (path: string) => void }) {
+  const parts = focus ? focus.split("/") : [];
+  return (
+    <nav aria-label="Where the chart is zoomed to">
+      <button disabled={focus === ""} onClick={() => go("")}>Chart</button>
+      {parts.map((part, i) => (
+        <span key={i}>
+          {" › "}
+          <button disabled={i === parts.length - 1} onClick={() => go(parts.slice(0, i + 1).join("/"))}>{part}</button>
+        </span>
+      ))}
+    </nav>
+  );
+}
+
+/** Heads of arrows; a marker is found by its name from anywhere in the page. */
+function Tips() {
+  return (
+    <svg className="tips" aria-hidden="true">
+      <defs>
+        {["tip", "tip-taken"].map((id) => (
+          <marker key={id} id={id} viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" orient="auto" markerUnits="userSpaceOnUse">
+            <path className={id} d="M0 0.5 L8 4 L0 7.5 z" />
+          </marker>
+        ))}
+      </defs>
+    </svg>
+  );
+}
+
+async function save(seq: number, path: string): Promise<void> {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(await svg(seq, path));
+  link.download = `chart-${seq}.svg`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}

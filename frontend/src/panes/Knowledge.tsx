@@ -1,0 +1,120 @@
+/** What is known: facts with a filter in the one language, what changed, what is said of a thing. */
+
+import { useEffect, useMemo, useState } from "react";
+import { written, type Fact, type KnowledgeRec, type Value } from "../core/records";
+import { query, type Answer } from "../link/requests";
+import { session, useMoment, useSelection } from "../session";
+import { Neighbourhood } from "./Neighbourhood";
+import { changed, RecordLink, Tree } from "./parts";
+
+const MOST = 300;
+const CHANGES = 25;
+const VIEWS = ["facts", "changes"] as const;
+
+export function Knowledge() {
+  const moment = useMoment();
+  const selection = useSelection();
+  const [view, setView] = useState<(typeof VIEWS)[number]>("facts");
+  const [text, setText] = useState("");
+  const thing = selection?.kind === "thing" ? selection.id : null;
+  const asking = text.trim().startsWith("(");
+  return (
+    <div className="scrolls knowledge" role="tabpanel">
+      {thing !== null && <Neighbourhood about={thing} />}
+      <input
+        type="search" aria-label="Filter or ask" placeholder="a word, or a condition: (lies-at ?i table)" value={text}
+        spellCheck={false} onChange={(event) => setText(event.target.value)}
+      />
+      {asking ? <Answers seq={moment.seq} text={text} /> : (
+        <>
+          <div className="switch" role="group" aria-label="Show">
+            {VIEWS.map((name) => <button key={name} aria-pressed={view === name} onClick={() => setView(name)}>{name}</button>)}
+            <span className="quiet">{`version ${moment.version} · ${moment.facts.size} facts`}</span>
+          </div>
+          {view === "facts" ? <Table word={text.trim()} about={thing} /> : <Feed />}
+        </>
+      )}
+    </div>
+  );
+}
+
+function Table({ word, about }: { word: string; about: string | null }) {
+  const moment = useMoment();
+  const [latest] = session.history.before(moment.seq, "knowledge", 1) as KnowledgeRec[];
+  const fresh = useMemo(() => new Set(latest ? changed(latest).added : []), [latest]);
+  const rows = useMemo(() => {
+    const facts: (Fact | readonly Value[])[] = [...moment.facts.values(), ...moment.values.values()];
+    const wanted = facts.filter((fact) => (about === null || fact.includes(about)) && (word === "" || written(fact).includes(word)));
+    return wanted.sort((a, b) => (written(a) < written(b) ? -1 : 1));
+  }, [moment, word, about]);
+  return (
+    <table className="known" aria-label="Facts">
+      <tbody>
+        {rows.slice(0, MOST).map((fact) => (
+          <tr key={written(fact)} className={fresh.has(written(fact)) ? "fresh" : ""}>
+            <th scope="row">{String(fact[0])}</th>
+            <td>{fact.slice(1).map((arg, i) => <Thing key={i} id={String(arg)} known={moment.nodes.has(String(arg))} />)}</td>
+          </tr>
+        ))}
+        {rows.length > MOST && <tr><td colSpan={2} className="quiet">{`${rows.length - MOST} more`}</td></tr>}
+      </tbody>
+    </table>
+  );
+}
+
+export function Thing({ id, known }: { id: string; known: boolean }) {
+  if (!known) return <span className="arg">{id}</span>;
+  return <button className="arg link" onClick={() => session.select({ kind: "thing", id })}>{id}</button>;
+}
+
+function Feed() {
+  const moment = useMoment();
+  const changes = session.history.before(moment.seq, "knowledge", CHANGES) as KnowledgeRec[];
+  return (
+    <ul className="records feed" aria-label="Changes">
+      {changes.map((rec) => (
+        <li key={rec.seq}>
+          <RecordLink rec={rec} />
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+/** What the program answers, asked anew for each moment. */
+function Answers({ seq, text }: { seq: number; text: string }) {
+  const [said, setSaid] = useState<{ answer?: Answer; wrong?: string } | null>(null);
+  useEffect(() => {
+    let wanted = true;
+    const timer = setTimeout(() => {
+      query(seq, text).then(
+        (answer) => wanted && setSaid({ answer }),
+        (error: Error) => wanted && setSaid({ wrong: error.message }),
+      );
+    }, 150);
+    return () => {
+      wanted = false;
+      clearTimeout(timer);
+    };
+  }, [seq, text]);
+  if (said === null) return null;
+  if (said.answer === undefined) return <p className="bad note" role="alert">{said.wrong}</p>;
+  const { answer } = said;
+  return (
+    <div aria-label="Answers" aria-live="polite">
+      <p><b>{answer.variables.length ? `${answer.answers.length} answers` : answer.holds ? "true" : "false"}</b><span className="quiet">{` · version ${answer.version}`}</span></p>
+      {answer.why && <div role="tree" aria-label="Why"><Tree why={answer.why} decider={null} /></div>}
+      {answer.variables.length > 0 && (
+        <table className="known">
+          <thead><tr>{answer.variables.map((name) => <th key={name} scope="col">{`?${name}`}</th>)}</tr></thead>
+          <tbody>
+            {answer.answers.slice(0, MOST).map((one, i) => (
+              <tr key={i}>{answer.variables.map((name) => <td key={name}><Thing id={String(one[name])} known /></td>)}</tr>
+            ))}
+          </tbody>
+        </table>
+      )}
+    </div>
+  );
+}
+

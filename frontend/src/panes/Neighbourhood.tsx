@@ -1,0 +1,67 @@
+/** What is said of a thing, drawn: the thing in the middle, what it is related to around it. */
+
+import { written, type Fact } from "../core/records";
+import { session, useMoment } from "../session";
+
+const WIDE = 340;
+const HIGH = 250;
+const MOST = 12;
+
+export function Neighbourhood({ about }: { about: string }) {
+  const moment = useMoment();
+  const facts = [...moment.facts.values()].filter((fact) => fact.includes(about));
+  const near = new Map<string, string[]>();
+  for (const fact of facts) {
+    for (const other of fact.slice(1).map(String)) {
+      if (other !== about && moment.nodes.has(other)) near.set(other, [...(near.get(other) ?? []), relation(fact, about)]);
+    }
+  }
+  const alone = facts.filter((fact) => fact.length === 2).map((fact) => String(fact[0]));
+  const others = [...near].slice(0, MOST);
+  return (
+    <figure className="near" aria-label={`${about} and what it is related to`}>
+      <figcaption>
+        <b>{about}</b> <span className="quiet">{moment.nodes.get(about) ?? "not known"}</span>
+        {alone.map((name) => <span key={name} className="badge">{name}</span>)}
+        <button className="close" aria-label="Close" onClick={() => session.select(null)}>✕</button>
+      </figcaption>
+      {others.length > 0 && (
+        <svg viewBox={`0 0 ${WIDE} ${HIGH}`} role="group" aria-label={facts.map(written).join(" ")}>
+          {others.map(([id, relations], i) => {
+            const angle = (2 * Math.PI * i) / others.length - Math.PI / 2;
+            const [x, y] = [WIDE / 2 + Math.cos(angle) * 120, HIGH / 2 + Math.sin(angle) * 95];
+            return (
+              <g key={id}>
+                <line x1={WIDE / 2} y1={HIGH / 2} x2={x} y2={y} />
+                <text className="relation" x={(WIDE / 2 + x) / 2} y={(HIGH / 2 + y) / 2}>{shortened(relations)}<title>{relations.join(", ")}</title></text>
+                <Node id={id} x={x} y={y} />
+              </g>
+            );
+          })}
+          <g className="middle"><Node id={about} x={WIDE / 2} y={HIGH / 2} /></g>
+        </svg>
+      )}
+      {near.size > MOST && <p className="quiet">{`${near.size - MOST} more`}</p>}
+    </figure>
+  );
+}
+
+function Node({ id, x, y }: { id: string; x: number; y: number }) {
+  const width = id.length * 6.6 + 14;
+  const select = () => session.select({ kind: "thing", id });
+  return (
+    <g className="node" tabIndex={0} role="button" aria-label={id} onClick={select} onKeyDown={(event) => event.key === "Enter" && select()}>
+      <rect x={x - width / 2} y={y - 10} width={width} height={20} rx={6} />
+      <text x={x} y={y + 4}>{id}</text>
+    </g>
+  );
+}
+
+/** With an arrow that says whether the thing is the first argument. */
+function relation(fact: Fact, about: string): string {
+  return fact[1] === about ? `${fact[0]} →` : `← ${fact[0]}`;
+}
+
+function shortened(relations: readonly string[]): string {
+  return relations.length > 2 ? `${relations[0]} +${relations.length - 1}` : relations.join(" ");
+}

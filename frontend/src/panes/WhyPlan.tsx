@@ -1,0 +1,122 @@
+/** A plan: why it ended. A step of it: what it provides to whom, what it needs, what it changed. */
+
+import { isFinished, type Plan } from "../core/plans";
+import { joinPath } from "../core/plots";
+import type { DecisionRec, PlanFoundRec } from "../core/records";
+import { changesBetween, conditionsInto } from "../core/why";
+import { session, useMoment } from "../session";
+import { Causes, changed, Facts, RecordLink } from "./parts";
+import { seconds } from "./Timeline";
+import { Decision, WhyRecord } from "./WhyRecord";
+
+export function WhyPlan({ number }: { number: number }) {
+  const moment = useMoment();
+  const { history } = session;
+  const plan = moment.plans[number];
+  if (!plan) return <p className="quiet">At this moment the plan had not been made yet.</p>;
+  const found = history.record(plan.seq) as PlanFoundRec;
+  const end = plan.ended === null ? undefined : history.record(plan.ended);
+  const follower = moment.plans[number + 1];
+  return (
+    <div aria-label="Plan">
+      <div className="what">
+        <span className="quiet">{`plan · ${seconds(found.t)}${plan.engine ? ` · ${plan.engine}` : ""}`}</span>
+        <p><b>{plan.name}</b>{`, ${plan.steps.length} steps, ${plan.steps.filter((step) => step.state === "done").length} done`}</p>
+      </div>
+      {end && !isFinished(plan) && (
+        <>
+          <h3>Why it was given up</h3>
+          <WhyRecord rec={end} />
+          <Causes seq={end.seq} />
+        </>
+      )}
+      {follower && <><h3>Then</h3><ul className="records"><li><RecordLink rec={history.record(follower.seq)!} /></li></ul></>}
+      <h3>Where it came from</h3>
+      <ul className="records"><li><RecordLink rec={found} /></li></ul>
+      <Causes seq={plan.seq} />
+    </div>
+  );
+}
+
+export function WhyStep({ plan: at, number }: { plan: number; number: number }) {
+  const moment = useMoment();
+  const plan = moment.plans[at];
+  const step = plan?.steps[number];
+  if (!plan || !step) return <p className="quiet">At this moment the plan had not been made yet.</p>;
+  const name = [...plan.names].find(([, which]) => which === number)?.[0];
+  return (
+    <div aria-label="Step of the plan">
+      <div className="what">
+        <span className="quiet">{`step ${number + 1} of ${plan.name} · ${step.state}`}</span>
+        <p><code>{step.text}</code></p>
+      </div>
+      <Links plan={plan} number={number} />
+      {name !== undefined && <Needed plan={plan} name={name} />}
+      <Brought plan={plan} number={number} />
+      {name !== undefined && <HowDone plan={plan} name={name} />}
+    </div>
+  );
+}
+
+/** What it provides to whom, and who provides what it needs: the plan's causal links, if the record has them. */
+function Links({ plan, number }: { plan: Plan; number: number }) {
+  const goal = plan.steps.length + 1;
+  const who = (one: number) => (one === 0 ? "what holds already" : one === goal ? "the goal" : `${one} ${plan.steps[one - 1]?.text}`);
+  const provides = plan.links.filter(([provider]) => provider === number + 1);
+  const needs = plan.links.filter(([, , user]) => user === number + 1);
+  if (plan.links.length === 0) return null;
+  return (
+    <>
+      <h3>Provides</h3>
+      {provides.length === 0 && <p className="quiet">nothing that the plan needs</p>}
+      <ul className="plain">{provides.map(([, fact, user], i) => <li key={i}><code>{fact}</code>{" for "}{who(user)}</li>)}</ul>
+      <h3>Relies on</h3>
+      <ul className="plain">{needs.map(([provider, fact], i) => <li key={i}><code>{fact}</code>{" from "}{who(provider)}</li>)}</ul>
+    </>
+  );
+}
+
+function Needed({ plan, name }: { plan: Plan; name: string }) {
+  const moment = useMoment();
+  const plot = session.history.plots.get(moment.bound.get(plan.at ?? "-") ?? "");
+  const conditions = plot?.generated ? conditionsInto(plot, name) : [];
+  if (conditions.length === 0) return null;
+  const facts = conditions.flatMap((text) => text.match(/\((?:not \([^()]*\)|[^()]+)\)/g) ?? [text]);
+  return (
+    <>
+      <h3>Begins once</h3>
+      <ul className="facts">
+        {facts.map((fact) => {
+          const holds = fact.startsWith("(not ") ? !moment.facts.has(fact.slice(5, -1)) : moment.facts.has(fact);
+          return <li key={fact} className={holds ? "true" : "false"}><code>{`${holds ? "✓" : "✕"} ${fact}`}</code></li>;
+        })}
+      </ul>
+    </>
+  );
+}
+
+function Brought({ plan, number }: { plan: Plan; number: number }) {
+  const moment = useMoment();
+  const step = plan.steps[number]!;
+  if (step.since === null) return null;
+  const changes = changesBetween(session.history, plan.seq, step.since, step.until ?? moment.t).filter((one) => one.seq <= moment.seq);
+  return (
+    <>
+      <h3>Changed while it ran</h3>
+      {changes.length === 0 && <p className="quiet">nothing yet</p>}
+      {changes.map((change) => (
+        <div key={change.seq}>
+          <Facts title="" sign="−" facts={changed(change).removed} />
+          <Facts title="" sign="+" facts={changed(change).added} />
+        </div>
+      ))}
+    </>
+  );
+}
+
+function HowDone({ plan, name }: { plan: Plan; name: string }) {
+  const moment = useMoment();
+  const path = joinPath(plan.at ?? "", name);
+  const made = session.history.before(moment.seq, "decision", 200).find((rec) => (rec as DecisionRec).state === path && rec.seq > plan.seq);
+  return made ? <><h3>How it is done</h3><Decision rec={made as DecisionRec} /></> : null;
+}

@@ -1,0 +1,120 @@
+/** Small parts that several panes show: records by name, condition trees, tables of values. */
+
+import { partsOf } from "../core/explanations";
+import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
+  type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type StepRec } from "../core/records";
+import { session } from "../session";
+import { seconds } from "./Timeline";
+
+/** What a record says, in a line. */
+export function inShort(rec: Rec): string {
+  switch (rec.type) {
+    case "event": return `${(rec as EventRec).name} from ${(rec as EventRec).source}`;
+    case "action": {
+      const { action, skill, port, value, component, mode } = rec as ActionRec;
+      return action === "start" ? `start ${skill}` : action === "set" ? `set ${port} to ${String(value)}` : `switch ${component} to ${mode}`;
+    }
+    case "step": {
+      const taken = (rec as StepRec).microsteps.flatMap((micro) => micro.taken);
+      return taken.length ? `${ending(taken[0]!.from)} → ${ending(taken.at(-1)!.to ?? "")}` : "the start";
+    }
+    case "decision": return `${(rec as DecisionRec).state}: ${(rec as DecisionRec).chosen ?? "no candidate"}`;
+    case "knowledge": return `${(rec as KnowledgeRec).author}: ${news(rec as KnowledgeRec)}`;
+    case "rule": return (rec as RuleRec).rule;
+    case "plan.found": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
+    case "plan.broken": return (rec as PlanBrokenRec).reason;
+    case "end": return (rec as EndRec).problem ?? "finished";
+    default: return "";
+  }
+}
+
+/** The last two parts of a path: enough to know it by. */
+function ending(path: string): string {
+  return path.split("/").slice(-2).join("/");
+}
+
+function news(rec: KnowledgeRec): string {
+  const said = [...(rec.removed ?? []).map((fact) => `− ${written(fact)}`), ...(rec.added ?? []).map((fact) => `+ ${written(fact)}`),
+    ...(rec.values ?? []).map((value) => `${written(value.slice(0, -1))} = ${String(value.at(-1))}`)];
+  return said.length > 3 ? `${said.slice(0, 3).join(" ")} and ${said.length - 3} more` : said.join(" ");
+}
+
+export function RecordLink({ rec }: { rec: Rec }) {
+  return (
+    <button className={`record ${rec.type.replace(".", "-")}`} onClick={() => session.goTo(rec.seq, { kind: "record", seq: rec.seq })}>
+      <span className="type">{rec.type}</span>
+      <span className="said">{inShort(rec)}</span>
+      <span className="quiet">{seconds(rec.t)}</span>
+    </button>
+  );
+}
+
+/** What led to a record, back to where it began. */
+export function Causes({ seq }: { seq: number }) {
+  const [, ...causes] = session.history.causes(seq);
+  if (causes.length === 0) return null;
+  return (
+    <>
+      <h3>Led to by</h3>
+      <ul className="records">{causes.map((rec) => <li key={rec.seq}><RecordLink rec={rec} /></li>)}</ul>
+    </>
+  );
+}
+
+const TRUTH = new Map<unknown, [string, string]>([[true, ["✓", "true"]], [false, ["✕", "false"]]]);
+
+/** A condition as a tree: each part with its truth, the one that decided marked. */
+export function Tree({ why, decider }: { why: Explanation; decider: Explanation | null }) {
+  const parts = partsOf(why);
+  const [sign, truth] = TRUTH.get(why.truth) ?? ["?", "unknown"];
+  const decides = why === decider || (why.decider === true && parts.length === 0);
+  const whole = why.text ?? "";
+  // The parts say the rest: a long conjunction is not written out twice.
+  const text = parts.length && whole.length > 60 ? `${whole.slice(0, whole.indexOf(" ") > 0 ? whole.indexOf(" ") : 20)} …)` : whole;
+  return (
+    <div className="tree" role="treeitem" aria-label={`${whole} is ${truth}${decides ? ", this decided" : ""}`}>
+      <div className={`leaf ${truth} ${decides ? "decides" : ""}`} title={whole}>
+        <span className="sign" aria-hidden="true">{sign}</span>
+        <code>{text}</code>
+        {why.detail && <span className="quiet">{why.detail}</span>}
+        {decides && <span className="badge decided">decided</span>}
+      </div>
+      {parts.length > 0 && <div role="group">{parts.map((part, i) => <Tree key={i} why={part} decider={decider} />)}</div>}
+    </div>
+  );
+}
+
+export function Values({ values }: { values: Named }) {
+  const names = Object.keys(values);
+  if (names.length === 0) return null;
+  return (
+    <table className="values">
+      <tbody>
+        {names.map((name) => (
+          <tr key={name}><th scope="row">{`?${name}`}</th><td>{shortly(values[name])}</td></tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+function shortly(value: unknown): string {
+  if (typeof value === "string") return value;
+  if (value !== null && typeof value === "object" && "plot" in value) return `the plot ${String(value.plot)}`;
+  return JSON.stringify(value);
+}
+
+export function Facts({ title, sign, facts }: { title: string; sign: string; facts: readonly string[] }) {
+  if (facts.length === 0) return null;
+  return (
+    <>
+      {title && <h3>{title}</h3>}
+      <ul className={`facts ${sign === "+" ? "" : "gone"}`}>{facts.map((fact) => <li key={fact}><code>{`${sign} ${fact}`}</code></li>)}</ul>
+    </>
+  );
+}
+
+export function changed(rec: KnowledgeRec): { added: string[]; removed: string[] } {
+  const values = (rec.values ?? []).map((value) => `${written(value.slice(0, -1))} = ${String(value.at(-1))}`);
+  return { added: [...(rec.added ?? []).map(written), ...values], removed: (rec.removed ?? []).map(written) };
+}

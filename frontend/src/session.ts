@@ -1,0 +1,180 @@
+/** What the panes share: the records, the moment they show, whether it moves, what is selected. */
+
+import { useSyncExternalStore } from "react";
+import { History, type Mark } from "./core/history";
+import { beginning, type Moment } from "./core/moment";
+import { connect, type Hello, type Status } from "./link/socket";
+
+export type Selection =
+  | { readonly kind: "state"; readonly path: string }
+  | { readonly kind: "step"; readonly plan: number; readonly step: number }
+  | { readonly kind: "plan"; readonly plan: number }
+  | { readonly kind: "record"; readonly seq: number }
+  | { readonly kind: "thing"; readonly id: string };
+
+export interface Shown {
+  readonly moment: Moment;
+  readonly last: number;
+  readonly playing: boolean;
+  readonly speed: number;
+  /** Whether it goes on with a live run. */
+  readonly following: boolean;
+  readonly live: boolean;
+  readonly control: boolean;
+  readonly connected: boolean;
+  readonly paused: string | null;
+  readonly header: Readonly<Record<string, unknown>>;
+  readonly expected: number;
+  readonly selection: Selection | null;
+}
+
+export const SPEEDS = [1, 2, 5, 10, 30, 100];
+
+const LOADING_MS = 250;
+
+export class Session {
+  readonly history = new History();
+  private shown: Shown = {
+    moment: beginning(), last: 0, playing: false, speed: 10, following: false, live: false, control: false,
+    connected: false, paused: null, header: {}, expected: 0, selection: null,
+  };
+  private readonly listeners = new Set<() => void>();
+  private drawing = 0;
+  private before = 0;
+  private drawn = 0;
+  private clock = 0;
+  private wanted: number | null = null;
+
+  constructor() {
+    const asked = Number(location.hash.slice(1));
+    this.wanted = Number.isInteger(asked) && asked > 0 ? asked : null;
+  }
+
+  start(): void {
+    connect({
+      wanted: () => this.history.last + 1,
+      hello: (said: Hello) => {
+        const following = said.live && this.wanted === null && (this.history.last === 0 || this.shown.following);
+        this.set({ header: said.header, live: said.live, control: said.control, expected: said.last, connected: true, following });
+      },
+      status: (said: Status) => this.set({ live: said.live, paused: said.paused, expected: said.last }),
+      records: (from, records) => {
+        this.history.append(from, records);
+        if (!this.waits()) this.later();
+      },
+      lost: () => this.set({ connected: false }),
+    });
+  }
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  };
+
+  get = (): Shown => this.shown;
+
+  /** Show the moment after a record; a live run is then no longer followed, unless it is the last. */
+  goTo(seq: number, select?: Selection): void {
+    const wanted = Math.max(0, Math.min(seq, this.history.last));
+    const moment = this.history.at(wanted);
+    this.clock = moment.t;
+    this.set({ moment, following: this.shown.live && wanted === this.history.last, playing: false, ...(select && { selection: select }) });
+    history.replaceState(null, "", `#${wanted}`);
+  }
+
+  /** To the next mark, or the one before; returns whether there is one. */
+  jump(mark: Mark, way: 1 | -1): boolean {
+    const found = this.history.beside(this.shown.moment.seq, mark, way);
+    if (found === undefined) return false;
+    this.goTo(found, mark === "step" ? undefined : { kind: "record", seq: found });
+    return true;
+  }
+
+  step(way: 1 | -1): void {
+    if (!this.jump("step", way)) this.goTo(way > 0 ? this.history.last : 0);
+  }
+
+  play(playing: boolean): void {
+    if (playing && this.shown.moment.seq >= this.history.last && !this.shown.live) this.goTo(0);
+    this.clock = this.shown.moment.t;
+    this.before = 0;
+    const atEnd = this.shown.moment.seq >= this.history.last;
+    this.set({ playing: playing && !atEnd, following: playing && this.shown.live && atEnd });
+    if (playing) this.later();
+  }
+
+  speed(speed: number): void {
+    this.set({ speed });
+  }
+
+  select(selection: Selection | null): void {
+    this.set({ selection });
+  }
+
+  private set(change: Partial<Shown>): void {
+    this.shown = { ...this.shown, ...change };
+    for (const listener of this.listeners) listener();
+  }
+
+  /** While a long trace comes in, how much of it is there is drawn a few times a second, not for each batch. */
+  private waits(): boolean {
+    const coming = this.history.last < this.shown.expected && this.shown.moment.seq > 0 && !this.shown.following;
+    const now = performance.now();
+    if (coming && now - this.drawn < LOADING_MS) return true;
+    this.drawn = now;
+    return false;
+  }
+
+  /** Draw once for whatever comes in until the next frame. */
+  private later(): void {
+    this.drawing ||= requestAnimationFrame((now) => {
+      this.drawing = 0;
+      this.draw(now);
+    });
+  }
+
+  private draw(now: number): void {
+    const { moment, playing, following } = this.shown;
+    const last = this.history.last;
+    let seq = moment.seq;
+    if (following) seq = last;
+    else if (playing) seq = this.played(now, seq);
+    else if (this.wanted !== null && last >= this.wanted) seq = this.wanted;
+    else if (moment.seq === 0 && this.wanted === null) seq = this.history.marks.step[0] ?? 0;
+    if (this.wanted !== null && last >= this.wanted) this.wanted = null;
+    const over = playing && seq >= last;
+    const next = seq === moment.seq ? moment : this.history.at(seq);
+    this.set({ moment: next, last, ...(over && { playing: false, following: this.shown.live }) });
+    if (this.shown.playing) this.later();
+  }
+
+  /** The record reached when the clock of the run went on since the last frame; never slower than one in two seconds. */
+  private played(now: number, seq: number): number {
+    const elapsed = this.before ? Math.min(now - this.before, 200) / 1000 : 0;
+    this.before = now;
+    this.clock += elapsed * this.shown.speed;
+    const coming = this.history.record(seq + 1);
+    if (coming && coming.t - this.clock > 2 * this.shown.speed) this.clock = coming.t - 2 * this.shown.speed;
+    return Math.max(seq, this.history.seqAt(this.clock));
+  }
+}
+
+export const session = new Session();
+
+export function useShown(): Shown {
+  return useSyncExternalStore(session.subscribe, session.get);
+}
+
+/** The moment alone: who uses no more is not drawn anew while records come in. */
+export function useMoment(): Moment {
+  return useSyncExternalStore(session.subscribe, () => session.get().moment);
+}
+
+export function useSelection(): Selection | null {
+  return useSyncExternalStore(session.subscribe, () => session.get().selection);
+}
+
+/** Whether the run may be changed from here. */
+export function useControl(): boolean {
+  return useSyncExternalStore(session.subscribe, () => session.get().control);
+}

@@ -1,0 +1,105 @@
+import { describe, expect, it } from "vitest";
+import { CHECKPOINT_EVERY, History } from "../src/core/history";
+import { nextStep } from "../src/core/plans";
+import type { Rec } from "../src/core/records";
+import { repeated, run } from "./run";
+
+const history = (records: readonly Rec[]) => {
+  const made = new History();
+  made.append(1, records);
+  return made;
+};
+
+describe("a moment", () => {
+  it("has the active states, with the plots inside them", () => {
+    const moment = history(run).at(4);
+    expect([...moment.active.keys()]).toEqual(["clear", "clear/plan"]);
+    expect([...moment.bound]).toEqual([["", "main"], ["clear", "achieve"]]);
+  });
+
+  it("has what is known: the world at the start and its changes", () => {
+    const moment = history(run).at(run.length);
+    expect([...moment.facts.keys()].sort()).toEqual(["(at sink)", "(on cup table)"]);
+    expect(moment.values.get("(tries cup)")).toEqual(["tries", "cup", 1]);
+    expect(moment.version).toBe(3);
+  });
+
+  it("knows a plan's steps before, while and after they are carried out", () => {
+    const made = history(run);
+    const states = (seq: number) => made.at(seq).plans.map((plan) => plan.steps.map((step) => step.state));
+    expect(states(5)).toEqual([["waiting", "waiting"]]);
+    expect(states(7)).toEqual([["running", "waiting"]]);
+    expect(nextStep(made.at(7).plans[0]!)).toBe(1);
+    expect(states(9)).toEqual([["done", "running"]]);
+    expect(states(13)).toEqual([["done", "stopped"], ["waiting"]]);
+    expect(made.at(13).plans.map((plan) => plan.ended)).toEqual([11, null]);
+    expect(states(15)).toEqual([["done", "stopped"], ["running"]]);
+  });
+
+  it("does not blame a rule after which the step was begun again for the end of the plan", () => {
+    const execute = "clear/execute";
+    const again = { event: "slipped", taken: [], exited: [`${execute}/step_1`], entered: [`${execute}/step_1`] };
+    const over = { event: "done", taken: [{ from: `${execute}/step_1`, on: "done", to: `${execute}/finished` }], exited: [`${execute}/step_1`, execute], entered: [] };
+    const rest = [
+      { type: "rule", rule: "slipped: wait, retry", state: `${execute}/step_1` },
+      { type: "step", microsteps: [again] },
+      { type: "step", microsteps: [over] },
+    ].map((data, i) => ({ seq: run.length + 1 + i, t: 6 + i, cause: null, ...data }));
+    const plan = history([...run, ...rest]).at(run.length + 3).plans[1]!;
+    expect(plan.ended).toBe(run.length + 3);
+    expect(plan.steps.map((step) => [step.state, step.tries])).toEqual([["done", 2]]);
+  });
+
+  it("has the transitions taken last, the latest first", () => {
+    expect(history(run).at(9).trail.map((one) => one.to)).toEqual(["clear/execute/step_2", "clear/execute/step_1", "clear/execute"]);
+  });
+
+  it("forgets what a state that was left had", () => {
+    const moment = history(run).at(13);
+    expect(moment.bound.has("clear/execute")).toBe(false);
+    expect(moment.variables.has("clear/execute")).toBe(false);
+  });
+
+  it("has the variables of the plots that run", () => {
+    expect(history(run).at(7).variables.get("clear/execute")).toEqual({ reason: "unknown" });
+  });
+});
+
+describe("history", () => {
+  it("gives the same moment however one got there", () => {
+    const records = repeated(run, 2 * CHECKPOINT_EVERY + 40);
+    const made = history(records);
+    for (const seq of [records.length, 0, 1, CHECKPOINT_EVERY, CHECKPOINT_EVERY - 1, CHECKPOINT_EVERY + 1, 33, 34]) {
+      expect(made.at(seq)).toEqual(history(records.slice(0, seq)).at(seq));
+    }
+  });
+
+  it("is not disturbed by who changes a moment it gave", () => {
+    const made = history(run);
+    made.at(7).active.clear();
+    expect(made.at(7).active.size).toBeGreaterThan(0);
+  });
+
+  it("passes over what it has, and does not take in what leaves a gap", () => {
+    const made = history(run.slice(0, 6));
+    made.append(3, run.slice(2, 8));
+    made.append(10, run.slice(9));
+    expect(made.last).toBe(8);
+  });
+
+  it("jumps to marks both ways", () => {
+    const made = history(run);
+    expect(made.beside(0, "plan", 1)).toBe(5);
+    expect(made.beside(5, "plan", 1)).toBe(13);
+    expect(made.beside(13, "plan", -1)).toBe(5);
+    expect(made.beside(13, "plan", 1)).toBeUndefined();
+    expect(made.beside(run.length, "failure", -1)).toBe(11);
+  });
+
+  it("finds the last record at a time, and what led to a record", () => {
+    const made = history(run);
+    expect(made.seqAt(1)).toBe(8);
+    expect(made.seqAt(-1)).toBe(0);
+    expect(made.causes(11).map((rec) => rec.seq)).toEqual([11, 10]);
+  });
+});
