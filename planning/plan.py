@@ -49,6 +49,11 @@ class Plan:
         if starts and (len(starts) != len(self.steps) or starts != sorted(starts)):
             raise InputError(f"a schedule has a time for each of the {len(self.steps)} steps, by start; found {starts}")
 
+    @property
+    def seconds(self) -> float:
+        """When all of it is done, by the schedule; 0 without one."""
+        return max((timing.end for timing in self.schedule), default=0.0)
+
     def __str__(self) -> str:
         """One step a line, as planners write plans."""
         return "\n".join(map(str, self.steps))
@@ -64,7 +69,8 @@ class PlanFound:
         seconds: how long that took in real time; differs from run to run.
         simulated_seconds: how long it takes in simulated time; depends on the problem only.
         reproducible: whether no limit of real time had a part in it, so that the same problem gives it again.
-        cost: what its actions cost together; their number, if nobody says what each costs.
+        cost: what its actions cost together; their number, if nobody says what each costs; with a schedule, the
+            seconds until all of it is done.
         from_cache: whether it was found for the same problem before.
         failures: what happened to other engines that were asked as well.
     """
@@ -89,6 +95,15 @@ class ProvenUnsolvable:
 
 
 @dataclass(frozen=True, slots=True)
+class NoneFound:
+    """There is no plan of a narrower kind than was asked for (`reason` says of which); `failures` as in `PlanFound`."""
+
+    engine: str
+    reason: str
+    failures: tuple[EngineFailed, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class TimedOut:
     """The engine was stopped after `seconds` of real time; nothing is known. For `failures` see `PlanFound`."""
 
@@ -105,5 +120,5 @@ class EngineFailed:
     message: str
 
 
-PlanningOutcome = PlanFound | ProvenUnsolvable | TimedOut | EngineFailed
+PlanningOutcome = PlanFound | ProvenUnsolvable | NoneFound | TimedOut | EngineFailed
 """What comes of asking for a plan."""

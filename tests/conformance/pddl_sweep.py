@@ -32,8 +32,9 @@ from knowledge_base.language.evaluation import evaluate_term
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.engines.race import PlannerRace
+from planning.engines.registry import timing
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
-from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 from planning.posing.problem import pose
 
 PAGE = Path(__file__).parents[2] / "docs" / "pddl.md"
@@ -133,7 +134,7 @@ def tried(pair: Pair, seconds: float) -> Result:
     """What becomes of one pair of files."""
     try:
         domain, problem = read(pair)
-        posed = pose(domain, world_of(domain, problem), problem.goal, problem.metric)
+        posed = pose(domain, world_of(domain, problem), problem.goal, problem.metric, durations=bool(timing()))
     except InputError as error:
         verdicts = [verdict for kind, verdict in REFUSED.items() if isinstance(error, kind)]
         said = str(error).replace(f"{pair.problem.parent}/", "")
@@ -144,8 +145,9 @@ def tried(pair: Pair, seconds: float) -> Result:
             verdict = "wrong" if said.startswith("invalid") else "plan"
             return Result(pair.name, verdict, engine, len(plan.steps), said)
         case ProvenUnsolvable(engine, reason):
-            verdict = "no sequential plan" if _durative(domain) else "unsolvable"
-            return Result(pair.name, verdict, engine, detail=reason)
+            return Result(pair.name, "unsolvable", engine, detail=reason)
+        case NoneFound(engine, reason):
+            return Result(pair.name, "no sequential plan", engine, detail=reason)
         case TimedOut(engine, limit):
             return Result(pair.name, "timed out", engine, detail=f"after {limit:g} s")
         case EngineFailed(engine, message):
