@@ -55,7 +55,8 @@ def plan_command(
     """
     from planning.engines.registry import timing
     from planning.ordering.order import deordered, scheduled
-    from planning.plan import PlanFound, ProvenUnsolvable
+    from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
+    from planning.posing.constructs import why_no_engine
     from planning.posing.problem import pose
     from planning.posing.unsolvable import why_unsolvable
 
@@ -63,6 +64,9 @@ def plan_command(
     problem = pose(domain, world, read.goal, read.metric, durations=bool(timing()) or engine is not None)
     outcome = _solve(problem, seconds, engine)
     status, answer = _answer(outcome)
+    if isinstance(outcome, NobodyCan):
+        answer["reason"] = why_no_engine(domain, read.goal, outcome)
+    notes = [*domain.notes, *read.notes, *problem.notes]
     if isinstance(outcome, ProvenUnsolvable) and explain:
         answer["why"] = list(why_unsolvable(domain, world, read.goal))
     if isinstance(outcome, PlanFound):
@@ -72,7 +76,9 @@ def plan_command(
         answer |= _purposes(order) if explain else {}
         if plot is not None:
             _write_plot(plot, outcome.plan, domain, order if parallel else None)
-    typer.echo(json.dumps(answer) if as_json else _text(answer), err=status != FOUND and not as_json)
+    for note in () if as_json else notes:
+        typer.echo(f"note: {note}", err=True)
+    typer.echo(json.dumps(answer | {"notes": notes}) if as_json else _text(answer), err=status != FOUND and not as_json)
     raise typer.Exit(status)
 
 
@@ -170,7 +176,7 @@ def _progress(text: str) -> AbstractContextManager[object]:
 
 def _answer(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
     """Exit status and what is printed."""
-    from planning.plan import EngineFailed, NoneFound, PlanFound, ProvenUnsolvable, TimedOut
+    from planning.plan import EngineFailed, NobodyCan, NoneFound, PlanFound, ProvenUnsolvable, TimedOut
 
     match outcome:
         case PlanFound(plan=plan, engine=engine, seconds=seconds, cost=cost):
@@ -186,6 +192,8 @@ def _answer(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
             return TIMED_OUT, {"outcome": "timed_out", "steps": [], "engine": engine, "seconds": seconds}
         case EngineFailed(engine=engine, message=message):
             return FAILED, {"outcome": "engine_failed", "steps": [], "engine": engine, "reason": message}
+        case NobodyCan(engine=engine, message=message):
+            return FAILED, {"outcome": "no_engine", "steps": [], "engine": engine, "reason": message}
 
 
 def _ordered(order: PartialOrder) -> dict[str, Any]:
@@ -226,7 +234,7 @@ def _text(answer: Mapping[str, Any]) -> str:
     match answer["outcome"]:
         case "plan":
             return _plan_text(answer) or "nothing to do: the goal already holds"
-        case "none_found":
+        case "none_found" | "no_engine":
             reason: str = answer["reason"]
             return reason
         case "unsolvable":

@@ -120,5 +120,32 @@ class EngineFailed:
     message: str
 
 
-PlanningOutcome = PlanFound | ProvenUnsolvable | NoneFound | TimedOut | EngineFailed
+@dataclass(frozen=True, slots=True)
+class NobodyCan:
+    """No engine was asked, since none that may be can do what the problem needs.
+
+    Attributes:
+        engine: who alone may be asked; empty if all that are installed may.
+        needs: the features of the problem, see `planning.strips.FEATURES`.
+        could: engines that can do that, each with what to do before it can be used; nothing if it only has to be named.
+    """
+
+    engine: str
+    needs: tuple[str, ...]
+    could: tuple[tuple[str, str], ...]
+
+    @property
+    def who(self) -> str:
+        """Who could, in words."""
+        nobody = f"{self.engine} cannot do that" if self.engine else "no installed engine can do that"
+        others = ", ".join(f"{name} could ({how or 'name it as the planner'})" for name, how in self.could)
+        return f"{nobody}, {others or 'nor does anybody known here'}"
+
+    @property
+    def message(self) -> str:
+        """One line: `the problem needs numeric; no installed engine can do that, enhsp could (pip install ...)`."""
+        return f"the problem needs {', '.join(self.needs) or 'STRIPS'}; {self.who}"
+
+
+PlanningOutcome = PlanFound | ProvenUnsolvable | NoneFound | TimedOut | EngineFailed | NobodyCan
 """What comes of asking for a plan."""

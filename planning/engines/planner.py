@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
-from planning.engines.registry import can_time, in_concert
+from planning.engines.registry import can_time, cannot, in_concert, nobody
 from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 
 if TYPE_CHECKING:
@@ -123,6 +123,8 @@ class PlannerProcess:
             return self._none(problem, "unreachable: " + ", ".join(problem.unreachable))
         if not problem.goal and not problem.bounds and not problem.unreachable:
             return PlanFound(Plan(), self.engine, 0.0, problem.simulated_seconds)
+        if cannot(self.engine, problem):
+            return nobody(problem, self.engine)
         return None
 
     def _none(self, problem: Problem, reason: str) -> ProvenUnsolvable | NoneFound:

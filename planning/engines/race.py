@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from planning.engines.planner import PlannerProcess
-from planning.engines.registry import able, chosen, described, installed
-from planning.plan import EngineFailed, NoneFound, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.engines.registry import chosen, nobody
+from planning.plan import EngineFailed, NobodyCan, NoneFound, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 from planning.strips import Problem
 
 if TYPE_CHECKING:
@@ -82,17 +82,17 @@ class PlannerRace:
                         yield outcome
                     return
             seconds -= min(time.monotonic() - started, limit)
-            failures = (outcome,) if isinstance(outcome, EngineFailed) else outcome.failures
+            failures = _failures(outcome)
         async with aclosing(self._raced(self._choose(problem), replace(problem, timed=None), seconds)) as outcomes:
             async for outcome in outcomes:
-                yield outcome if isinstance(outcome, EngineFailed) else _with(failures, outcome)
+                yield outcome if isinstance(outcome, EngineFailed | NobodyCan) else _with(failures, outcome)
 
     async def _raced(
         self, engines: Sequence[Engine], problem: Problem, seconds: float
     ) -> AsyncGenerator[PlanningOutcome, None]:
         """What these engines say to one form of a problem."""
         if not engines:
-            yield _nobody(problem)
+            yield nobody(problem)
             return
         for task in self._improving:
             task.cancel()
@@ -131,6 +131,12 @@ class PlannerRace:
 
 def _with(failures: tuple[EngineFailed, ...], outcome: _Failing) -> PlanningOutcome:
     return replace(outcome, failures=(*failures, *outcome.failures)) if failures else outcome
+
+
+def _failures(outcome: PlanningOutcome) -> tuple[EngineFailed, ...]:
+    if isinstance(outcome, EngineFailed):
+        return (outcome,)
+    return () if isinstance(outcome, NobodyCan) else outcome.failures
 
 
 async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answers: asyncio.Queue[_Answer]) -> None:
@@ -177,13 +183,6 @@ def _all_failed(failures: Sequence[EngineFailed]) -> EngineFailed:
         return failures[0]
     said = "; ".join(f"{one.engine}: {one.message}" for one in failures)
     return EngineFailed(_names(one.engine for one in failures), said)
-
-
-def _nobody(problem: Problem) -> EngineFailed:
-    needed = ", ".join(sorted(problem.features)) or "STRIPS"
-    ways = [described(one) for one in able(problem.features) if one.races and not installed(one)]
-    could = f"; these could: {', '.join(ways)}" if ways else "; nor is there one that could be"
-    return EngineFailed("none", f"no engine that can do {needed} is installed{could}")
 
 
 def _names(names: Iterable[str]) -> str:

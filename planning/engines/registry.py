@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 from knowledge_base.errors import UnknownNameError
+from planning.plan import NobodyCan
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
@@ -151,6 +152,17 @@ def timing() -> list[Engine]:
 def in_concert() -> str:
     """Who could find a plan with several actions at a time, and how to get him, as text."""
     return "engines that could do several: " + ", ".join(map(described, able({"durations"})))
+
+
+def nobody(problem: Problem, engine: str = "") -> NobodyCan:
+    """The outcome where no engine, or not the only one that may be asked, can do what the problem needs."""
+    could = tuple((one.name, one.lacks()) for one in able(problem.features) if one.races)
+    return NobodyCan(engine, tuple(sorted(problem.features - WISHES)), could)
+
+
+def cannot(name: str, problem: Problem) -> bool:
+    """Whether the engine of that name is known not to do what the problem needs."""
+    return any(one.name == name and not one.can_do(problem.features) for one in ENGINES)
 
 
 def described(one: Engine) -> str:

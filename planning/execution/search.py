@@ -17,6 +17,7 @@ from planning.execution.mending import mending
 from planning.execution.repair import EXCLUDED_SECONDS, without
 from planning.plan import (
     EngineFailed,
+    NobodyCan,
     NoneFound,
     Plan,
     PlanFound,
@@ -25,6 +26,7 @@ from planning.plan import (
     ProvenUnsolvable,
     TimedOut,
 )
+from planning.posing.constructs import why_no_engine
 from planning.posing.problem import pose
 from planning.posing.unsolvable import why_unsolvable
 from planning.validation import Validation, validate
@@ -184,7 +186,7 @@ class Search:
             reproducible = answer.reproducible and mended is None
             return Found(replace(answer, reproducible=reproducible), better=better)
         if not isinstance(answer, ProvenUnsolvable):
-            return _unknown(answer)
+            return _unknown(answer, self._domain, goal)
         if rejected:
             reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
@@ -272,7 +274,9 @@ class Search:
             timer.cancel()
 
 
-def _unknown(answer: NoneFound | TimedOut | EngineFailed) -> NotFound:
+def _unknown(
+    answer: NoneFound | TimedOut | EngineFailed | NobodyCan, domain: PlanningDomain, goal: Expression
+) -> NotFound:
     """No plan, and no proof that there is none."""
     match answer:
         case NoneFound(reason=reason):
@@ -281,6 +285,8 @@ def _unknown(answer: NoneFound | TimedOut | EngineFailed) -> NotFound:
             return NotFound("timed_out", f"no plan within {seconds:g} s ({engine})")
         case EngineFailed(engine=engine, message=message):
             return NotFound("failed", f"{engine}: {message}")
+        case NobodyCan():
+            return NotFound("failed", why_no_engine(domain, goal, answer))
 
 
 def _cancelled_from_outside() -> bool:
