@@ -74,8 +74,8 @@ class Course:
 
     Args:
         steps: the plan's steps.
-        domain: has their conditions and effects.
-        goal: what they are for.
+        domain: has their conditions and effects, without derived predicates.
+        goal: what they are for, in the same way.
         before: pairs of steps of which the first has to be done when the second begins; each pair of the
             sequence if left out.
     """
@@ -89,11 +89,17 @@ class Course:
     ) -> None:
         self.steps = tuple(steps)
         self.goal = goal
-        self._domain = domain
+        self.domain = domain
         self._needs = Needs(self.steps, domain, goal)
         self._before = before
         self._begun: set[int] = set()
         self._done: set[int] = set()
+
+    def renewed(self, domain: PlanningDomain, goal: Expression) -> Course:
+        """Just as far, with conditions written for another state of the world."""
+        course = Course(self.steps, domain, goal, self._before)
+        course._begun, course._done = set(self._begun), set(self._done)
+        return course
 
     def begin(self, number: int) -> None:
         """A step has begun."""
@@ -138,11 +144,11 @@ class Course:
 
     def stands(self, world: World) -> bool:
         """Whether the goal is reached from `world`; each step at work may not have begun or be done."""
-        return any(leads_to(steps, self._domain, world, self.goal) for steps in self._ways_on())
+        return any(leads_to(steps, self.domain, world, self.goal) for steps in self._ways_on())
 
     def shortest_end(self, world: World) -> tuple[PlanStep, ...] | None:
         """The fewest last steps that lead to the goal from `world`, each step at work among them or not."""
-        ends = (shortest_end(steps, self._domain, world, self.goal) for steps in self._ways_on())
+        ends = (shortest_end(steps, self.domain, world, self.goal) for steps in self._ways_on())
         return min((end for end in ends if end is not None), key=len, default=None)
 
     def coming(self) -> tuple[PlanStep, ...]:

@@ -12,6 +12,7 @@ from knowledge_base.language.expression import And, Expression
 from planning.domain import PlanningDomain
 from planning.execution.needs import Needs
 from planning.plan import Plan, PlanStep
+from planning.posing.derived import derivation
 from planning.posing.problem import pose
 from planning.strips import Problem
 from planning.validation import validate
@@ -58,11 +59,13 @@ def mending(
         world: the present.
         goal: what the plan is for.
     """
-    ends = [(end, _needed(end, domain, goal)) for end in _ends(before) if not excluded & set(end)]
+    derived = derivation(domain)
+    closed, wanted = derived.world(world), derived.expand(goal)
+    ends = [(end, _needed(end, derived.domain, wanted)) for end in _ends(before) if not excluded & set(end)]
     near = [
         (unmet + len(end), end, needed)
         for end, needed in ends
-        if needed is not None and (unmet := sum(not _true(one, world) for one in needed)) <= _MOST_UNMET
+        if needed is not None and (unmet := sum(not _true(one, closed) for one in needed)) <= _MOST_UNMET
     ]
     if not near:
         return None
