@@ -13,6 +13,7 @@ from knowledge_base.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.execution.needs import Needs
 from planning.plan import PlanStep
+from planning.posing.costs import TOTAL_COST
 
 _MOST_AT_WORK = 3
 """Of so many steps at work, each is looked at as not begun and as done; of more, only all of them."""
@@ -65,6 +66,16 @@ def _possible(
         if domain.applicable(step, ahead):
             ahead.apply(domain.effects(step, ahead))
             yield step
+
+
+def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
+    """What the steps, taken in this order from `world`, add to `(total-cost)`; their number if it is not declared."""
+    if TOTAL_COST.function not in domain.schema.functions:
+        return len(steps)
+    ahead = Overlay(world)
+    for step in steps:
+        ahead.apply(domain.effects(step, ahead))
+    return ahead.value(TOTAL_COST.function, ()) - world.value(TOTAL_COST.function, ())
 
 
 class Course:

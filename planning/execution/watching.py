@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from dsc.skills import Outcome
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
-from planning.execution.course import Course, shortest_end
+from planning.execution.course import Course, cost_of, shortest_end
 from planning.execution.monitor import Broken, Monitor, News, Reached, Shorter
 from planning.execution.search import Found, NotFound, Search
 from planning.plan import PlanFound
@@ -191,7 +191,7 @@ class _Watch:
                     self._put(_Better(answer))
 
     def _better(self, plan: Plan) -> tuple[PlanStep, ...] | None:
-        """The step at work and then the end of a better plan, if that is shorter than what is left."""
+        """The step at work and then the end of a better plan, if that costs less than what is left."""
         about, course = self._about, self._carried.course
         if self._carried.following is not None or self._said_broken or len(course.at_work) != 1:
             return None
@@ -199,7 +199,9 @@ class _Watch:
         ahead = Overlay(about.knowledge)
         ahead.apply(course.domain.effects(step, ahead))
         end = shortest_end(plan.steps, course.domain, ahead, course.goal)
-        return None if end is None or len(end) >= len(course.coming()) else (step, *end)
+        if end is None or cost_of(end, course.domain, ahead) >= cost_of(course.coming(), course.domain, ahead):
+            return None
+        return (step, *end)
 
     def _follow(self, answer: PlanFound, steps: tuple[PlanStep, ...], kept: int) -> Outcome | None:
         """Let a new plan take the place, after the step at work if it begins with that one too."""
