@@ -68,7 +68,8 @@ def main() -> None:
         print(json.dumps({"engines": engines, "parts": parts, "whole": whole, "optimal": optimal}))
         return
     versions = ", ".join(f"{one.package} {one.version}" for one in ENGINES if one.races and installed(one))
-    text = "\n\n".join([_table(engines), _table(parts), _table(whole), _table(optimal), f"Measured with {versions}; {rounds} rounds."])
+    tables = map(_table, (engines, parts, whole, optimal))
+    text = "\n\n".join([*tables, f"Measured with {versions}; {rounds} rounds."])
     print(text)
     if options.write:
         head, mark, _ = PAGE.read_text(encoding="utf-8").partition(MARK)
@@ -169,7 +170,8 @@ def whole_row(items: int) -> dict[str, Any]:
     spent = replanning.measured(items)
     ours = sum(spent[part] for part in replanning.OURS)
     verdict = f"≤ {OUR_MS} ms: {_verdict(ours <= OUR_MS)}" if items == 25 else ""
-    return {"items": items, **{part: f"{ms:.1f} ms" for part, ms in spent.items()}, "ours": f"{ours:.0f} ms", "": verdict}
+    said = {part: f"{ms:.1f} ms" for part, ms in spent.items()}
+    return {"items": items, **said, "ours": f"{ours:.0f} ms", "": verdict}
 
 
 def optimal_row(items: int) -> dict[str, Any]:
