@@ -52,7 +52,7 @@ check: $(VENV)/.test   ## ruff, mypy strict, import contracts
 conformance: $(VENV)/.test   ## SCION's SCXML charts, fetched with npm into .conformance/, on this engine (WRITE=1 writes the docs)
 	$(BIN)/python tests/conformance/charts.py $(if $(WRITE),--write)
 
-sweep-pddl: $(VENV)/.test   ## the PDDL files that come with unified-planning: read, planned for, plans checked by their validator (WRITE=1 writes the docs)
+sweep-pddl: $(VENV)/.engines   ## the PDDL files that come with unified-planning: read, planned for, plans checked by their validator (WRITE=1 writes the docs)
 	$(BIN)/python -W ignore tests/conformance/pddl_sweep.py $(if $(WRITE),--write)
 
 soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every report true? (SEEDS=N FAULTS=P)

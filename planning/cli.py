@@ -53,24 +53,32 @@ def plan_command(
 
     Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
     """
-    from planning.ordering.order import deordered
-    from planning.plan import PlanFound, ProvenUnsolvable
+    from planning.engines.registry import timing
+    from planning.ordering.order import deordered, scheduled
+    from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
+    from planning.posing.constructs import why_no_engine
     from planning.posing.problem import pose
     from planning.posing.unsolvable import why_unsolvable
 
     domain, read, world = _read(files)
-    problem = pose(domain, world, read.goal, read.metric)
+    problem = pose(domain, world, read.goal, read.metric, durations=bool(timing()) or engine is not None)
     outcome = _solve(problem, seconds, engine)
     status, answer = _answer(outcome)
+    if isinstance(outcome, NobodyCan):
+        answer["reason"] = why_no_engine(domain, read.goal, outcome)
+    notes = [*domain.notes, *read.notes, *problem.notes]
     if isinstance(outcome, ProvenUnsolvable) and explain:
         answer["why"] = list(why_unsolvable(domain, world, read.goal))
     if isinstance(outcome, PlanFound):
-        order = deordered(outcome.plan, domain, world, read.goal)
+        plan = outcome.plan
+        order = scheduled(plan) if plan.schedule else deordered(plan, domain, world, read.goal)
         answer |= _ordered(order) if parallel else {}
         answer |= _purposes(order) if explain else {}
         if plot is not None:
             _write_plot(plot, outcome.plan, domain, order if parallel else None)
-    typer.echo(json.dumps(answer) if as_json else _text(answer), err=status != FOUND and not as_json)
+    for note in () if as_json else notes:
+        typer.echo(f"note: {note}", err=True)
+    typer.echo(json.dumps(answer | {"notes": notes}) if as_json else _text(answer), err=status != FOUND and not as_json)
     raise typer.Exit(status)
 
 
@@ -141,7 +149,8 @@ def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRa
 
     if engine is None:
         return PlannerRace()
-    suited = {one.name: one for one in able(problem.features)}
+    forms = [problem, *([problem.timed] if problem.timed else ())]
+    suited = {one.name: one for form in forms for one in able(form.features)}
     could = f"; for this problem there are {', '.join(suited)}" if suited else ""
     known = [one.name for one in ENGINES]
     if engine not in known:
@@ -167,18 +176,24 @@ def _progress(text: str) -> AbstractContextManager[object]:
 
 def _answer(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
     """Exit status and what is printed."""
-    from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
+    from planning.plan import EngineFailed, NobodyCan, NoneFound, PlanFound, ProvenUnsolvable, TimedOut
 
     match outcome:
         case PlanFound(plan=plan, engine=engine, seconds=seconds, cost=cost):
             found: dict[str, Any] = {"outcome": "plan", "steps": [str(step) for step in plan.steps]}
+            if plan.schedule:
+                found["schedule"] = [[round(one.start, 6), round(one.duration, 6)] for one in plan.schedule]
             return FOUND, {**found, "cost": cost, "engine": engine, "seconds": round(seconds, 3)}
         case ProvenUnsolvable(engine=engine, reason=reason):
             return UNSOLVABLE, {"outcome": "unsolvable", "steps": [], "engine": engine, "reason": reason}
+        case NoneFound(engine=engine, reason=reason):
+            return UNSOLVABLE, {"outcome": "none_found", "steps": [], "engine": engine, "reason": reason}
         case TimedOut(engine=engine, seconds=seconds):
             return TIMED_OUT, {"outcome": "timed_out", "steps": [], "engine": engine, "seconds": seconds}
         case EngineFailed(engine=engine, message=message):
             return FAILED, {"outcome": "engine_failed", "steps": [], "engine": engine, "reason": message}
+        case NobodyCan(engine=engine, message=message):
+            return FAILED, {"outcome": "no_engine", "steps": [], "engine": engine, "reason": message}
 
 
 def _ordered(order: PartialOrder) -> dict[str, Any]:
@@ -219,6 +234,9 @@ def _text(answer: Mapping[str, Any]) -> str:
     match answer["outcome"]:
         case "plan":
             return _plan_text(answer) or "nothing to do: the goal already holds"
+        case "none_found" | "no_engine":
+            reason: str = answer["reason"]
+            return reason
         case "unsolvable":
             return "\n".join([f"there is no plan ({answer['reason']})", *answer.get("why", ())])
         case "timed_out":
@@ -237,12 +255,18 @@ def _plan_text(answer: Mapping[str, Any]) -> str:
         for step in lane:
             others = [one for one in answer.get("waits_for", {}).get(step, ()) if one != before]
             waiting = f"   waits for {', '.join(map(str, others))}" if others else ""
-            lines.append(f"{step:3} {answer['steps'][step - 1]}{waiting}")
+            timed = _time_text(*answer["schedule"][step - 1]) if "schedule" in answer else ""
+            lines.append(f"{step:3} {timed}{answer['steps'][step - 1]}{waiting}")
             before = step
             for purpose in answer.get("purposes", {}).get(step, ()):
                 user = f"step {purpose['for']}" if purpose["for"] else "the goal"
                 lines.append(f"      {purpose['fact']} for {user}")
     return "\n".join(lines)
+
+
+def _time_text(start: float, seconds: float) -> str:
+    """When a step begins and how long it takes, in the way of temporal planners."""
+    return f"{start:8.3f}: [{seconds:g}] "
 
 
 def _engine_table(engines: list[dict[str, Any]]) -> Any:

@@ -49,6 +49,11 @@ class Plan:
         if starts and (len(starts) != len(self.steps) or starts != sorted(starts)):
             raise InputError(f"a schedule has a time for each of the {len(self.steps)} steps, by start; found {starts}")
 
+    @property
+    def seconds(self) -> float:
+        """When all of it is done, by the schedule; 0 without one."""
+        return max((timing.end for timing in self.schedule), default=0.0)
+
     def __str__(self) -> str:
         """One step a line, as planners write plans."""
         return "\n".join(map(str, self.steps))
@@ -64,7 +69,8 @@ class PlanFound:
         seconds: how long that took in real time; differs from run to run.
         simulated_seconds: how long it takes in simulated time; depends on the problem only.
         reproducible: whether no limit of real time had a part in it, so that the same problem gives it again.
-        cost: what its actions cost together; their number, if nobody says what each costs.
+        cost: what its actions cost together; their number, if nobody says what each costs; with a schedule, the
+            seconds until all of it is done.
         from_cache: whether it was found for the same problem before.
         failures: what happened to other engines that were asked as well.
     """
@@ -89,6 +95,15 @@ class ProvenUnsolvable:
 
 
 @dataclass(frozen=True, slots=True)
+class NoneFound:
+    """There is no plan of a narrower kind than was asked for (`reason` says of which); `failures` as in `PlanFound`."""
+
+    engine: str
+    reason: str
+    failures: tuple[EngineFailed, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class TimedOut:
     """The engine was stopped after `seconds` of real time; nothing is known. For `failures` see `PlanFound`."""
 
@@ -105,5 +120,32 @@ class EngineFailed:
     message: str
 
 
-PlanningOutcome = PlanFound | ProvenUnsolvable | TimedOut | EngineFailed
+@dataclass(frozen=True, slots=True)
+class NobodyCan:
+    """No engine was asked, since none that may be can do what the problem needs.
+
+    Attributes:
+        engine: who alone may be asked; empty if all that are installed may.
+        needs: the features of the problem, see `planning.strips.FEATURES`.
+        could: engines that can do that, each with what to do before it can be used; nothing if it only has to be named.
+    """
+
+    engine: str
+    needs: tuple[str, ...]
+    could: tuple[tuple[str, str], ...]
+
+    @property
+    def who(self) -> str:
+        """Who could, in words."""
+        nobody = f"{self.engine} cannot do that" if self.engine else "no installed engine can do that"
+        others = ", ".join(f"{name} could ({how or 'name it as the planner'})" for name, how in self.could)
+        return f"{nobody}, {others or 'nor does anybody known here'}"
+
+    @property
+    def message(self) -> str:
+        """One line: `the problem needs numeric; no installed engine can do that, enhsp could (pip install ...)`."""
+        return f"the problem needs {', '.join(self.needs) or 'STRIPS'}; {self.who}"
+
+
+PlanningOutcome = PlanFound | ProvenUnsolvable | NoneFound | TimedOut | EngineFailed | NobodyCan
 """What comes of asking for a plan."""

@@ -7,12 +7,15 @@ Facts are positive: where a condition needs `(not (p a))`, the fact `(not-p a)` 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
+from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from knowledge_base.facts import Fact
-from planning.plan import Plan, PlanStep
+from planning.plan import Plan, PlanStep, Timing
 from planning.quantities import Assignment, Bound, Numbers, from_json, to_json
+from planning.timeline import FINEST, Act, Changes, Event, Flaw, carried_out
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -22,6 +25,26 @@ FEATURES = ("numeric", "costs", "durations", "derived")
 """What a problem may need of an engine beyond STRIPS; everything else is compiled away when posing."""
 
 _NONE: Numbers = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """What makes a ground action durative; its own conditions and effects are then those at its start.
+
+    Attributes:
+        least, most: how long it may take, in seconds.
+        over_all: facts that must hold all the time between its start and its end.
+        end: facts that must hold just before its end.
+        adds: facts that hold after its end.
+        deletes: facts that hold no longer then, none of them in `adds`.
+    """
+
+    least: float
+    most: float
+    over_all: tuple[Fact, ...] = ()
+    end: tuple[Fact, ...] = ()
+    adds: tuple[Fact, ...] = ()
+    deletes: tuple[Fact, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +61,7 @@ class GroundAction:
         cost: what taking it once adds to the plan's cost; never negative, 1 if nobody says otherwise.
         bounds: what must hold of numbers before.
         assignments: how numbers change, one for each fluent, all computed from the numbers before.
+        span: of a durative action, what it needs and does after its start; such an action has no numbers.
     """
 
     step: PlanStep | None
@@ -47,6 +71,7 @@ class GroundAction:
     cost: float = 1.0
     bounds: tuple[Bound, ...] = ()
     assignments: tuple[Assignment, ...] = ()
+    span: Span | None = None
 
     def applicable(self, state: Collection[Fact], numbers: Numbers = _NONE) -> bool:
         """Whether the precondition holds in `state` and with these numbers."""
@@ -73,7 +98,15 @@ class GroundAction:
 
     def facts(self) -> tuple[Fact, ...]:
         """Every fact it mentions."""
-        return (*self.precondition, *self.adds, *self.deletes)
+        later = () if self.span is None else (*self.span.over_all, *self.span.end, *self.span.adds, *self.span.deletes)
+        return (*self.precondition, *self.adds, *self.deletes, *later)
+
+    def act(self, timing: Timing) -> Act[frozenset[Fact]]:
+        """The action at its time, in a state of facts."""
+        start, span = _event(self.precondition, self.adds, self.deletes), self.span
+        if span is None:
+            return Act(timing, start)
+        return Act(timing, start, partial(_missing, span.over_all), _event(span.end, span.adds, span.deletes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +126,8 @@ class Problem:
         numbers: the numeric fluents' values now, as far as they matter.
         bounds: what shall hold of numbers.
         notes: what was asked for and cannot be had, e.g. a metric that no engine is told about; for people.
+        one_at_a_time: whether durative actions are seen as ordinary ones, so that its having no plan proves nothing.
+        timed: then the same problem with durations, for an engine that can do them; like `whole` not in JSON.
     """
 
     domain: str
@@ -105,6 +140,8 @@ class Problem:
     numbers: Mapping[Fact, float] = field(default_factory=dict)
     bounds: tuple[Bound, ...] = ()
     notes: tuple[str, ...] = ()
+    one_at_a_time: bool = False
+    timed: Problem | None = None
 
     @property
     def features(self) -> frozenset[str]:
@@ -114,7 +151,9 @@ class Problem:
         """
         costs = {action.cost for action in self.actions if action.step is not None}
         numeric = bool(self.bounds) or any(action.bounds or action.assignments for action in self.actions)
-        return frozenset([*(["costs"] if len(costs) > 1 else ()), *(["numeric"] if numeric else ())])
+        durative = any(action.span is not None for action in self.actions)
+        needs = {"costs": len(costs) > 1, "numeric": numeric, "durations": durative}
+        return frozenset(feature for feature, needed in needs.items() if needed)
 
     def cost(self, chosen: Iterable[int]) -> float:
         """What the actions with these indices cost together."""
@@ -150,8 +189,32 @@ class Problem:
         steps = (self.actions[index].step for index in chosen)
         return Plan(tuple(step for step in steps if step is not None))
 
+    def scheduled(self, chosen: Sequence[tuple[int, float, float]]) -> Plan | str:
+        """The plan that has actions (index, start and duration in seconds) begin at their times, or why it is none."""
+        chosen = sorted(chosen, key=itemgetter(1))
+        acts = []
+        for index, start, seconds in chosen:
+            if not 0 <= index < len(self.actions):
+                return f"there is no action number {index}"
+            action = self.actions[index]
+            least, most = (action.span.least, action.span.most) if action.span else (0.0, 0.0)
+            if not least - FINEST <= seconds <= most + FINEST:
+                return f"{action.step} takes {seconds:g} s, which is not between {least:g} and {most:g}"
+            acts.append(action.act(Timing(start, seconds)))
+        state = carried_out(acts, frozenset(self.init), _changed)
+        if isinstance(state, Flaw):
+            return f"{self.actions[chosen[state.act][0]].step} needs {state.why}"
+        missing = [wanted for wanted in self.goal if wanted not in state]
+        if missing:
+            return f"goal fact {missing[0]} does not hold at the end"
+        steps = [(self.actions[index].step, act.timing) for (index, _, _), act in zip(chosen, acts, strict=True)]
+        return Plan(
+            tuple(step for step, _ in steps if step is not None),
+            tuple(timing for step, timing in steps if step is not None),
+        )
+
     def to_json(self) -> dict[str, Any]:
-        """As JSON data, reversible except for `whole`; facts are listed once and referred to by number."""
+        """As JSON data, reversible except for `whole` and `timed`; facts are listed once and referred to by number."""
         number: dict[Fact, int] = {}
 
         def refer(facts: Iterable[Fact]) -> list[int]:
@@ -171,6 +234,7 @@ class Problem:
                     a.cost,
                     [_bound_to_json(one) for one in a.bounds],
                     [[to_json(one.fluent), to_json(one.amount), one.increase] for one in a.assignments],
+                    a.span and [a.span.least, a.span.most, *map(refer, _span_facts(a.span))],
                 ]
                 for a in self.actions
             ],
@@ -178,6 +242,7 @@ class Problem:
             "numbers": [[to_json(fluent), number] for fluent, number in self.numbers.items()],
             "bounds": [_bound_to_json(one) for one in self.bounds],
             "notes": list(self.notes),
+            "one_at_a_time": self.one_at_a_time,
             "whole": self.whole is not None,
         }
         return {"facts": [[f.predicate, *f.args] for f in number], **rest}
@@ -204,13 +269,15 @@ class Problem:
                     cost,
                     tuple(map(_bound_from_json, bounds)),
                     tuple(Assignment(_fluent(one), from_json(amount), more) for one, amount, more in assignments),
+                    None if span is None else Span(span[0], span[1], *map(read, span[2:])),
                 )
-                for step, pre, add, gone, cost, bounds, assignments in data["actions"]
+                for step, pre, add, gone, cost, bounds, assignments, span in data["actions"]
             ),
             unreachable=tuple(data["unreachable"]),
             numbers={_fluent(fluent): number for fluent, number in data["numbers"]},
             bounds=tuple(map(_bound_from_json, data["bounds"])),
             notes=tuple(data["notes"]),
+            one_at_a_time=data["one_at_a_time"],
         )
 
 
@@ -225,3 +292,20 @@ def _bound_from_json(data: Sequence[Any]) -> Bound:
 def _fluent(data: Any) -> Fact:
     name, *args = data["fluent"]
     return Fact(name, tuple(args))
+
+
+def _missing(needed: tuple[Fact, ...], state: frozenset[Fact]) -> str | None:
+    return next((str(one) for one in needed if one not in state), None)
+
+
+def _event(needed: tuple[Fact, ...], adds: tuple[Fact, ...], deletes: tuple[Fact, ...]) -> Event[frozenset[Fact]]:
+    changes = {**dict.fromkeys(deletes, False), **dict.fromkeys(adds, True)}
+    return Event(partial(_missing, needed), lambda _: changes)
+
+
+def _changed(state: frozenset[Fact], changes: Changes) -> frozenset[Fact]:
+    return (state - changes.keys()) | {fact for fact, holds in changes.items() if holds}
+
+
+def _span_facts(span: Span) -> tuple[tuple[Fact, ...], ...]:
+    return span.over_all, span.end, span.adds, span.deletes

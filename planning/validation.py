@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.evaluation import World, explain, holds
+from knowledge_base.facts import Delta
+from knowledge_base.language.evaluation import World, apply_effect, evaluate_term, explain, holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
 from planning.plan import Plan
 from planning.posing.derived import derivation
+from planning.timeline import FINEST, Act, Changes, Event, Flaw, carried_out
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from knowledge_base.facts import Value
+    from knowledge_base.language.effect import Effect
+    from knowledge_base.schema import Schema
     from planning.domain import PlanningDomain
-    from planning.plan import PlanStep
+    from planning.plan import PlanStep, Timing
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,21 +43,99 @@ class Validation:
 def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> Validation:
     """Execute `plan` in thought from `world`, which stays as it is.
 
-    Steps that name no action of the domain, or no known object, make the plan invalid like any other; so does
-    a goal about an object that is not there any more.
+    A plan with a schedule is carried out along its time line, see `planning.timeline`; another one step by step, a
+    durative action as an ordinary one. Steps that name no action of the domain, or no known object, make the plan
+    invalid like any other; so does a goal about an object that is not there any more.
     """
     derived = derivation(domain)
-    ahead = Overlay(derived.world(world))
-    for index, step in enumerate(plan.steps):
-        why_not = _obstacle(step, derived.domain, ahead)
-        if why_not is not None:
-            return Validation(valid=False, failing_step=index, why=why_not)
+    take = _as_scheduled if plan.schedule else _in_turn
+    ahead = take(plan, derived.domain, derived.world(world))
+    if isinstance(ahead, Validation):
+        return ahead
     try:
         wanted = derived.expand(goal)
         reached = holds(wanted, ahead)
         return Validation(reached, why="" if reached else str(explain(wanted, ahead).deciding))
     except InputError as error:
         return Validation(valid=False, why=str(error))
+
+
+def _in_turn(plan: Plan, domain: PlanningDomain, world: World) -> Overlay | Validation:
+    """The world after the steps one after the other, or at which one that ends."""
+    ahead = Overlay(world)
+    for index, step in enumerate(plan.steps):
+        why_not = _obstacle(step, domain, ahead)
+        if why_not is not None:
+            return Validation(valid=False, failing_step=index, why=why_not)
+    return ahead
+
+
+def _as_scheduled(plan: Plan, domain: PlanningDomain, world: World) -> Overlay | Validation:
+    """The world after the steps at their times, or at which one that ends."""
+    acts = []
+    for index, (step, timing) in enumerate(zip(plan.steps, plan.schedule, strict=True)):
+        try:
+            acts.append(_act(step, timing, domain, world))
+        except InputError as error:
+            return Validation(valid=False, failing_step=index, why=str(error))
+
+    def after(state: Overlay, changes: Changes) -> Overlay:
+        ahead = Overlay(world)  # not on top of `state`: a plan may have many moments
+        ahead.apply(state.delta)
+        ahead.apply(_delta(changes, world.schema))
+        return ahead
+
+    end = carried_out(acts, Overlay(world), after)
+    return Validation(valid=False, failing_step=end.act, why=end.why) if isinstance(end, Flaw) else end
+
+
+def _act(step: PlanStep, timing: Timing, domain: PlanningDomain, world: World) -> Act[Overlay]:
+    """The step at its time.
+
+    Raises:
+        InputError: it names something that is not there, or takes longer or shorter than its action.
+    """
+    action, bindings = domain.action(step), domain.bindings(step)
+    for parameter in action.parameters:
+        arg = bindings[parameter.name]
+        if not world.schema.fits(world.type_of(arg) or "", parameter.types):
+            raise InputError(f"{step} is not possible: '{arg}' is no {' or '.join(parameter.types)}")
+    timed, duration = action.timed, action.duration
+    if timed is None or duration is None:
+        return Act(timing, _event(action.precondition, action.effect, bindings))
+    least, most = (float(evaluate_term(one, world, bindings)) for one in (duration.least, duration.most))
+    if not least - FINEST <= timing.duration <= most + FINEST:
+        raise InputError(f"{step} takes {timing.duration:g} s, which is not between {least:g} and {most:g}")
+    start, end = (
+        _event(condition, effect, bindings)
+        for condition, effect in ((timed.start, timed.start_effect), (timed.end, timed.end_effect))
+    )
+    return Act(timing, start, partial(_missing, timed.over_all, bindings), end)
+
+
+def _event(condition: Expression, effect: Effect, bindings: Mapping[str, Value]) -> Event[Overlay]:
+    return Event(partial(_missing, condition, bindings), partial(_changes, effect, bindings))
+
+
+def _missing(condition: Expression, bindings: Mapping[str, Value], state: Overlay) -> str | None:
+    try:
+        return None if holds(condition, state, bindings) else str(explain(condition, state, bindings).deciding)
+    except InputError as error:
+        return str(error)
+
+
+def _changes(effect: Effect, bindings: Mapping[str, Value], state: Overlay) -> Changes:
+    made = apply_effect(effect, state, bindings)
+    return {**dict.fromkeys(made.removed, False), **dict.fromkeys(made.added, True), **made.values}
+
+
+def _delta(changes: Changes, schema: Schema) -> Delta:
+    facts = {one: so for one, so in changes.items() if one.predicate in schema.predicates}
+    return Delta(
+        added=tuple(one for one, so in facts.items() if so),
+        removed=tuple(one for one, so in facts.items() if not so),
+        values={one: number for one, number in changes.items() if one not in facts},
+    )
 
 
 def _obstacle(step: PlanStep, domain: PlanningDomain, ahead: Overlay) -> str | None:

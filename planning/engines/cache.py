@@ -81,4 +81,5 @@ def _key(problem: Problem) -> Hashable:
     """What determines the answer: the order in which facts were told does not."""
     numbers = frozenset(problem.numbers.items())
     goal = (frozenset(problem.goal), frozenset(problem.bounds))
-    return (problem.domain, frozenset(problem.init), numbers, goal, problem.actions, problem.unreachable)
+    timed = None if problem.timed is None else _key(problem.timed)
+    return (problem.domain, frozenset(problem.init), numbers, goal, problem.actions, problem.unreachable, timed)

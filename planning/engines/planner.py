@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import threading
 import time
 from contextlib import AbstractContextManager, aclosing, nullcontext
@@ -15,7 +16,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
-from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.engines.registry import can_time, cannot, in_concert, nobody
+from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable, Sequence
@@ -72,7 +74,8 @@ class PlannerProcess:
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
         """Plan within `seconds` of real time, counted while the engine works.
 
-        A problem that was sliced is tried as a whole if the slice has no plan, or none in half the time.
+        A problem that was sliced is tried as a whole if the slice has no plan, or none in half the time. So is one
+        with durations, by an engine that can do these, before it is tried with one action at a time.
         """
         async with aclosing(self.plans(problem, seconds)) as plans:
             return await anext(plans)
@@ -88,7 +91,7 @@ class PlannerProcess:
             return
         async with self._turn():
             with self._clock_hold():
-                async with aclosing(self._sliced(problem, seconds)) as outcomes:
+                async with aclosing(self._tried(problem, seconds)) as outcomes:
                     async for outcome in outcomes:
                         yield outcome
 
@@ -116,33 +119,46 @@ class PlannerProcess:
         return self._lock
 
     def _without_search(self, problem: Problem) -> PlanningOutcome | None:
-        if problem.unreachable:
-            return ProvenUnsolvable(self.engine, "unreachable: " + ", ".join(problem.unreachable))
-        if not problem.goal and not problem.bounds:
+        if problem.unreachable and not self._timed(problem):
+            return self._none(problem, "unreachable: " + ", ".join(problem.unreachable))
+        if not problem.goal and not problem.bounds and not problem.unreachable:
             return PlanFound(Plan(), self.engine, 0.0, problem.simulated_seconds)
+        if cannot(self.engine, problem):
+            return nobody(problem, self.engine)
         return None
 
-    async def _sliced(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        whole = problem.whole
-        if whole is None:
-            async for outcome in self._attempt(problem, seconds):
-                yield outcome
-            return
-        started, cut_short = time.monotonic(), False
-        async with aclosing(self._attempt(problem, seconds / 2)) as outcomes:
+    def _none(self, problem: Problem, reason: str) -> ProvenUnsolvable | NoneFound:
+        if not problem.one_at_a_time:
+            return ProvenUnsolvable(self.engine, reason)
+        return NoneFound(self.engine, f"no plan with one action at a time ({reason}); {in_concert()}")
+
+    def _timed(self, problem: Problem) -> bool:
+        """Whether this engine can be asked for a plan with durations."""
+        return problem.timed is not None and can_time(self.engine)
+
+    def _forms(self, problem: Problem) -> list[Problem]:
+        """The forms of a problem in which it is tried, one after the other."""
+        forms = (problem.timed if self._timed(problem) else None, problem, problem.whole)
+        return [one for one in forms if one is not None and not one.unreachable]
+
+    async def _tried(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+        """The plans of the first form that has one; each but the last gets half of the time that is left."""
+        *first, last = self._forms(problem)
+        cut_short = False
+        for form in first:
+            started = time.monotonic()
+            async with aclosing(self._attempt(form, seconds / 2)) as outcomes:
+                async for outcome in outcomes:
+                    if not isinstance(outcome, PlanFound | EngineFailed):
+                        cut_short |= isinstance(outcome, TimedOut)
+                        break
+                    yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
+                else:
+                    return
+            seconds -= min(time.monotonic() - started, seconds / 2)  # a new start is not planning time
+        async with aclosing(self._attempt(last, seconds)) as outcomes:
             async for outcome in outcomes:
-                if not isinstance(outcome, PlanFound | EngineFailed):
-                    cut_short = isinstance(outcome, TimedOut)
-                    break
-                yield outcome
-            else:
-                return
-        spent = min(time.monotonic() - started, seconds / 2)  # a new start is not planning time
-        async for outcome in self._attempt(whole, seconds - spent):
-            if isinstance(outcome, PlanFound):
-                yield replace(outcome, reproducible=not cut_short)
-            else:
-                yield TimedOut(self.engine, seconds) if isinstance(outcome, TimedOut) else outcome
+                yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
 
     async def _attempt(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
         """The first outcome and each cheaper plan; anything but a plan is the last."""
@@ -202,15 +218,32 @@ class PlannerProcess:
         """What the engine's answer is worth: a plan counts only if it solves the problem."""
         if "failed" in answer:
             return EngineFailed(self.engine, str(answer["failed"]))
+        durations = "durations" in problem.features
         chosen = answer.get("actions", "no actions")
         if chosen is None:
-            return ProvenUnsolvable(self.engine, "the search was exhausted")
-        if not isinstance(chosen, list) or not all(type(index) is int for index in chosen):
+            return self._none(problem, "the search was exhausted")
+        try:
+            plan = problem.scheduled(_times(answer["timed"])) if durations else problem.plan(_numbers(chosen))
+        except (KeyError, TypeError, ValueError):
             return EngineFailed(self.engine, f"no answer: {str(answer)[:80]}")
-        plan = problem.plan(chosen)
         if isinstance(plan, str):
             return EngineFailed(self.engine, f"its plan is no solution: {plan}")
-        return PlanFound(plan, self.engine, seconds, problem.simulated_seconds, cost=problem.cost(chosen))
+        cost = plan.seconds if durations else problem.cost(chosen)
+        return PlanFound(plan, self.engine, seconds, problem.simulated_seconds, cost=cost)
+
+
+def _numbers(chosen: Any) -> list[int]:
+    if not isinstance(chosen, list) or not all(type(index) is int for index in chosen):
+        raise TypeError
+    return chosen
+
+
+def _times(timed: Any) -> list[tuple[int, float, float]]:
+    times = [(index, float(start), float(seconds)) for index, start, seconds in timed]
+    _numbers([index for index, _, _ in times])
+    if not all(math.isfinite(start) and math.isfinite(seconds) for _, start, seconds in times):
+        raise ValueError
+    return times
 
 
 async def _answers(

@@ -7,13 +7,14 @@ who wins a race depends on the machine.
 from __future__ import annotations
 
 import asyncio
+import time
 from contextlib import aclosing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from planning.engines.planner import PlannerProcess
-from planning.engines.registry import able, chosen, installed
-from planning.plan import EngineFailed, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.engines.registry import chosen, nobody
+from planning.plan import EngineFailed, NobodyCan, NoneFound, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 from planning.strips import Problem
 
 if TYPE_CHECKING:
@@ -25,6 +26,9 @@ _PLAIN = Problem("", {}, (), (), ())
 
 _Answer = tuple[str, PlanningOutcome | None]
 """Who says it, and what; nothing when it has said everything."""
+
+_Failing = PlanFound | ProvenUnsolvable | NoneFound | TimedOut
+"""What can name others that failed."""
 
 
 class PlannerRace:
@@ -61,11 +65,34 @@ class PlannerRace:
     async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
         """As `solve`, and then each cheaper plan that one of the engines finds in the rest of the time.
 
+        A problem with durations, too, is first given to engines that can do these; if they find no plan in half the
+        time, it is tried with one action at a time.
+
         Closing it ends all searches: `async with contextlib.aclosing(...)`.
         """
-        engines = self._choose(problem)
+        failures: tuple[EngineFailed, ...] = ()
+        engines = [] if problem.timed is None else self._choose(problem.timed)
+        if problem.timed is not None and engines:
+            started, limit = time.monotonic(), seconds if problem.unreachable else seconds / 2
+            async with aclosing(self._raced(engines, problem.timed, limit)) as outcomes:
+                outcome = await anext(outcomes)
+                if isinstance(outcome, PlanFound) or problem.unreachable:
+                    yield outcome
+                    async for outcome in outcomes:
+                        yield outcome
+                    return
+            seconds -= min(time.monotonic() - started, limit)
+            failures = _failures(outcome)
+        async with aclosing(self._raced(self._choose(problem), replace(problem, timed=None), seconds)) as outcomes:
+            async for outcome in outcomes:
+                yield outcome if isinstance(outcome, EngineFailed | NobodyCan) else _with(failures, outcome)
+
+    async def _raced(
+        self, engines: Sequence[Engine], problem: Problem, seconds: float
+    ) -> AsyncGenerator[PlanningOutcome, None]:
+        """What these engines say to one form of a problem."""
         if not engines:
-            yield _nobody(problem)
+            yield nobody(problem)
             return
         for task in self._improving:
             task.cancel()
@@ -102,6 +129,16 @@ class PlannerRace:
         return self._planners[name]
 
 
+def _with(failures: tuple[EngineFailed, ...], outcome: _Failing) -> PlanningOutcome:
+    return replace(outcome, failures=(*failures, *outcome.failures)) if failures else outcome
+
+
+def _failures(outcome: PlanningOutcome) -> tuple[EngineFailed, ...]:
+    if isinstance(outcome, EngineFailed):
+        return (outcome,)
+    return () if isinstance(outcome, NobodyCan) else outcome.failures
+
+
 async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answers: asyncio.Queue[_Answer]) -> None:
     try:
         async with aclosing(planner.plans(problem, seconds)) as plans:
@@ -128,7 +165,7 @@ async def _better_and_better(
             case PlanFound() if best is None or outcome.cost < best.cost:
                 best = replace(outcome, failures=tuple(failures))
                 yield best
-            case ProvenUnsolvable() if best is None:
+            case ProvenUnsolvable() | NoneFound() if best is None:
                 yield replace(outcome, failures=tuple(failures))
                 return
             case EngineFailed():
@@ -146,13 +183,6 @@ def _all_failed(failures: Sequence[EngineFailed]) -> EngineFailed:
         return failures[0]
     said = "; ".join(f"{one.engine}: {one.message}" for one in failures)
     return EngineFailed(_names(one.engine for one in failures), said)
-
-
-def _nobody(problem: Problem) -> EngineFailed:
-    needed = ", ".join(sorted(problem.features)) or "STRIPS"
-    ways = [f"{one.name} ({one.lacks()})" for one in able(problem.features) if one.races and not installed(one)]
-    could = f"; these could: {', '.join(ways)}" if ways else "; nor is there one that could be"
-    return EngineFailed("none", f"no engine that can do {needed} is installed{could}")
 
 
 def _names(names: Iterable[str]) -> str:

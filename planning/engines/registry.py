@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 from knowledge_base.errors import UnknownNameError
+from planning.plan import NobodyCan
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
@@ -101,7 +102,7 @@ ENGINES = (
     ),
     Engine(
         "aries", "up", "up_aries.solver:Aries", "up-aries", "MIT",
-        features=frozenset({"durations"}), extra="durations", proves=False, most_actions=300,
+        features=frozenset({"durations"}), extra="durations", proves=False, deterministic=False, most_actions=300,
     ),
     Engine(
         "fast-downward-opt", "fast_downward", "optimal", "up-fast-downward", "GPL-3.0",
@@ -138,9 +139,44 @@ def installed(one: Engine) -> bool:
     return not one.lacks()
 
 
+def can_time(name: str) -> bool:
+    """Whether the engine of that name, if there is one, plans with durations."""
+    return any(one.name == name and "durations" in one.features for one in ENGINES)
+
+
+def timing() -> list[Engine]:
+    """The installed engines that plan with durations and are chosen by themselves."""
+    return [one for one in able({"durations"}) if one.races and installed(one)]
+
+
+def in_concert() -> str:
+    """Who could find a plan with several actions at a time, and how to get him, as text."""
+    return "engines that could do several: " + ", ".join(map(described, able({"durations"})))
+
+
+def nobody(problem: Problem, engine: str = "") -> NobodyCan:
+    """The outcome where no engine, or not the only one that may be asked, can do what the problem needs."""
+    could = tuple((one.name, one.lacks()) for one in able(problem.features) if one.races)
+    return NobodyCan(engine, tuple(sorted(problem.features - WISHES)), could)
+
+
+def cannot(name: str, problem: Problem) -> bool:
+    """Whether the engine of that name is known not to do what the problem needs."""
+    return any(one.name == name and not one.can_do(problem.features) for one in ENGINES)
+
+
+def described(one: Engine) -> str:
+    """The engine, and what to do before it can be used."""
+    lacks = one.lacks()
+    return f"{one.name} ({lacks})" if lacks else one.name
+
+
 def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:
-    """The engines that shall race for a plan, at most `AT_ONCE`; none if none that can is installed."""
+    """The engines that shall race for a plan, at most `AT_ONCE`; none if none that can is installed.
+
+    Nor is one chosen for a problem with durations that is too large for it: one action at a time is quicker then.
+    """
     racing = [one for one in able(problem.features) if one.races and usable(one)]
     size = len(problem.actions)
     fitting = [one for one in racing if one.most_actions is None or size <= one.most_actions]
-    return (fitting or racing)[:AT_ONCE]
+    return (fitting or ([] if "durations" in problem.features else racing))[:AT_ONCE]

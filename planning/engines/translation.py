@@ -1,7 +1,8 @@
 """Our problem as unified-planning's, built straight, without PDDL text.
 
 Facts are fluents (`f0`, ...), numeric fluents are real fluents (`n0`, ...), ground actions are actions (`a0`, ...),
-all without parameters. Names are numbers in the problem, so that nothing depends on what objects are called.
+all without parameters; those with a span are durative actions, with times in `ticks`. Names are numbers in the
+problem, so that nothing depends on what objects are called.
 """
 
 from __future__ import annotations
@@ -11,7 +12,14 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from unified_planning.environment import Environment
-from unified_planning.model import Fluent, InstantaneousAction
+from unified_planning.model import (
+    DurativeAction,
+    EndTiming,
+    Fluent,
+    InstantaneousAction,
+    OpenTimeInterval,
+    StartTiming,
+)
 from unified_planning.model import Problem as UpProblem
 from unified_planning.model.metrics import MinimizeActionCosts
 
@@ -21,7 +29,7 @@ from planning.quantities import Assignment, Bound, Operation, Quantity
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from planning.strips import GroundAction, Problem
+    from planning.strips import GroundAction, Problem, Span
 
 
 def translated(problem: Problem, *, costs: bool = False, environment: Environment | None = None) -> UpProblem:
@@ -36,6 +44,12 @@ def translated(problem: Problem, *, costs: bool = False, environment: Environmen
     return _Translation(problem, Environment() if environment is None else environment, costs=costs).result
 
 
+def ticks(problem: Problem) -> int:
+    """How many units of time a second has in the translation: not every engine takes fractions of one."""
+    spans = [action.span for action in problem.actions if action.span is not None]
+    return math.lcm(*(_nearly(one).denominator for span in spans for one in (span.least, span.most)))
+
+
 class _Translation:
     def __init__(self, problem: Problem, environment: Environment, *, costs: bool) -> None:
         self._environment = environment
@@ -43,6 +57,7 @@ class _Translation:
         self._expressions = self._environment.expression_manager
         self._fluents: dict[Fact, Fluent] = {}
         self._numbers: dict[Fact, Fluent] = {}
+        self._ticks = ticks(problem)
         self.result = UpProblem("problem", self._environment)
         for fluent, number in problem.numbers.items():
             self.result.set_initial_value(self._number(fluent), _exact(number))
@@ -72,7 +87,27 @@ class _Translation:
             self.result.add_fluent(self._numbers[one], default_initial_value=0)
         return self._numbers[one]
 
-    def _action(self, name: str, action: GroundAction) -> InstantaneousAction:
+    def _action(self, name: str, action: GroundAction) -> InstantaneousAction | DurativeAction:
+        return self._ordinary(name, action) if action.span is None else self._durative(name, action, action.span)
+
+    def _durative(self, name: str, action: GroundAction, span: Span) -> DurativeAction:
+        translation = DurativeAction(name, _env=self._environment)
+        least, most = (int(_nearly(one) * self._ticks) for one in (span.least, span.most))
+        translation.set_closed_duration_interval(least, most)
+        start, end = StartTiming(), EndTiming()
+        needed = {start: action.precondition, OpenTimeInterval(start, end): span.over_all, end: span.end}
+        for when, facts in needed.items():
+            for one in facts:
+                translation.add_condition(when, self._fluent(one))
+        changed = ((start, action.deletes, action.adds), (end, span.deletes, span.adds))
+        for at, deletes, adds in changed:
+            for one in deletes:
+                translation.add_effect(at, self._fluent(one), value=False)
+            for one in adds:
+                translation.add_effect(at, self._fluent(one), value=True)
+        return translation
+
+    def _ordinary(self, name: str, action: GroundAction) -> InstantaneousAction:
         translation = InstantaneousAction(name, _env=self._environment)
         for one in action.precondition:
             translation.add_precondition(self._fluent(one))
@@ -130,8 +165,13 @@ def _exact(number: float) -> Fraction:
     return Fraction(repr(number))
 
 
+def _nearly(number: float) -> Fraction:
+    """The same to a thousandth."""
+    return _exact(number).limit_denominator(1000)
+
+
 def _whole(costs: Sequence[float]) -> list[int]:
     """Whole numbers in the same proportion, to a thousandth: not every engine takes fractions."""
-    exact = [_exact(cost).limit_denominator(1000) for cost in costs]
+    exact = [_nearly(cost) for cost in costs]
     common = math.lcm(*(cost.denominator for cost in exact))
     return [int(cost * common) for cost in exact]

@@ -13,7 +13,7 @@ from unified_planning.engines import PlanGenerationResultStatus, pddl_planner
 from unified_planning.plans import TimeTriggeredPlan
 from up_pyperplan.engine import EngineImpl  # type: ignore[import-untyped]
 
-from planning.engines.translation import translated
+from planning.engines.translation import ticks, translated
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from unified_planning.model import InstantaneousAction
 
     from planning.engines.registry import Engine
+    from planning.engines.worker import Schedule
     from planning.strips import Problem
 
 
@@ -60,7 +61,7 @@ def _by_name(atom: Any) -> str:
     return str(atom.name)
 
 
-def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | None]]:
+def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | Schedule | None]]:
     """The search with an engine made by the class `module:name`, for `planning.engines.worker`.
 
     Raises:
@@ -70,9 +71,13 @@ def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | None]]
     found = getattr(import_module(module), name)
     make = Pyperplan if issubclass(found, EngineImpl) else found
 
-    def search(problem: Problem) -> Iterator[list[int] | None]:
+    def search(problem: Problem) -> Iterator[list[int] | Schedule | None]:
         costs = "costs" in engine.features & problem.features
-        yield _actions(make().solve(translated(problem, costs=costs)))
+        answer = make().solve(translated(problem, costs=costs))
+        if "durations" in problem.features and answer.plan is not None:
+            yield {"timed": _timed(answer.plan, ticks(problem))}
+        else:
+            yield _actions(answer)
 
     return search
 
@@ -95,6 +100,14 @@ def _actions(result: PlanGenerationResult) -> list[int] | None:
     if any(words in said for words in _NO_MEMORY):
         raise MemoryError
     raise RuntimeError(f"it ended with status {result.status.name} {' '.join(said.split())[-200:]}".rstrip())
+
+
+def _timed(plan: TimeTriggeredPlan, ticks: int) -> list[tuple[int, float, float]]:
+    """Index, start and duration, in seconds, of actions whose times are in ticks."""
+    return [
+        (int(action.action.name[1:]), float(start / ticks), float((duration or 0) / ticks))
+        for start, action, duration in plan.timed_actions
+    ]
 
 
 def _start(timed: Any) -> Any:

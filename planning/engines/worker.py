@@ -6,7 +6,8 @@ and may crash as it likes.
 
 One JSON object a line. The worker begins with `{"ready": true}`. For each problem (`Problem.to_json`) on
 standard input it says `{"searching": G}`, G being the process group of the search and of all that it starts;
-then answers, `{"actions": [3, 0, ...]}` (each plan better than the one before), `{"actions": null}` when there
+then answers, `{"actions": [3, 0, ...]}` or, with the seconds at which each begins and that it takes, `{"timed":
+[[3, 0.0, 5.0], ...]}` (each plan better than the one before), `{"actions": null}` when there
 is proven to be no plan, or `{"failed": "why"}`; and at last, always, `{"ended": STATUS}`. It ends when its
 standard input does, and the search with it: a planner never outlives who asked.
 """
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     from planning.strips import Problem
 
 _PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
+
+Schedule = dict[str, list[tuple[int, float, float]]]
+"""A plan with times as it is answered."""
 
 MEGABYTES = 2048
 """Memory that a search may take, each of its processes by itself, if nobody says otherwise."""
@@ -69,7 +73,7 @@ def _say(out: int, said: dict[str, Any]) -> None:
         data = data[os.write(out, data) :]
 
 
-def _loaded(name: str) -> Callable[[Problem], Iterator[list[int] | None]]:
+def _loaded(name: str) -> Callable[[Problem], Iterator[list[int] | Schedule | None]]:
     """The engine's search; if it cannot be imported, one that says so to each problem."""
     try:
         import planning.strips  # noqa: F401, PLC0415  before the first fork, so that no search pays for it
@@ -77,11 +81,11 @@ def _loaded(name: str) -> Callable[[Problem], Iterator[list[int] | None]]:
 
         one = engine(name)
         driver = import_module(f"planning.engines.{one.driver}")
-        searching: Callable[[Problem], Iterator[list[int] | None]] = driver.searching(one)
+        searching: Callable[[Problem], Iterator[list[int] | Schedule | None]] = driver.searching(one)
     except Exception as error:  # noqa: BLE001  a broken installation is an answer, too
         failure = error
 
-        def failing(problem: Problem) -> Iterator[list[int] | None]:  # noqa: ARG001
+        def failing(problem: Problem) -> Iterator[list[int] | Schedule | None]:  # noqa: ARG001
             raise failure
 
         return failing
@@ -89,7 +93,7 @@ def _loaded(name: str) -> Callable[[Problem], Iterator[list[int] | None]]:
 
 
 def _serve(
-    line: bytes, search: Callable[[Problem], Iterator[list[int] | None]], out: int, megabytes: int
+    line: bytes, search: Callable[[Problem], Iterator[list[int] | Schedule | None]], out: int, megabytes: int
 ) -> None:
     heard, said = os.pipe()
     lifeline, held = os.pipe()
@@ -153,7 +157,7 @@ def _kill_group(group: int) -> None:
 
 def _search(
     line: bytes,
-    search: Callable[[Problem], Iterator[list[int] | None]],
+    search: Callable[[Problem], Iterator[list[int] | Schedule | None]],
     said: int,
     lifeline: int,
     megabytes: int,
@@ -188,12 +192,12 @@ def _limit_memory(megabytes: int) -> None:
     os.environ["JAVA_TOOL_OPTIONS"] = f"-Xmx{max(16, megabytes // 2)}m {unwritten}"
 
 
-def _answer(line: bytes, search: Callable[[Problem], Iterator[list[int] | None]], said: int) -> None:
+def _answer(line: bytes, search: Callable[[Problem], Iterator[list[int] | Schedule | None]], said: int) -> None:
     from planning.strips import Problem  # noqa: PLC0415  see _loaded
 
     try:
         for actions in search(Problem.from_json(json.loads(line))):
-            _say(said, {"actions": actions})
+            _say(said, actions if isinstance(actions, dict) else {"actions": actions})
     except MemoryError:
         _say(said, {"failed": "it ran out of memory"})
     except Exception as error:  # noqa: BLE001  an engine may raise anything

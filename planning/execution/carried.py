@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator
 
+    from knowledge_base.language.expression import Expression
     from planning.execution.course import Course
     from planning.execution.repair import Attempt
     from planning.ordering.order import PartialOrder
@@ -21,6 +22,7 @@ class Carried:
 
     Attributes:
         name: its plot's.
+        goal: what was asked for.
         course: how far it is.
         order: which of its steps wait for which.
         attempt: what has been tried for its goal.
@@ -34,6 +36,7 @@ class Carried:
     """
 
     name: str
+    goal: Expression
     course: Course
     order: PartialOrder
     attempt: Attempt

@@ -20,6 +20,7 @@ from planning.generation.plot import plot_from_plan
 from planning.generation.steps import expectation, implementing
 from planning.ordering.order import PartialOrder, deordered, in_sequence, scheduled
 from planning.plan import Plan
+from planning.posing.derived import derivation
 
 if TYPE_CHECKING:
     from dsc.dynamic.library import Library
@@ -74,7 +75,8 @@ class PlanningComponent(Component):
         shared: Collection[str] = (),
     ) -> None:
         super().__init__()
-        self._domain = domain
+        self._derivation = derivation(domain)
+        self._domain = self._derivation.domain
         self._library = library
         self._knowledge = knowledge
         self._working_for = working_for
@@ -127,18 +129,19 @@ class PlanningComponent(Component):
         `unsolvable`, `timed_out` or `failed`.
         """
         before = self._carried.pop(after, None)
-        wanted = parse_condition(goal)
-        if holds(wanted, self._knowledge):
+        wanted, now = parse_condition(goal), self._derivation.at(self._knowledge)
+        if holds(now.condition(wanted), self._knowledge):
             return Outcome("goal_holds")
         self._telling.asked(goal, self._knowledge.version)
         try:
             found = await self._search.plan(wanted, seconds, () if before is None else before.course.left_steps)
             if isinstance(found, NotFound):
                 return self._none(found.kind, found.reason)
+            now = self._derivation.at(self._knowledge)
             order = self._order(found.answer.plan, wanted)
-            course = Course(found.steps, self._domain, wanted, order.before)
+            course = Course(found.steps, now.domain, now.condition(wanted), order.before)
             attempt = Attempt() if before is None else before.attempt
-            carried = Carried(self._new_name(), course, order, attempt, holder, seconds, replans, found.better)
+            carried = Carried(self._new_name(), wanted, course, order, attempt, holder, seconds, replans, found.better)
             form = self._plot(carried)
         except InputError as error:
             return self._none("failed", str(error))
@@ -151,7 +154,8 @@ class PlanningComponent(Component):
     async def judge(self, call: SkillCall, goal: str) -> Outcome:  # noqa: ARG002
         """Say whether the goal holds, and if not, which part of it is missing."""
         try:
-            why = explain(parse_condition(goal), self._knowledge)
+            wanted = self._derivation.at(self._knowledge).condition(parse_condition(goal))
+            why = explain(wanted, self._knowledge)
         except InputError as error:  # what the goal is about is not there any more
             return Outcome("goal_open", {"reason": str(error)})
         return Outcome("goal_holds") if why.truth else Outcome("goal_open", {"reason": str(why.deciding)})
@@ -174,7 +178,8 @@ class PlanningComponent(Component):
             return author == CHART or author in self._working_for(call.action_id)
 
         watching = Watching(
-            self._required(plan), self._domain, self._knowledge, self._search, self._telling, self._new_name, is_own,
+            self._required(plan), self._derivation, self._knowledge, self._search, self._telling, self._new_name,
+            is_own,
         )  # fmt: skip
         return await watching.watch()
 
@@ -192,6 +197,9 @@ class PlanningComponent(Component):
         `plan_found` goes on without asking the planner, `replan` says that it has to be asked.
         """
         carried = self._required(plan)
+        if self._derivation.recursive:
+            now = self._derivation.at(self._knowledge)
+            carried.course = carried.course.renewed(now.domain, now.condition(carried.goal))
         course, attempt = carried.course, carried.attempt
         if _holds(course.goal, self._knowledge):
             del self._carried[plan]
@@ -199,7 +207,7 @@ class PlanningComponent(Component):
         if carried.following is None:
             end = course.shortest_end(self._knowledge)
         else:
-            end = shortest_end(carried.following, self._domain, self._knowledge, course.goal)
+            end = shortest_end(carried.following, course.domain, self._knowledge, course.goal)
         failed = None if carried.stopped else self._failed_step(course)
         if end is not None and (carried.following is not None if failed is None else failed not in end):
             return self._go_on(carried, end, why)
@@ -224,7 +232,7 @@ class PlanningComponent(Component):
             return attempt.interrupted(end[0] if end else None), None
         choice = self._choice(failed)
         others = choice is not None and len(implementing(failed, self._library)) > 1
-        failure = Failure(failed, why, situation(self._domain, self._knowledge, course.goal))
+        failure = Failure(failed, why, situation(course.domain, self._knowledge, course.goal))
         return attempt.failed(failure, stands=end is not None, others=others), choice
 
     def _failed_step(self, course: Course) -> PlanStep | None:
@@ -255,9 +263,11 @@ class PlanningComponent(Component):
         else:
             self._telling.resumed(carried.name, name, steps[0], why, instead_of)
         del self._carried[carried.name]
-        order = self._order(Plan(steps), carried.course.goal)
-        course = Course(steps, self._domain, carried.course.goal, order.before)
-        again = Carried(name, course, order, carried.attempt, carried.holder, carried.seconds, carried.replans)
+        order, before = self._order(Plan(steps), carried.goal), carried.course
+        course = Course(steps, before.domain, before.goal, order.before)
+        again = Carried(
+            name, carried.goal, course, order, carried.attempt, carried.holder, carried.seconds, carried.replans
+        )
         return self._carry(again, self._plot(again, instead_of))
 
     def _give_up(self, carried: Carried, reason: str) -> Outcome:
@@ -271,8 +281,8 @@ class PlanningComponent(Component):
 
     def _plot(self, carried: Carried, instead_of: str | None = None) -> dict[str, Any]:
         rules = self._library.plot(carried.holder).rules if carried.holder in self._library else ()
-        plan = Plan(carried.course.steps)
-        plot = plot_from_plan(plan, self._domain, self._library, rules, carried.name, carried.order, self._shared)
+        plan, domain = Plan(carried.course.steps), carried.course.domain
+        plot = plot_from_plan(plan, domain, self._library, rules, carried.name, carried.order, self._shared)
         form = plot.to_form()
         if instead_of is not None:
             _put_last(instead_of, _state(plot, form, "step_1")["dynamic"])
@@ -282,7 +292,9 @@ class PlanningComponent(Component):
         """Which steps wait for which."""
         if plan.schedule:
             return scheduled(plan)
-        return deordered(plan, self._domain, self._knowledge, goal) if self._parallel else in_sequence(plan)
+        if not self._parallel:
+            return in_sequence(plan)
+        return deordered(plan, self._derivation.original, self._knowledge, goal)
 
     def _carry(self, carried: Carried, form: dict[str, Any]) -> Outcome:
         self._carried[carried.name] = carried

@@ -13,6 +13,7 @@ from knowledge_base.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.execution.needs import Needs
 from planning.plan import PlanStep
+from planning.posing.costs import TOTAL_COST
 
 _MOST_AT_WORK = 3
 """Of so many steps at work, each is looked at as not begun and as done; of more, only all of them."""
@@ -67,6 +68,16 @@ def _possible(
             yield step
 
 
+def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
+    """What the steps, taken in this order from `world`, add to `(total-cost)`; their number if it is not declared."""
+    if TOTAL_COST.function not in domain.schema.functions:
+        return len(steps)
+    ahead = Overlay(world)
+    for step in steps:
+        ahead.apply(domain.effects(step, ahead))
+    return ahead.value(TOTAL_COST.function, ()) - world.value(TOTAL_COST.function, ())
+
+
 class Course:
     """How far a plan is; steps are spoken of by their number, from 1.
 
@@ -74,8 +85,8 @@ class Course:
 
     Args:
         steps: the plan's steps.
-        domain: has their conditions and effects.
-        goal: what they are for.
+        domain: has their conditions and effects, without derived predicates.
+        goal: what they are for, in the same way.
         before: pairs of steps of which the first has to be done when the second begins; each pair of the
             sequence if left out.
     """
@@ -89,11 +100,17 @@ class Course:
     ) -> None:
         self.steps = tuple(steps)
         self.goal = goal
-        self._domain = domain
+        self.domain = domain
         self._needs = Needs(self.steps, domain, goal)
         self._before = before
         self._begun: set[int] = set()
         self._done: set[int] = set()
+
+    def renewed(self, domain: PlanningDomain, goal: Expression) -> Course:
+        """Just as far, with conditions written for another state of the world."""
+        course = Course(self.steps, domain, goal, self._before)
+        course._begun, course._done = set(self._begun), set(self._done)
+        return course
 
     def begin(self, number: int) -> None:
         """A step has begun."""
@@ -138,11 +155,11 @@ class Course:
 
     def stands(self, world: World) -> bool:
         """Whether the goal is reached from `world`; each step at work may not have begun or be done."""
-        return any(leads_to(steps, self._domain, world, self.goal) for steps in self._ways_on())
+        return any(leads_to(steps, self.domain, world, self.goal) for steps in self._ways_on())
 
     def shortest_end(self, world: World) -> tuple[PlanStep, ...] | None:
         """The fewest last steps that lead to the goal from `world`, each step at work among them or not."""
-        ends = (shortest_end(steps, self._domain, world, self.goal) for steps in self._ways_on())
+        ends = (shortest_end(steps, self.domain, world, self.goal) for steps in self._ways_on())
         return min((end for end in ends if end is not None), key=len, default=None)
 
     def coming(self) -> tuple[PlanStep, ...]:

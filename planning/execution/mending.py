@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
@@ -12,6 +12,7 @@ from knowledge_base.language.expression import And, Expression
 from planning.domain import PlanningDomain
 from planning.execution.needs import Needs
 from planning.plan import Plan, PlanStep
+from planning.posing.derived import derivation
 from planning.posing.problem import pose
 from planning.strips import Problem
 from planning.validation import validate
@@ -58,11 +59,16 @@ def mending(
         world: the present.
         goal: what the plan is for.
     """
-    ends = [(end, _needed(end, domain, goal)) for end in _ends(before) if not excluded & set(end)]
+    derived = derivation(domain)
+    closed, wanted = derived.world(world), derived.expand(goal)
+    needs = Needs(before, derived.domain, wanted)  # of all ends, since a shorter one is the end of a longer one
+    numbers = range(1, len(before) + 1)
+    firsts = [first for first in range(min(_MOST_LEFT_OUT + 1, len(before))) if not excluded & set(before[first:])]
+    ends = [(tuple(before[first:]), needs.before(tuple(numbers[first:]))) for first in firsts]
     near = [
         (unmet + len(end), end, needed)
         for end, needed in ends
-        if needed is not None and (unmet := sum(not _true(one, world) for one in needed)) <= _MOST_UNMET
+        if needed is not None and (unmet := sum(not _true(one, closed) for one in needed)) <= _MOST_UNMET
     ]
     if not near:
         return None
@@ -72,14 +78,6 @@ def mending(
     except InputError:  # what the end needs cannot be asked for
         return None
     return None if problem.unreachable else Mending(end, problem)
-
-
-def _ends(steps: Sequence[PlanStep]) -> list[tuple[PlanStep, ...]]:
-    return [tuple(steps[first:]) for first in range(min(_MOST_LEFT_OUT + 1, len(steps)))]
-
-
-def _needed(end: tuple[PlanStep, ...], domain: PlanningDomain, goal: Expression) -> Iterable[Expression] | None:
-    return Needs(end, domain, goal).before(tuple(range(1, len(end) + 1)))
 
 
 def _true(condition: Expression, world: World) -> bool:

@@ -103,4 +103,5 @@ def without(problem: Problem, steps: Collection[PlanStep]) -> Problem:
     """The problem of reaching the goal without taking any of these steps."""
     allowed = tuple(action for action in problem.actions if action.step not in steps)
     whole = None if problem.whole is None else without(problem.whole, steps)
-    return replace(problem, actions=allowed, whole=whole)
+    timed = None if problem.timed is None else without(problem.timed, steps)
+    return replace(problem, actions=allowed, whole=whole, timed=timed)

@@ -12,9 +12,21 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from planning.engines.improving import Improving
+from planning.engines.registry import timing
 from planning.execution.mending import mending
 from planning.execution.repair import EXCLUDED_SECONDS, without
-from planning.plan import EngineFailed, PlanFound, PlanningOutcome, PlanStep, ProvenUnsolvable, TimedOut
+from planning.plan import (
+    EngineFailed,
+    NobodyCan,
+    NoneFound,
+    Plan,
+    PlanFound,
+    PlanningOutcome,
+    PlanStep,
+    ProvenUnsolvable,
+    TimedOut,
+)
+from planning.posing.constructs import why_no_engine
 from planning.posing.problem import pose
 from planning.posing.unsolvable import why_unsolvable
 from planning.validation import Validation, validate
@@ -38,6 +50,7 @@ MAX_REJECTED = 5
 """How many plans the simulation may reject."""
 PATIENCE = 90.0
 """Seconds of real time beyond its own for a planner that does not keep to it; starting an engine may take a minute."""
+_IN_CONCERT = "there is only a plan with several steps at a time that need each other, which is not carried out yet"
 MENDING_SECONDS = 2.0
 """Real time for finding out how to mend a plan, at most."""
 
@@ -130,6 +143,11 @@ class Search:
             if self._clock.simulated:
                 await self._clock.sleep(found.answer.simulated_seconds)
             verdict = validate(found.answer.plan, self._domain, self._knowledge, goal)
+            if verdict.valid and found.answer.plan.schedule:
+                alone = validate(Plan(found.steps), self._domain, self._knowledge, goal)
+                if not alone.valid:
+                    await found.close()
+                    return NotFound("failed", f"{_IN_CONCERT}: {alone.why} ({found.answer.engine})")
             if verdict.valid:
                 verdict = await self._foreseen(found)
                 if verdict.valid:
@@ -161,15 +179,14 @@ class Search:
         if isinstance(mended, Found):
             return mended
         with self._clock.hold():  # grounding takes its time as well: in a thread, so that a stop is obeyed
-            problem = await asyncio.to_thread(pose, self._domain, snapshot, goal)
+            durations = not self._clock.simulated and bool(timing())
+            problem = await asyncio.to_thread(pose, self._domain, snapshot, goal, durations=durations)
         answer, better = await self._answer(problem, seconds, rejected)
         if isinstance(answer, PlanFound):
             reproducible = answer.reproducible and mended is None
             return Found(replace(answer, reproducible=reproducible), better=better)
-        if isinstance(answer, TimedOut):
-            return NotFound("timed_out", f"no plan within {answer.seconds:g} s ({answer.engine})")
-        if isinstance(answer, EngineFailed):
-            return NotFound("failed", f"{answer.engine}: {answer.message}")
+        if not isinstance(answer, ProvenUnsolvable):
+            return _unknown(answer, self._domain, goal)
         if rejected:
             reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
@@ -255,6 +272,21 @@ class Search:
             return EngineFailed(engine, f"{type(error).__name__}: {error}")
         finally:
             timer.cancel()
+
+
+def _unknown(
+    answer: NoneFound | TimedOut | EngineFailed | NobodyCan, domain: PlanningDomain, goal: Expression
+) -> NotFound:
+    """No plan, and no proof that there is none."""
+    match answer:
+        case NoneFound(reason=reason):
+            return NotFound("unsolvable", reason)
+        case TimedOut(engine=engine, seconds=seconds):
+            return NotFound("timed_out", f"no plan within {seconds:g} s ({engine})")
+        case EngineFailed(engine=engine, message=message):
+            return NotFound("failed", f"{engine}: {message}")
+        case NobodyCan():
+            return NotFound("failed", why_no_engine(domain, goal, answer))
 
 
 def _cancelled_from_outside() -> bool:

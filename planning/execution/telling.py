@@ -26,10 +26,12 @@ class Telling:
         self._trace.record("plan.asked", goal=goal, version=version)
 
     def found(self, answer: PlanFound, name: str) -> None:
-        """There is a plan."""
-        limit = {} if answer.reproducible else _CUT_SHORT
+        """There is a plan; engines that were asked as well and failed are named."""
+        more: dict[str, Any] = {} if answer.reproducible else dict(_CUT_SHORT)
+        if answer.failures:
+            more["failures"] = [{"engine": one.engine, "message": one.message} for one in answer.failures]
         steps = [str(step) for step in answer.plan.steps]
-        self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine, **limit)
+        self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine, **more)
 
     def none(self, kind: str, reason: str) -> None:
         """There is none."""

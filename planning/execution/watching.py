@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING
 from dsc.skills import Outcome
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
-from planning.execution.course import Course, shortest_end
+from planning.execution.course import Course, cost_of, shortest_end
 from planning.execution.monitor import Broken, Monitor, News, Reached, Shorter
 from planning.execution.search import Found, NotFound, Search
 from planning.plan import PlanFound
 
 if TYPE_CHECKING:
+    from knowledge_base.facts import Change
     from knowledge_base.store import KnowledgeBase
-    from planning.domain import PlanningDomain
     from planning.execution.carried import Carried
     from planning.execution.telling import Telling
     from planning.plan import Plan, PlanningOutcome, PlanStep
+    from planning.posing.derived import Derivation, Settled
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +46,14 @@ class Watching:
 
     Attributes:
         carried: the plan.
-        domain, knowledge, search, telling: as in the planning component.
+        derivation: of the planning domain.
+        knowledge, search, telling: as in the planning component.
         new_name: names a plan.
         is_own: whether a change by this author is the running step's own doing.
     """
 
     carried: Carried
-    domain: PlanningDomain
+    derivation: Derivation
     knowledge: KnowledgeBase
     search: Search
     telling: Telling
@@ -81,18 +83,24 @@ class _Watch:
         self._carried = about.carried
         self._put = hear
         self._said_broken = False
+        self._settled: Settled | None = None
+        self._unsubscribe: Callable[[], None] = lambda: None
         self._monitor: Monitor | None = None
         self._beside: list[asyncio.Task[None]] = []
 
     def begin(self) -> None:
         carried = self._carried
         carried.begun = self._begun
+        if self._about.derivation.recursive:
+            self._settled = self._about.derivation.at(self._about.knowledge)
+            self._unsubscribe = self._about.knowledge.subscribe(self._changed)
         self._look("earlier")  # the world went on between the search and now
         if carried.better is not None:
             self._beside.append(asyncio.create_task(self._improve(carried.better)))
 
     def end(self) -> None:
         self._carried.begun = None
+        self._unsubscribe()
         for task in self._beside:
             task.cancel()
         if self._monitor is not None:
@@ -125,11 +133,20 @@ class _Watch:
                 outcome = None if better is None else self._follow(answer, better, 0)
         return outcome
 
+    def _changed(self, change: Change) -> None:
+        """What recursive predicates stand for may be another now, so that the plan has to be looked at anew."""
+        settled = self._about.derivation.at(self._about.knowledge)
+        if settled != self._settled:
+            self._settled, carried = settled, self._carried
+            carried.course = carried.course.renewed(settled.domain, settled.condition(carried.goal))
+            self._look(change.author)
+
     def _look(self, author: str) -> None:
         about = self._about
         if self._monitor is not None:
             self._monitor.close()
-        self._monitor = Monitor(self._carried.course, about.domain, about.knowledge, about.is_own, self._hear)
+        course = self._carried.course
+        self._monitor = Monitor(course, course.domain, about.knowledge, about.is_own, self._hear)
         self._monitor.look(author)
 
     def _hear(self, news: News) -> None:
@@ -157,10 +174,10 @@ class _Watch:
         return later and within_budget and carried.following is None
 
     async def _plan_meanwhile(self) -> None:
-        course = self._carried.course
-        self._about.telling.asked(to_text(course.goal), self._about.knowledge.version)
+        goal, course = self._carried.goal, self._carried.course
+        self._about.telling.asked(to_text(goal), self._about.knowledge.version)
         try:
-            found = await self._about.search.plan(course.goal, self._carried.seconds, course.left_steps)
+            found = await self._about.search.plan(goal, self._carried.seconds, course.left_steps)
             if isinstance(found, Found):
                 await found.close()
         except Exception as error:  # noqa: BLE001  whatever goes wrong beside a plan must not leave it unwatched
@@ -174,15 +191,17 @@ class _Watch:
                     self._put(_Better(answer))
 
     def _better(self, plan: Plan) -> tuple[PlanStep, ...] | None:
-        """The step at work and then the end of a better plan, if that is shorter than what is left."""
+        """The step at work and then the end of a better plan, if that costs less than what is left."""
         about, course = self._about, self._carried.course
         if self._carried.following is not None or self._said_broken or len(course.at_work) != 1:
             return None
         step = course.steps[course.at_work[0] - 1]
         ahead = Overlay(about.knowledge)
-        ahead.apply(about.domain.effects(step, ahead))
-        end = shortest_end(plan.steps, about.domain, ahead, course.goal)
-        return None if end is None or len(end) >= len(course.coming()) else (step, *end)
+        ahead.apply(course.domain.effects(step, ahead))
+        end = shortest_end(plan.steps, course.domain, ahead, course.goal)
+        if end is None or cost_of(end, course.domain, ahead) >= cost_of(course.coming(), course.domain, ahead):
+            return None
+        return (step, *end)
 
     def _follow(self, answer: PlanFound, steps: tuple[PlanStep, ...], kept: int) -> Outcome | None:
         """Let a new plan take the place, after the step at work if it begins with that one too."""
@@ -192,7 +211,7 @@ class _Watch:
         about.telling.found(answer, carried.following_name)
         if [carried.course.steps[number - 1] for number in carried.course.at_work] != list(steps[:1]):
             return Outcome("plan_changed", {"why": "a new plan begins in another way"})
-        carried.course = Course(steps, about.domain, carried.course.goal)
+        carried.course = Course(steps, carried.course.domain, carried.course.goal)
         carried.course.begin(1)
         self._said_broken = False
         self._look("earlier")

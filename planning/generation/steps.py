@@ -16,9 +16,11 @@ from knowledge_base.language.expression import (
     And,
     Arithmetic,
     Atom,
+    Comparison,
     Constant,
     Expression,
     Not,
+    Or,
     Term,
     substitute,
     substitute_term,
@@ -139,12 +141,25 @@ def _step(
         limit = Constant(seconds)
     return CarriedStep(
         text=str(step),
-        needed=parts(substitute(action.precondition, bindings)),
+        needed=tuple(one for one in parts(substitute(action.precondition, bindings)) if not _decided(one)),
         over_all=tuple(substitute(one, bindings) for one in _watched(action)),
         effect=substitute_effect(action.effect, bindings),
         expected=() if assumed else parts(expectation(action.effect, bindings)),
         content=content, assumed=assumed, seconds=limit, **more,
     )  # fmt: skip
+
+
+def _decided(e: Expression) -> bool:
+    """Whether it holds whatever the world is like; what a recursive predicate stands for is such a condition."""
+    match e:
+        case Comparison("=", Constant(one), Constant(other)):
+            return one == other
+        case And(those):
+            return all(map(_decided, those))
+        case Or(those):
+            return any(map(_decided, those))
+        case _:
+            return False
 
 
 def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None:

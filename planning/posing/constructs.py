@@ -12,10 +12,11 @@ from planning.posing.derived import derivation
 from planning.posing.relevance import names_of, relevant
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from knowledge_base.errors import Place
     from planning.domain import PlanningDomain
+    from planning.plan import NobodyCan
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,22 +54,16 @@ def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Con
                 yield Construct(owner, to_text(comparison), comparison.place)
 
 
-def why_no_engine(domain: PlanningDomain, goal: Expression, could: Mapping[str, str]) -> str:
-    """Why no engine can be asked: the construct, its place, and who could.
+def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: NobodyCan) -> str:
+    """Why no engine can be asked, in one line: the construct, its place, who could, and how to get him.
 
     Args:
         domain: the planning domain.
         goal: what shall hold.
-        could: engines that can do what the problem needs -> what to do before they can be used.
+        nobody: what came of asking.
     """
     construct = next(numeric_constructs(domain, goal), None)
-    return _who(could) if construct is None else f"{construct}; {_who(could)}"
-
-
-def _who(could: Mapping[str, str]) -> str:
-    if not could:
-        return "no engine known here can do that"
-    return "no installed engine can do that, " + ", ".join(f"{name} could ({how})" for name, how in could.items())
+    return nobody.message if construct is None else f"{construct}; {nobody.who}"
 
 
 def _comparisons(e: Expression | Term) -> Iterator[Comparison]:

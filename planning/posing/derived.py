@@ -7,7 +7,7 @@ least fixpoint, stratum by stratum as in Datalog. Otherwise it cannot be planned
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import networkx as nx
@@ -22,6 +22,7 @@ from knowledge_base.language.expression import (
     Atom,
     Call,
     Comparison,
+    Constant,
     Exists,
     Expression,
     Forall,
@@ -41,8 +42,9 @@ from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.posing.relevance import changed, names_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
+    from knowledge_base.facts import Value
     from knowledge_base.language.evaluation import World
     from planning.domain import Axiom, PlanningAction, PlanningDomain
 
@@ -60,10 +62,12 @@ class Derivation:
     """A domain without its derived predicates, and what replaces them.
 
     Attributes:
+        original: the domain as it is written.
         domain: the domain with conditions in their place, as far as that can be.
     """
 
     def __init__(self, domain: PlanningDomain) -> None:
+        self.original = domain
         self._axioms: dict[str, list[Axiom]] = {}
         for axiom in domain.axioms:
             self._axioms.setdefault(axiom.predicate, []).append(axiom)
@@ -76,7 +80,7 @@ class Derivation:
         reached = {name: {name, *nx.descendants(graph, name)} for name in self._recursive}
         self._unsupported = {name: changing & follows for name, follows in reached.items() if changing & follows}
         if domain.axioms:
-            actions = {name: self._action(action) for name, action in domain.actions.items()}
+            actions = {name: rewritten(action, self.expand) for name, action in domain.actions.items()}
             domain = replace(domain, actions=actions, axioms=())
         self.domain = domain
 
@@ -111,6 +115,22 @@ class Derivation:
             while facts := [fact for fact in self._consequences(circle, closed) if not _holds(fact, closed)]:
                 closed.apply(Delta(added=tuple(dict.fromkeys(facts))))
         return closed
+
+    def at(self, world: World) -> Settled:
+        """The domain for the world as it is, and as long as nothing changes that recursive predicates follow from."""
+        closed = self.world(world)
+        supported = [name for circle in self._circles for name in sorted(circle) if name not in self._unsupported]
+        facts = frozenset(
+            Fact(name, tuple(args))
+            for name in supported
+            for args in closed.match(name, (None,) * len(self._schema.predicates[name].parameters))
+        )
+        return Settled(self, facts, frozenset(supported))
+
+    @property
+    def recursive(self) -> bool:
+        """Whether a predicate follows from itself, so that what it stands for depends on the world."""
+        return bool(self._recursive)
 
     def require_supported(self, goal: Expression, actions: Iterable[PlanningAction]) -> None:
         """Raise an error if the expanded goal or actions ask for a predicate that cannot be planned with.
@@ -156,30 +176,6 @@ class Derivation:
                     )
         return graph
 
-    def _action(self, action: PlanningAction) -> PlanningAction:
-        timed = action.timed and replace(
-            action.timed,
-            start=self.expand(action.timed.start),
-            over_all=self.expand(action.timed.over_all),
-            end=self.expand(action.timed.end),
-            start_effect=self._effect(action.timed.start_effect),
-            end_effect=self._effect(action.timed.end_effect),
-        )
-        return replace(
-            action, precondition=self.expand(action.precondition), effect=self._effect(action.effect), timed=timed
-        )
-
-    def _effect(self, effect: Effect) -> Effect:
-        match effect:
-            case AllOf(parts):
-                return replace(effect, parts=tuple(map(self._effect, parts)))
-            case ForEach(_, body):
-                return replace(effect, effect=self._effect(body))
-            case When(condition, body):
-                return replace(effect, condition=self.expand(condition), effect=self._effect(body))
-            case _:
-                return effect
-
     def _instance(self, axiom: Axiom, atom: Atom) -> Expression:
         """The axiom's condition for the atom's arguments, and their types where the axiom asks for narrower ones."""
         declared = self._schema.predicates[axiom.predicate].parameters
@@ -201,7 +197,80 @@ class Derivation:
                     yield Fact(name, tuple(found[p.name] for p in axiom.parameters))
 
 
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A domain that the bare knowledge base can judge: nothing derived is left in it.
+
+    Attributes:
+        derivation: of the domain.
+        facts: of recursive predicates, which replace them.
+        predicates: these predicates.
+    """
+
+    derivation: Derivation = field(compare=False, repr=False)
+    facts: frozenset[Fact]
+    predicates: frozenset[str]
+
+    @property
+    def domain(self) -> PlanningDomain:
+        """The domain without derived predicates."""
+        domain = self.derivation.domain
+        if not self.predicates:
+            return domain
+        actions = {name: rewritten(action, self._replaced) for name, action in domain.actions.items()}
+        return replace(domain, actions=actions)
+
+    def condition(self, e: Expression) -> Expression:
+        """The condition without derived predicates."""
+        expanded = self.derivation.expand(e)
+        return self._replaced(expanded) if self.predicates else expanded
+
+    def _replaced(self, e: Expression) -> Expression:
+        match e:
+            case Atom(name, args) if name in self.predicates:
+                known = sorted((one.args for one in self.facts if one.predicate == name), key=str)
+                return Or(tuple(And(tuple(map(_equal, args, values))) for values in known), place=e.place)
+            case Not(body) | Exists(_, body) | Forall(_, body):
+                return replace(e, body=self._replaced(body))
+            case And(parts) | Or(parts):
+                return replace(e, parts=tuple(map(self._replaced, parts)))
+            case Imply(premise, conclusion):
+                return Imply(self._replaced(premise), self._replaced(conclusion), place=e.place)
+            case _:
+                return e
+
+
+def _equal(term: Term, value: Value) -> Expression:
+    return Comparison("=", term, Constant(value))
+
+
 _known: IdentityCache[PlanningDomain, Derivation] = IdentityCache(size=64)
+
+
+def rewritten(action: PlanningAction, rewrite: Callable[[Expression], Expression]) -> PlanningAction:
+    """The action with each of its conditions rewritten."""
+    timed = action.timed and replace(
+        action.timed,
+        start=rewrite(action.timed.start),
+        over_all=rewrite(action.timed.over_all),
+        end=rewrite(action.timed.end),
+        start_effect=_rewritten(action.timed.start_effect, rewrite),
+        end_effect=_rewritten(action.timed.end_effect, rewrite),
+    )
+    effect = _rewritten(action.effect, rewrite)
+    return replace(action, precondition=rewrite(action.precondition), effect=effect, timed=timed)
+
+
+def _rewritten(effect: Effect, rewrite: Callable[[Expression], Expression]) -> Effect:
+    match effect:
+        case AllOf(parts):
+            return replace(effect, parts=tuple(_rewritten(part, rewrite) for part in parts))
+        case ForEach(_, body):
+            return replace(effect, effect=_rewritten(body, rewrite))
+        case When(condition, body):
+            return replace(effect, condition=rewrite(condition), effect=_rewritten(body, rewrite))
+        case _:
+            return effect
 
 
 def _strata(graph: nx.DiGraph[str]) -> Iterator[frozenset[str]]:

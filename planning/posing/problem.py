@@ -27,6 +27,7 @@ from planning.posing.groundwork import Groundwork, numbered, things_of
 from planning.posing.interchange import spared
 from planning.posing.reduction import Task, pruned, reachable
 from planning.posing.relevance import Relevant, relevant
+from planning.posing.timed import durative, pose_timed
 from planning.posing.unforeseeable import refuse_unforeseeable
 from planning.posing.ways import Ways
 from planning.quantities import Bound
@@ -44,7 +45,9 @@ _ONE_OF = "one of"
 _MOST_KEPT = 8  # goals of different kinds, each with its ground actions
 
 
-def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Metric | None = None) -> Problem:
+def pose(
+    domain: PlanningDomain, world: World, goal: Expression, metric: Metric | None = None, *, durations: bool = False
+) -> Problem:
     """The problem of reaching `goal` from `world`, which stays as it is.
 
     What the next problem of the same domain needs again is kept; see `Poser`.
@@ -54,6 +57,7 @@ def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Metric 
         world: the present.
         goal: what shall hold.
         metric: what makes a plan better than another; to minimize `(total-cost)` if the domain declares that.
+        durations: whether there is somebody to ask who plans with durations: `timed` of the problem is for him.
 
     Raises:
         InputError: the goal has a free variable, or names something that is not declared or not known.
@@ -62,7 +66,7 @@ def pose(domain: PlanningDomain, world: World, goal: Expression, metric: Metric 
         UnsupportedActionError: so does an action that matters, or it has too many alternatives.
     """
     poser = _posers.find(domain, None) or _posers.keep(domain, None, Poser(domain))
-    return poser.pose(world, goal, metric)
+    return poser.pose(world, goal, metric, durations=durations)
 
 
 def check_goal(goal: Expression, world: World) -> None:
@@ -99,12 +103,24 @@ class Poser:
         self._kept: dict[tuple[tuple[str, ...], frozenset[str], Term | None], tuple[Groundwork, Assembly]] = {}
         self._lock = threading.Lock()
 
-    def pose(self, world: World, goal: Expression, metric: Metric | None = None) -> Problem:
+    def pose(
+        self, world: World, goal: Expression, metric: Metric | None = None, *, durations: bool = False
+    ) -> Problem:
         """See `planning.posing.problem.pose`."""
         check_goal(goal, world)
-        world = self._derivation.world(world)
-        if holds(self._derivation.expand(goal), world):
+        world, wanted = self._derivation.world(world), self._derivation.expand(goal)
+        if holds(wanted, world):
             return self._nothing()
+        problem = self._one_at_a_time(world, goal, metric)
+        if not durative(self._domain, wanted):
+            return problem
+        timed = pose_timed(self._domain, world, wanted) if durations or problem.unreachable else None
+        if timed is not None and timed.unreachable:
+            return timed
+        return replace(problem, one_at_a_time=True, timed=timed if durations else None)
+
+    def _one_at_a_time(self, world: World, goal: Expression, metric: Metric | None) -> Problem:
+        """The problem with durative actions as ordinary ones."""
         amount = metric_of(metric, world.schema)
         with self._lock:
             posing = self.posing(world, goal, amount)

@@ -31,9 +31,20 @@ from knowledge_base.exchange.pddl import ProblemText, read_problem
 from knowledge_base.language.evaluation import evaluate_term
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
+from planning.engines import registry
 from planning.engines.race import PlannerRace
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
-from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.plan import (
+    EngineFailed,
+    NobodyCan,
+    NoneFound,
+    Plan,
+    PlanFound,
+    PlanningOutcome,
+    ProvenUnsolvable,
+    TimedOut,
+)
+from planning.posing.constructs import why_no_engine
 from planning.posing.problem import pose
 
 PAGE = Path(__file__).parents[2] / "docs" / "pddl.md"
@@ -64,8 +75,8 @@ class Result:
     """What became of one pair.
 
     Attributes:
-        verdict: `plan`, `unsolvable`, `no sequential plan`, `timed out`, `not read`, `not posed`, `engine failed` or
-            `wrong`.
+        verdict: `plan`, `unsolvable`, `no sequential plan`, `timed out`, `not read`, `not posed`, `engine failed`,
+            `no engine` or `wrong`.
         engine: who said so.
         steps: the length of the plan.
         detail: why not; for a plan, what unified-planning says to it.
@@ -133,23 +144,33 @@ def tried(pair: Pair, seconds: float) -> Result:
     """What becomes of one pair of files."""
     try:
         domain, problem = read(pair)
-        posed = pose(domain, world_of(domain, problem), problem.goal, problem.metric)
+        posed = pose(domain, world_of(domain, problem), problem.goal, problem.metric, durations=bool(registry.timing()))
     except InputError as error:
         verdicts = [verdict for kind, verdict in REFUSED.items() if isinstance(error, kind)]
         said = str(error).replace(f"{pair.problem.parent}/", "")
         return Result(pair.name, verdicts[0] if verdicts else "wrong", detail=said)
-    match asyncio.run(_solved(posed, seconds)):
-        case PlanFound(plan, engine):
-            said = judged(pair, plan, domain, problem)
-            verdict = "wrong" if said.startswith("invalid") else "plan"
-            return Result(pair.name, verdict, engine, len(plan.steps), said)
+    outcome = asyncio.run(_solved(posed, seconds))
+    if isinstance(outcome, NobodyCan):
+        return Result(pair.name, "no engine", detail=why_no_engine(domain, problem.goal, outcome))
+    if isinstance(outcome, PlanFound):
+        said = judged(pair, outcome.plan, domain, problem)
+        verdict = "wrong" if said.startswith("invalid") else "plan"
+        return Result(pair.name, verdict, outcome.engine, len(outcome.plan.steps), said)
+    return _planless(pair.name, outcome)
+
+
+def _planless(name: str, outcome: PlanningOutcome) -> Result:
+    match outcome:
         case ProvenUnsolvable(engine, reason):
-            verdict = "no sequential plan" if _durative(domain) else "unsolvable"
-            return Result(pair.name, verdict, engine, detail=reason)
+            return Result(name, "unsolvable", engine, detail=reason)
+        case NoneFound(engine, reason):
+            return Result(name, "no sequential plan", engine, detail=reason)
         case TimedOut(engine, limit):
-            return Result(pair.name, "timed out", engine, detail=f"after {limit:g} s")
+            return Result(name, "timed out", engine, detail=f"after {limit:g} s")
         case EngineFailed(engine, message):
-            return Result(pair.name, "engine failed", engine, detail=message)
+            return Result(name, "engine failed", engine, detail=message)
+        case _:
+            raise TypeError(outcome)
 
 
 def judged(pair: Pair, plan: Plan, domain: PlanningDomain, problem: ProblemText) -> str:

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from dsc.text.plots import parse_plot
 from knowledge_base.errors import InputError
 from planning.cli import doctor_command, plan_command
+from planning.engines import registry
 from planning.engines.registry import ENGINES
 from planning.plan import EngineFailed
 
@@ -95,7 +96,7 @@ def test_without_any_engine_the_command_says_what_could_be_installed(run, monkey
     monkeypatch.setattr("planning.engines.registry.Engine.version", None)
     result = run()
     assert result.exit_code == 4
-    assert "fast-downward (pip install 'dynamic-state-charts[fast]')" in result.stderr
+    assert "fast-downward could (pip install 'dynamic-state-charts[fast]')" in result.stderr
 
 
 def test_a_domain_may_come_in_fragments(run, tmp_path, domain_file):
@@ -229,3 +230,33 @@ def test_the_command_line_loads_no_planner():
     script = f"import planning.cli, sys; print([m for m in {heavy} if m in sys.modules])"
     shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert shown.stdout.strip() == "[]"
+
+
+JARS = """(define (domain jars) (:requirements :no-such-thing) (:types jar)
+  (:predicates (sealed ?j - jar)) (:functions (litres ?j - jar) (price ?j - jar))
+  (:action fill :parameters (?j - jar) :effect (and (increase (litres ?j) 1) (assign (price ?j) (litres ?j))))
+  (:action seal :parameters (?j - jar) :precondition (> (litres ?j) 1) :effect (sealed ?j)))
+"""
+SEAL = "(define (problem p) (:domain jars) (:objects a - jar) (:goal (sealed a)) (:metric minimize (price a)))"
+
+
+def test_where_no_engine_can_be_asked_the_condition_and_who_could_are_named(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(registry.Engine, "lacks", lambda one: "pip install x" if "numeric" in one.features else "")
+    (tmp_path / "jars.pddl").write_text(JARS)
+    result = run(problem=SEAL, domains=[tmp_path / "jars.pddl"])
+    assert result.exit_code == 4
+    assert "jars.pddl:4:" in result.stderr
+    assert "(> (litres ?j) 1); no installed engine can do that, enhsp could (pip install x)" in result.stderr
+
+
+def test_notes_about_files_and_the_problem_are_printed(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(registry.Engine, "lacks", lambda one: "pip install x" if "numeric" in one.features else "")
+    (tmp_path / "jars.pddl").write_text(JARS)
+    said = run(problem=SEAL, domains=[tmp_path / "jars.pddl"])
+    [about_file, about_metric, _] = said.stderr.splitlines()
+    assert about_file.startswith("note: ")
+    assert ":no-such-thing" in about_file
+    assert about_metric.startswith("note: the metric (price a) is ignored")
+    answer = json.loads(run("--json", problem=SEAL, domains=[tmp_path / "jars.pddl"]).stdout)
+    assert [f"note: {one}" for one in answer["notes"]] == [about_file, about_metric]
+    assert answer["outcome"] == "no_engine"

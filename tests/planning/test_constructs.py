@@ -2,8 +2,11 @@ from __future__ import annotations
 
 import pytest
 
+from knowledge_base.facts import fact
 from knowledge_base.language.parser import parse_condition
+from planning import Executive
 from planning.domain import PlanningDomain
+from planning.plan import NobodyCan
 from planning.posing.constructs import numeric_constructs, why_no_engine
 
 JARS = """(define (domain jars) (:types jar)
@@ -48,5 +51,22 @@ def test_numbers_that_nobody_changes_ask_nothing_of_an_engine(jars):
 
 def test_who_could_plan_is_said_with_how_to_get_it(jars):
     goal = parse_condition("(exists (?j - jar) (sealed ?j))")
-    assert "enhsp could (pip install x)" in why_no_engine(jars, goal, {"enhsp": "pip install x"})
-    assert why_no_engine(jars, goal, {}).endswith("(> (litres ?j) 2); no engine known here can do that")
+    said = why_no_engine(jars, goal, NobodyCan("", ("numeric",), (("enhsp", "pip install x"),)))
+    assert said.endswith("(> (litres ?j) 2); no installed engine can do that, enhsp could (pip install x)")
+    said = why_no_engine(jars, goal, NobodyCan("pyperplan", ("numeric",), ()))
+    assert said.endswith("(> (litres ?j) 2); pyperplan cannot do that, nor does anybody known here")
+
+
+def test_without_such_a_construct_it_is_said_what_is_needed(jars):
+    said = why_no_engine(jars, parse_condition("(washed a)"), NobodyCan("", (), (("enhsp", ""),)))
+    assert said == "the problem needs STRIPS; no installed engine can do that, enhsp could (name it as the planner)"
+
+
+def test_a_robot_says_which_condition_no_engine_that_it_may_ask_can_do(jars, world_of):
+    """In simulated time that is pyperplan alone."""
+    robot = Executive(jars, [], [], world_of(jars.schema, {"a": "jar"}, values={fact("size", "a"): 2}))
+    with robot:
+        [outcome] = robot.achieve("(sealed a)").emitted
+    reason = outcome.attributes["reason"]
+    assert (outcome.name, "jars.pddl:6:" in reason, "(> (litres ?j) 2)" in reason) == ("no_plan", True, True)
+    assert "pyperplan cannot do that, enhsp could (" in reason

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, able, chosen, engine
-from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
+from planning.plan import EngineFailed, NobodyCan, PlanFound, ProvenUnsolvable, TimedOut
 
 FIRST, SECOND = ENGINES[:2]
 
@@ -147,8 +147,8 @@ def test_no_engine_that_can_is_an_outcome_that_says_how_to_get_one():
         return await PlannerRace(choose=lambda _: []).solve(PROBLEM, 1)
 
     found = asyncio.run(run())
-    assert isinstance(found, EngineFailed)
-    assert "no engine that can do STRIPS is installed" in found.message
+    assert isinstance(found, NobodyCan)
+    assert found.message.startswith("the problem needs STRIPS; no installed engine can do that, fast-downward could")
 
 
 def test_two_at_most_race_and_only_those_that_can():

@@ -1,0 +1,137 @@
+"""From a failure to the first action of the new plan, part by part, in a run with the real component.
+
+A robot clears a table; the first time that it stacks something, that fails, and it turns out that the two do not fit:
+the plan is void, and nobody can mend it. What is measured is the way from the skill's answer to the call of the next
+skill: of this process its processor time, so that what else the machine does hardly counts, each part by a clock
+around the function that does it; of the engine the real time that it took.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import set_table
+
+from dsc import ActionPlot, Component, Outcome, SkillCall, skill
+from knowledge_base.facts import Delta, fact
+from knowledge_base.language.printer import to_text
+from planning import Executive, PlanStep
+from planning.domain import PlanningAction
+from planning.engines.race import PlannerRace
+from planning.execution import component, search
+from planning.plan import PlanFound, PlanningOutcome
+from planning.strips import Problem
+
+PARTS = ("mend", "pose", "translate", "engine", "validate", "de-order", "generate", "bind, dispatch and the rest")
+OURS = tuple(part for part in PARTS if part != "engine")
+_WRAPPED = (
+    (search, "mending", "mend"), (search, "pose", "pose"), (search, "validate", "validate"),
+    (Problem, "to_json", "translate"),
+    (component, "deordered", "de-order"), (component, "plot_from_plan", "generate"),
+)  # fmt: skip
+
+
+def measured(items: int) -> dict[str, float]:
+    """Part -> milliseconds; the second failure's, when everything is warm."""
+    domain, world = set_table.domain(), set_table.world(items)
+    planner = _Clocked()
+    robot = _Robot(domain, world, planner)
+    with _clocked(planner.spent):
+        plots = [_plot(action) for action in domain.actions.values()]
+        program = Executive(domain, plots, [robot], world, planner=planner)
+        program.achieve(to_text(set_table.GOAL), simulated=False)
+    planner.race.kill()
+    if robot.found is None:
+        raise SystemExit(f"no plan for {items} items stacks anything twice")
+    return robot.found
+
+
+class _Clocked:
+    """A race that says how long the engine took."""
+
+    def __init__(self) -> None:
+        self.race = PlannerRace()
+        self.spent: dict[str, float] = defaultdict(float)
+
+    async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
+        outcome = await self.race.solve(problem, seconds)
+        self.spent["engine"] += outcome.seconds if isinstance(outcome, PlanFound) else 0.0
+        return outcome
+
+
+class _Robot(Component):
+    """Does each step at once, and fails where two things are stacked for the first and second time."""
+
+    name = "robot"
+
+    def __init__(self, domain: Any, world: Any, planner: _Clocked) -> None:
+        super().__init__()
+        self._domain, self._world, self._planner = domain, world, planner
+        self._failed, self._since = 0, 0.0
+        self.found: dict[str, float] | None = None
+
+    @skill(outcomes={"did": {}, "failed": {}})
+    async def act(
+        self, call: SkillCall, action: str, a: str = "", b: str = "", c: str = "", d: str = "", e: str = ""  # noqa: ARG002
+    ) -> Outcome:
+        now = time.process_time()
+        if self._since and self._failed == 2 and self.found is None:
+            self._note(now - self._since)
+        step = PlanStep(action, tuple(filter(None, (a, b, c, d, e))))
+        if action == "stack" and self._failed < 2:
+            self._failed += 1
+            self._planner.spent.clear()
+            self._since = time.process_time()
+            return Outcome("failed", observed=Delta(removed=(fact("fits", *step.args[:2]),)))
+        return Outcome("did", observed=self._domain.effects(step, self._world))
+
+    def _note(self, seconds: float) -> None:
+        spent = {part: self._planner.spent.get(part, 0.0) for part in PARTS}
+        spent[PARTS[-1]] = seconds - sum(spent[part] for part in OURS)
+        self.found = {part: 1000 * one for part, one in spent.items()}
+
+
+def _plot(action: PlanningAction) -> ActionPlot:
+    """The action as one call of the robot's skill."""
+    given = dict(zip("abcde", (f"?{parameter.name}" for parameter in action.parameters), strict=False))
+    act = {
+        "entry": {"trigger": "robot.act", "with": {"action": action.name, **given}},
+        "on": {"did": "done", "failed": {"to": "ended", "emit": "failed"}},
+    }
+    return ActionPlot.model_validate({
+        "plot": action.name, "implements": action.name, "emits": {"failed": {}},
+        "parameters": {parameter.name: (parameter.types or ("object",))[0] for parameter in action.parameters},
+        "states": {"act": act, "done": {"final": True}, "ended": {"final": True}},
+    })  # fmt: skip
+
+
+@contextmanager
+def _clocked(spent: dict[str, float]) -> Iterator[None]:
+    """A clock around each function of `_WRAPPED`; what one calls inside another counts for the outer one."""
+    before = [(module, name, getattr(module, name)) for module, name, _ in _WRAPPED]
+    inside = [False]
+
+    def clocked(function: Callable[..., Any], part: str) -> Callable[..., Any]:
+        def run(*args: Any, **named: Any) -> Any:
+            if inside[0]:
+                return function(*args, **named)
+            inside[0], started = True, time.thread_time()
+            try:
+                return function(*args, **named)
+            finally:
+                inside[0] = False
+                spent[part] += time.thread_time() - started
+
+        return run
+
+    for (module, name, part), (_, _, function) in zip(_WRAPPED, before, strict=True):
+        setattr(module, name, clocked(function, part))
+    try:
+        yield
+    finally:
+        for module, name, function in before:
+            setattr(module, name, function)
