@@ -17,7 +17,8 @@ import inspect
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, Protocol, TypeVar
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
@@ -111,9 +112,18 @@ def skill(
 
 
 class Component:
-    """Base of all components; `name` is how charts address it and may be chosen at deployment."""
+    """Base of all components.
+
+    Attributes:
+        name: how charts address it; it may be chosen at deployment.
+        domain: what it brings to the planning domain: a PDDL file, or PDDL text; `None` for nothing.
+        concurrent: whether it can carry out several skills at once. Steps of a plan that use one which cannot never
+            overlap; what plots start side by side is their own affair.
+    """
 
     name: str = ""
+    domain: ClassVar[Path | str | None] = None
+    concurrent: bool = False
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
