@@ -269,6 +269,10 @@ class Component:
         for test in tuple(self._tests.get(event, ())):
             test(*values)
 
+    def activated(self, event: str) -> bool:
+        """Whether anybody has activated the event at present; a component need not look for it otherwise."""
+        return bool(self._tests.get(event))
+
     @contextmanager
     def tested(self, event: str, test: Callable[..., None]) -> Iterator[None]:
         """Inside, the test is called with the event's value, now if there is one and with each `update`."""
@@ -286,6 +290,9 @@ class Component:
 
     async def stop(self) -> None:
         """To Shutdown: override to close devices."""
+
+    async def activate(self, active: bool) -> None:  # noqa: FBT001
+        """Somebody needs it from now on, or nobody any more: override to take resources and to free them (S4.1)."""
 
     async def come_alive(self) -> None:
         """Start if it is in Init; who comes meanwhile waits for the same start."""

@@ -85,6 +85,11 @@ class Dispatcher:
         return tuple(start for start, _ in self._running.values())
 
     @property
+    def in_use(self) -> frozenset[str]:
+        """Names of the components that carry out something, the root's needs in an activation tree."""
+        return frozenset(start.component for start in self.started())
+
+    @property
     def waiting(self) -> bool:
         """Whether any answer or timeout is still to come.
 
