@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Awaitable, Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol, TypeVar, cast
 
+from dsc.components.activations import Activations
 from dsc.components.blocking import in_process, in_thread
 from dsc.components.life import Life, LifeCycle
 from knowledge_base.errors import InputError, UnknownNameError
@@ -128,11 +128,12 @@ class Declared:
 
     def __call__(self, body: _Body) -> _Body:
         """Note it."""
-        setattr(body, _DECLARED, self)
+        setattr(body, DECLARED, self)
         return body
 
 
-_DECLARED = "__dsc_skill__"
+DECLARED = "__dsc_skill__"
+"""Where `Declared` is noted."""
 _ANNOTATED: Mapping[Any, str] = {"int": "number", "float": "number", "bool": "boolean"} | {
     int: "number", float: "number", bool: "boolean",
 }  # fmt: skip
@@ -144,7 +145,7 @@ def skill(
     *,
     blocking: Literal["thread", "process"] | None = None,
 ) -> Callable[[_Body], _Body]:
-    """Declare a component's method, or a function of its own (see `component_of`), as a skill.
+    """Declare a component's method, or a function of its own (see `dsc.components.functions`), as a skill.
 
     Args:
         outcomes: every event it may end with or report, with the event's attributes and their types.
@@ -191,6 +192,7 @@ class Component:
             overlap; what plots start side by side is their own affair.
         modes: the sub-states it has while Alive, besides `neutral`; if it names none, any may be asked for.
         needs: mode -> names of the components it needs then; `ALWAYS`: in every mode.
+        activations: who has activated its events.
         life: where it is in its life; `self.life.become(Life.FATAL_ERROR, "no power")` when the device is gone.
     """
 
@@ -206,8 +208,7 @@ class Component:
         self.parameters: dict[str, Any] = {}
         self.life = LifeCycle()
         self._starting = False
-        self._values: dict[str, tuple[Any, ...]] = {}
-        self._tests: dict[str, list[Callable[..., None]]] = {}
+        self.activations = Activations()
 
     def skills(self) -> dict[str, SkillSignature]:
         """The signatures of all decorated methods, by skill name."""
@@ -228,7 +229,7 @@ class Component:
             )
         check_arguments(signature, arguments)
         body = self.body(skill_name)
-        declared: Declared = getattr(body, _DECLARED)
+        declared: Declared = getattr(body, DECLARED)
         return declared.carry_out(self, body, call, arguments)
 
     def body(self, skill_name: str) -> SkillBody:
@@ -253,7 +254,7 @@ class Component:
         taking = {n: m for n, m in inspect.getmembers(type(self), inspect.isfunction) if hasattr(m, TAKES)}
         if port not in taking:
             raise UnknownNameError(f"component '{self.name}' takes no '{port}'", found=port, valid=taking)
-        check_arguments(_signature(self.name, port, taking[port], getattr(taking[port], TAKES)), message)
+        check_arguments(signature_of(self.name, port, taking[port], getattr(taking[port], TAKES)), message)
         await getattr(self, port)(**message)
 
     def update(self, event: str, *values: Any) -> None:
@@ -265,25 +266,7 @@ class Component:
         events = [name for name, signature in self.skills().items() if signature.pattern == "event"]
         if event not in events:
             raise UnknownNameError(f"component '{self.name}' has no event '{event}'", found=event, valid=events)
-        self._values[event] = values
-        for test in tuple(self._tests.get(event, ())):
-            test(*values)
-
-    def activated(self, event: str) -> bool:
-        """Whether anybody has activated the event at present; a component need not look for it otherwise."""
-        return bool(self._tests.get(event))
-
-    @contextmanager
-    def tested(self, event: str, test: Callable[..., None]) -> Iterator[None]:
-        """Inside, the test is called with the event's value, now if there is one and with each `update`."""
-        tests = self._tests.setdefault(event, [])
-        tests.append(test)
-        try:
-            if event in self._values:
-                test(*self._values[event])
-            yield
-        finally:
-            tests.remove(test)
+        self.activations.update(event, values)
 
     async def start(self) -> None:
         """From Init to Alive: override to open devices; what is raised means FatalError."""
@@ -346,38 +329,6 @@ class Component:
         }
 
 
-def component_of(name: str, *functions: SkillBody) -> Component:
-    """A component whose skills are decorated functions: `async def greet(call, person)`.
-
-    Raises:
-        InputError: a function is not decorated with `skill`.
-    """
-    for function in functions:
-        if not hasattr(function, _DECLARED):
-            raise InputError(f"'{function.__name__}' is no skill: decorate it with `skill`", found=function.__name__)
-    return _OfFunctions(name, {function.__name__: function for function in functions})
-
-
-class _OfFunctions(Component):
-    """Has functions for skills."""
-
-    def __init__(self, name: str, functions: Mapping[str, SkillBody]) -> None:
-        super().__init__(name)
-        self._functions = functions
-
-    def skills(self) -> dict[str, SkillSignature]:
-        """The signatures of the functions, which have no `self`."""
-        declared = {name: getattr(function, _DECLARED) for name, function in self._functions.items()}
-        return {
-            name: _signature(self.name, name, function, replace(declared[name], own=declared[name].own - 1))
-            for name, function in self._functions.items()
-        }
-
-    def body(self, skill_name: str) -> SkillBody:
-        """The function."""
-        return self._functions[skill_name]
-
-
 @cache
 def signatures(kind: type[Component], name: str) -> Mapping[str, SkillSignature]:
     """The signatures of a component class's decorated methods, for a component of that name.
@@ -386,9 +337,9 @@ def signatures(kind: type[Component], name: str) -> Mapping[str, SkillSignature]
     """
     found = {}
     for attribute, body in inspect.getmembers(kind, inspect.isfunction):
-        declared: Declared | None = getattr(body, _DECLARED, None)
+        declared: Declared | None = getattr(body, DECLARED, None)
         if declared is not None:
-            found[attribute] = _signature(name, attribute, body, declared)
+            found[attribute] = signature_of(name, attribute, body, declared)
     return found
 
 
@@ -405,7 +356,8 @@ def check_arguments(signature: SkillSignature, arguments: Mapping[str, Any]) -> 
             raise InputError(f"skill '{name}' needs its parameter '{wanted}'")
 
 
-def _signature(component: str, name: str, body: SkillBody, declared: Declared) -> SkillSignature:
+def signature_of(component: str, name: str, body: SkillBody, declared: Declared) -> SkillSignature:
+    """The interface of a decorated body under that name."""
     given = list(inspect.signature(body).parameters.values())[declared.own :]
     return SkillSignature(
         component=component,

@@ -79,7 +79,7 @@ async def _activate(component: Component, body: SkillBody, call: SkillCall, argu
         held = found is not None
 
     forever: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
-    with component.tested(body.__name__, test):
+    with component.activations.tested(body.__name__, test):
         return await forever
 
 

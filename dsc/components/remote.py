@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from dsc.components.activation import Heart
+from dsc.components.heartbeats import Heart
 from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError
 from dsc.components.life import Life
 from dsc.components.transport import Transport

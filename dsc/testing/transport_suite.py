@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from dsc.components.activation import BEAT, SILENCE, Heart
+from dsc.components.heartbeats import BEAT, SILENCE, Heart
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
 from dsc.components.life import Life
 from dsc.components.ports import event, query, takes
@@ -374,12 +374,12 @@ class TransportSuite:
                 heard: list[Any] = []
                 call = SkillCall("a6.0", LoopClock(), lambda outcome: heard.append(outcome.attributes["level"]))
                 async with running(_watched(remote, call)):
-                    await until(lambda: robot.activated("low"))
+                    await until(lambda: robot.activations.active("low"))
                     for level in (30, 19, 18, 25, 15, 10, 40, 5):
                         robot.update("low", level)
                     await until(lambda: len(heard) == 3)
                 assert heard == [19, 15, 5]
-                assert not robot.activated("low")
+                assert not robot.activations.active("low")
 
         self.run(main())
 

@@ -13,8 +13,9 @@ import pytest
 from dsc_runs import Arm, Ran
 
 from dsc.components import blocking
+from dsc.components.functions import component_of
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
-from dsc.skills import Component, Outcome, SkillCall, component_of, skill
+from dsc.skills import Component, Outcome, SkillCall, skill
 from knowledge_base.errors import InputError
 
 
