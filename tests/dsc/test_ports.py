@@ -185,3 +185,21 @@ def test_a_component_says_how_it_is():
     said = asyncio.run(battery.diagnose())
     assert said["life"] == "init"
     assert said["skills"] == ["lasts", "low", "ponders", "run"]
+
+
+def test_the_sequencer_says_how_the_run_is_going():
+    said = []
+
+    def prepare(sequencer):
+        async def ask():
+            said.append(sequencer.diagnose())
+
+        said.append(sequencer.diagnose())
+        sequencer.wait_before_events(ask)
+
+    done = ran(LOW.replace("BELOW", "20"), prepare=prepare)
+    assert said[0]["active"] == []
+    assert said[1]["active"] == ["a"]
+    assert said[1]["working"] == ["battery.low", "battery.run"]
+    assert said[1]["in_use"] == ["battery"]
+    assert done.sequencer.diagnose()["finished"]
