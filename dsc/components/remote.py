@@ -14,8 +14,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from dsc.components.heartbeats import Heart
 from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError
+from dsc.components.heartbeats import Heart
 from dsc.components.life import Life
 from dsc.components.transport import Transport
 from dsc.skills import Clock, Component, Outcome, SkillCall, SkillSignature

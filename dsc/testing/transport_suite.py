@@ -19,8 +19,8 @@ from typing import Any
 
 import pytest
 
-from dsc.components.heartbeats import BEAT, SILENCE, Heart
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
+from dsc.components.heartbeats import BEAT, SILENCE, Heart
 from dsc.components.life import Life
 from dsc.components.ports import event, query, takes
 from dsc.components.pushing import Publisher, Subscription
