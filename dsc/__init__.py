@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from dsc.components.functions import component_of as component_of
+    from dsc.components.ports import event as event
+    from dsc.components.ports import query as query
+    from dsc.components.ports import takes as takes
     from dsc.dynamic.library import Library as Library
     from dsc.engine.machine import Machine as Machine
     from dsc.events import Event as Event
@@ -38,11 +42,15 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "RunEnd": "sequencer.sequencer",
         "Sequencer": "sequencer.sequencer",
         "SkillCall": "skills",
+        "component_of": "components.functions",
+        "event": "components.ports",
         "load_library": "text.plots",
         "load_plot": "text.plots",
         "parse_plot": "text.plots",
         "primitive_plot": "primitive",
+        "query": "components.ports",
         "skill": "skills",
+        "takes": "components.ports",
         "validate_library": "validation",
         "validate_plot": "validation",
     },

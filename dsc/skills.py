@@ -14,12 +14,16 @@ one decorated coroutine:
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, Protocol, TypeVar, cast
 
+from dsc.components.activations import Activations
+from dsc.components.blocking import in_process, in_thread
+from dsc.components.life import Life, LifeCycle
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
 
@@ -56,15 +60,28 @@ class SkillCall:
         action_id: names this execution; stable across restarts, never used for another one.
         clock: the only time a skill may use.
         report: hands over an intermediate event while the skill goes on (e.g. progress, a perception).
+        deadline: second of run time at which the skill is cancelled.
+        give_up: says that something of the skill goes on that cannot be stopped.
     """
 
     action_id: str
     clock: Clock
     report: Callable[[Outcome], None]
+    deadline: float = math.inf
+    give_up: Callable[[str], None] = lambda _: None
+
+    @property
+    def remaining(self) -> float:
+        """Seconds of run time until the deadline."""
+        return self.deadline - self.clock.now()
 
 
-SkillBody = Callable[..., Awaitable[Outcome]]
+SkillBody = Callable[..., Any]
+"""What is decorated: a coroutine function or, if it blocks, a plain one, that gives an `Outcome`."""
 _Body = TypeVar("_Body", bound=SkillBody)
+Pattern = Literal["skill", "query", "event"]
+"""Which pattern of communication `trigger` uses: a skill ends by itself, a query with its answer, an event not at
+all: it is activated until the state is left (S1.1)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +93,7 @@ class SkillSignature:
         parameters: names with types (`None`: anything).
         defaults: values of the parameters that may be left out.
         outcomes: events it may end with or report, with their attributes and types.
+        pattern: how it communicates.
     """
 
     component: str
@@ -83,32 +101,85 @@ class SkillSignature:
     parameters: Mapping[str, str | None]
     defaults: Mapping[str, Any]
     outcomes: Mapping[str, Mapping[str, str | None]]
+    pattern: Pattern = "skill"
+
+
+CarryOut = Callable[["Component", SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
+"""How a decorated body is made to act: the component, the bound body, the call, the arguments."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Declared:
+class Declared:
+    """What a decorator notes about the body below it.
+
+    Attributes:
+        types: types of parameters by name; others follow from the annotations `int`, `float` and `bool`.
+        outcomes: as in `SkillSignature`.
+        carry_out: how a call reaches the body.
+        own: how many of the body's first parameters no chart gives.
+        pattern: how it communicates.
+    """
+
     types: Mapping[str, str]
     outcomes: Mapping[str, Mapping[str, str | None]]
+    carry_out: CarryOut
+    own: int = 2
+    pattern: Pattern = "skill"
+
+    def __call__(self, body: _Body) -> _Body:
+        """Note it."""
+        setattr(body, DECLARED, self)
+        return body
 
 
-_DECLARED = "__dsc_skill__"
+DECLARED = "__dsc_skill__"
+"""Where `Declared` is noted."""
+_ANNOTATED: Mapping[Any, str] = {"int": "number", "float": "number", "bool": "boolean"} | {
+    int: "number", float: "number", bool: "boolean",
+}  # fmt: skip
 
 
 def skill(
-    outcomes: Mapping[str, Mapping[str, str | None]], types: Mapping[str, str] | None = None
+    outcomes: Mapping[str, Mapping[str, str | None]],
+    types: Mapping[str, str] | None = None,
+    *,
+    blocking: Literal["thread", "process"] | None = None,
 ) -> Callable[[_Body], _Body]:
-    """Declare a component's coroutine method as a skill.
+    """Declare a component's method, or a function of its own (see `dsc.components.functions`), as a skill.
 
     Args:
         outcomes: every event it may end with or report, with the event's attributes and their types.
-        types: types of its parameters by name; a parameter left out takes any value.
+        types: types of its parameters by name; others follow from the annotations `int`, `float` and `bool`, and
+            what is left takes any value.
+        blocking: the body is no coroutine and blocks: it runs in a thread, with a `BlockingCall` to be asked now and
+            then whether it shall stop; or in a process, which is ended when it shall stop. What goes to a process
+            and comes back is pickled, the component itself included.
     """
+    declared = {event: dict(attributes) for event, attributes in outcomes.items()}
+    return Declared(dict(types or {}), declared, _CARRIED_OUT[blocking])
 
-    def declare(body: _Body) -> _Body:
-        setattr(body, _DECLARED, _Declared(dict(types or {}), {k: dict(v) for k, v in outcomes.items()}))
-        return body
 
-    return declare
+async def _awaited(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    return cast(Outcome, await body(call, **arguments))
+
+
+async def _in_thread(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    return await in_thread(body, call, arguments)
+
+
+async def _in_process(component: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    return await in_process(body, component.name, call, arguments)
+
+
+_CARRIED_OUT: Mapping[str | None, CarryOut] = {None: _awaited, "thread": _in_thread, "process": _in_process}
+
+
+NEUTRAL = "neutral"
+"""The mode at rest."""
+ALWAYS = ""
+"""Stands for every mode in `Component.needs`."""
+TAKES = "__dsc_takes__"
+"""Where `takes` notes what it declares."""
 
 
 class Component:
@@ -119,16 +190,25 @@ class Component:
         domain: what it brings to the planning domain: a PDDL file, or PDDL text; `None` for nothing.
         concurrent: whether it can carry out several skills at once. Steps of a plan that use one which cannot never
             overlap; what plots start side by side is their own affair.
+        modes: the sub-states it has while Alive, besides `neutral`; if it names none, any may be asked for.
+        needs: mode -> names of the components it needs then; `ALWAYS`: in every mode.
+        activations: who has activated its events.
+        life: where it is in its life; `self.life.become(Life.FATAL_ERROR, "no power")` when the device is gone.
     """
 
     name: str = ""
     domain: ClassVar[Path | str | None] = None
     concurrent: bool = False
+    modes: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
-        self.mode = "neutral"
+        self.mode = NEUTRAL
         self.parameters: dict[str, Any] = {}
+        self.life = LifeCycle()
+        self._starting = False
+        self.activations = Activations()
 
     def skills(self) -> dict[str, SkillSignature]:
         """The signatures of all decorated methods, by skill name."""
@@ -148,8 +228,13 @@ class Component:
                 f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
             )
         check_arguments(signature, arguments)
-        body: SkillBody = getattr(self, skill_name)
-        return body(call, **arguments)
+        body = self.body(skill_name)
+        declared: Declared = getattr(body, DECLARED)
+        return declared.carry_out(self, body, call, arguments)
+
+    def body(self, skill_name: str) -> SkillBody:
+        """What carries out a skill of that name, which exists."""
+        return cast(SkillBody, getattr(self, skill_name))
 
     async def configure(self, parameter: str, value: object) -> None:
         """The *param* port: set a named parameter; override to react."""
@@ -158,6 +243,90 @@ class Component:
     async def switch(self, mode: str) -> None:
         """The *state* port: enter a mode (`neutral` is at rest); override to react."""
         self.mode = mode
+
+    async def take(self, port: str, message: Mapping[str, Any]) -> None:
+        """The *send* port: a one-way message, for the method of that name that is decorated with `takes`.
+
+        Raises:
+            UnknownNameError: there is no such method.
+            InputError: something is missing in the message or unknown.
+        """
+        taking = {n: m for n, m in inspect.getmembers(type(self), inspect.isfunction) if hasattr(m, TAKES)}
+        if port not in taking:
+            raise UnknownNameError(f"component '{self.name}' takes no '{port}'", found=port, valid=taking)
+        check_arguments(signature_of(self.name, port, taking[port], getattr(taking[port], TAKES)), message)
+        await getattr(self, port)(**message)
+
+    def update(self, event: str, *values: Any) -> None:
+        """Put a new value before all who have activated the event; those who come later are told it, too.
+
+        Raises:
+            UnknownNameError: the component has no such event.
+        """
+        events = [name for name, signature in self.skills().items() if signature.pattern == "event"]
+        if event not in events:
+            raise UnknownNameError(f"component '{self.name}' has no event '{event}'", found=event, valid=events)
+        self.activations.update(event, values)
+
+    async def start(self) -> None:
+        """From Init to Alive: override to open devices; what is raised means FatalError."""
+
+    async def stop(self) -> None:
+        """To Shutdown: override to close devices."""
+
+    async def activate(self, active: bool) -> None:  # noqa: FBT001
+        """Somebody needs it from now on, or nobody any more: override to take resources and to free them (S4.1)."""
+
+    async def come_alive(self) -> None:
+        """Start if it is in Init; who comes meanwhile waits for the same start."""
+        if self.life.state is not Life.INIT:
+            return
+        if self._starting:
+            await self.life.until(lambda life: life is not Life.INIT)
+            return
+        self._starting = True
+        try:
+            await self.start()
+        except Exception as error:  # noqa: BLE001  # whatever it is, the component cannot work
+            self.life.become(Life.FATAL_ERROR, f"{type(error).__name__}: {error}")
+        else:
+            self.life.become(Life.ALIVE)
+        finally:
+            self._starting = False
+
+    async def change_mode(self, mode: str) -> None:
+        """What `switch` in a chart does: a mode, or `init` (start anew) and `shutdown`.
+
+        Raises:
+            UnknownNameError: the component says which modes it has, and this is none.
+        """
+        if mode == Life.INIT:
+            self.life.become(Life.INIT)
+            await self.come_alive()
+        elif mode == Life.SHUTDOWN:
+            await self.stop()
+            self.life.become(Life.SHUTDOWN)
+        elif self.modes and mode not in (NEUTRAL, *self.modes):
+            valid = (NEUTRAL, *self.modes)
+            raise UnknownNameError(f"component '{self.name}' has no mode '{mode}'", found=mode, valid=valid)
+        else:
+            await self.switch(mode)
+
+    def needed(self) -> tuple[str, ...]:
+        """Names of the components it needs in its present mode."""
+        return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
+
+    async def diagnose(self) -> dict[str, Any]:
+        """The *diagnose* port: how it is, as plain data; override to add what only it knows."""
+        return {
+            "component": self.name,
+            "life": str(self.life.state),
+            "reason": self.life.reason,
+            "mode": self.mode,
+            "parameters": dict(self.parameters),
+            "needs": list(self.needed()),
+            "skills": sorted(self.skills()),
+        }
 
 
 @cache
@@ -168,9 +337,9 @@ def signatures(kind: type[Component], name: str) -> Mapping[str, SkillSignature]
     """
     found = {}
     for attribute, body in inspect.getmembers(kind, inspect.isfunction):
-        declared: _Declared | None = getattr(body, _DECLARED, None)
+        declared: Declared | None = getattr(body, DECLARED, None)
         if declared is not None:
-            found[attribute] = _signature(name, attribute, body, declared)
+            found[attribute] = signature_of(name, attribute, body, declared)
     return found
 
 
@@ -187,12 +356,14 @@ def check_arguments(signature: SkillSignature, arguments: Mapping[str, Any]) -> 
             raise InputError(f"skill '{name}' needs its parameter '{wanted}'")
 
 
-def _signature(component: str, name: str, body: SkillBody, declared: _Declared) -> SkillSignature:
-    own = list(inspect.signature(body).parameters.values())[2:]  # after self and call
+def signature_of(component: str, name: str, body: SkillBody, declared: Declared) -> SkillSignature:
+    """The interface of a decorated body under that name."""
+    given = list(inspect.signature(body).parameters.values())[declared.own :]
     return SkillSignature(
         component=component,
         name=name,
-        parameters={p.name: declared.types.get(p.name) for p in own},
-        defaults={p.name: p.default for p in own if p.default is not inspect.Parameter.empty},
+        parameters={p.name: declared.types.get(p.name, _ANNOTATED.get(p.annotation)) for p in given},
+        defaults={p.name: p.default for p in given if p.default is not inspect.Parameter.empty},
         outcomes=declared.outcomes,
+        pattern=declared.pattern,
     )

@@ -8,8 +8,8 @@ from typing import Any
 
 from dsc.engine.situation import Situation
 from dsc.engine.state import NOTHING
-from dsc.engine.steps import Output, SetParameter, Start, SwitchMode
-from dsc.model.actions import Configure, ExternalAction, Trigger
+from dsc.engine.steps import Output, SendMessage, SetParameter, Start, SwitchMode
+from dsc.model.actions import Configure, ExternalAction, Send, Trigger
 from dsc.model.plot import ActionPlot
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.expression import Constant, Term, Variable
@@ -76,4 +76,7 @@ def output_of(action: ExternalAction, activation: int, number: int, value: Calla
     if isinstance(action, Configure):
         component, parameter = action.set.split(".")
         return SetParameter(component, parameter, value(action.to))
+    if isinstance(action, Send):
+        component, port = action.send.split(".")
+        return SendMessage(component, port, {name: value(term) for name, term in action.arguments.items()})
     return SwitchMode(action.switch, action.to)

@@ -51,6 +51,15 @@ class SwitchMode:
 
 
 @dataclass(frozen=True, slots=True)
+class SendMessage:
+    """Send a component a one-way message."""
+
+    component: str
+    port: str
+    arguments: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
 class StartTimer:
     """Send the activation the event, for its timeout or period number `index`, after `seconds`.
 
@@ -88,7 +97,7 @@ class Note:
     text: str
 
 
-Output = Start | Cancel | SetParameter | SwitchMode | StartTimer | SendLater | Revoke | Note
+Output = Start | Cancel | SetParameter | SwitchMode | SendMessage | StartTimer | SendLater | Revoke | Note
 """What leaves the machine, in order."""
 
 

@@ -40,7 +40,14 @@ class Switch(Frozen):
     to: str
 
 
-ExternalAction = Trigger | Configure | Switch
+class Send(Frozen):
+    """Send a component a message that nobody answers: `send: voice.say`, `with: {text: hello}` (S1.1)."""
+
+    send: str = Field(pattern=r"^[\w\-]+\.[\w\-]+$")
+    arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
+
+
+ExternalAction = Trigger | Configure | Switch | Send
 """What acts on components; the rest stays in the chart."""
 
 
@@ -122,13 +129,14 @@ Action = Annotated[
     Annotated[Trigger, Tag("trigger")]
     | Annotated[Configure, Tag("set")]
     | Annotated[Switch, Tag("switch")]
+    | Annotated[Send, Tag("send")]
     | Annotated[Assign, Tag("assign")]
     | Annotated[Tell, Tag("tell")]
     | Annotated[Emit, Tag("emit")]
     | Annotated[Withdraw, Tag("withdraw")]
     | Annotated[Log, Tag("log")]
     | Annotated[Choose, Tag("if")],
-    by_key("trigger", "set", "switch", "assign", "tell", "emit", "withdraw", "log", "if"),
+    by_key("trigger", "set", "switch", "send", "assign", "tell", "emit", "withdraw", "log", "if"),
 ]
 """What entry and exit may hold; internal actions only in profile `scxml` (SCXML 3.8)."""
 

@@ -8,18 +8,33 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from dsc.engine.steps import Cancel, Output, Revoke, SendLater, SetParameter, Start, StartTimer, SwitchMode
+from dsc.components.blocking import DeadlineError
+from dsc.components.roster import Roster
+from dsc.components.stopping import GRACE, give_up, give_up_after
+from dsc.engine.steps import (
+    Cancel,
+    Output,
+    Revoke,
+    SendLater,
+    SendMessage,
+    SetParameter,
+    Start,
+    StartTimer,
+    SwitchMode,
+)
 from dsc.events import EVERY, SKILL_ERROR, TIMED_OUT, Event
 from dsc.skills import Clock, Component, Outcome, SkillCall
 from knowledge_base.errors import UnknownNameError
 
 DEFAULT_WITHIN = 300.0
 """Seconds a skill may take if the trigger does not say: every wait has a bound."""
-CLOSING = 30.0
+CLOSING = GRACE
 """Seconds for components to take what they were last told, and for cancelled skills to stop."""
 
 
@@ -49,6 +64,9 @@ class Dispatcher:
         post: Callable[[SkillMessage | TimerMessage | Event], None],
     ) -> None:
         self._components = {component.name: component for component in components}
+        self._roster = Roster(self._components)
+        self._given_up: list[str] = []
+        self._answered_for: set[str] = set()
         self._clock = clock
         self._post = post
         self._running: dict[str, tuple[Start, asyncio.Task[None]]] = {}
@@ -59,18 +77,35 @@ class Dispatcher:
         self._last_sent = 0
 
     def deploy(self, component: Component) -> None:
-        """Add a component; it replaces one of the same name."""
-        self._components[component.name] = component
+        """Add a component; it replaces one of the same name. Who has waited for it goes on."""
+        self._roster.deploy(component)
 
     def started(self) -> tuple[Start, ...]:
         """The skills that are being carried out, or whose answer has not been taken yet."""
         return tuple(start for start, _ in self._running.values())
 
     @property
+    def in_use(self) -> frozenset[str]:
+        """Names of the components that carry out something, the root's needs in an activation tree."""
+        return frozenset(start.component for start in self.started())
+
+    @property
     def waiting(self) -> bool:
-        """Whether any answer or timeout is still to come; periods, which always are, do not count."""
+        """Whether any answer or timeout is still to come.
+
+        Periods, which always are, do not count; nor do events that were activated without a bound and may never come.
+        """
         timeouts = any(event != EVERY for _, event, _ in self._timers)
-        return bool(self._running) or timeouts or bool(self._sent)
+        return any(map(self._will_end, self.started())) or timeouts or bool(self._sent)
+
+    def _will_end(self, start: Start) -> bool:
+        return math.isfinite(self._within(start))
+
+    def _within(self, start: Start) -> float:
+        """Seconds that it may take; an event lasts as long as the state that activated it."""
+        signature = self.component(start.component).skills().get(start.skill)
+        lasting = signature is not None and signature.pattern == "event"
+        return start.within or (math.inf if lasting else DEFAULT_WITHIN)
 
     @property
     def periods(self) -> frozenset[tuple[int, int]]:
@@ -98,6 +133,9 @@ class Dispatcher:
             self._configure(component, lambda: component.configure(output.parameter, _encoded(output.value)))
         elif isinstance(output, SwitchMode):
             self._switch(output)
+        elif isinstance(output, SendMessage):
+            component = self.component(output.component)
+            self._configure(component, lambda: component.take(output.port, _encoded(output.arguments)))
         # What is left is a note, which the trace has.
 
     def component(self, name: str) -> Component:
@@ -114,7 +152,8 @@ class Dispatcher:
         """Cancel skills and timers, and wait until they have stopped and components are told what they were sent.
 
         Returns:
-            What components could not take, as far as no skill has failed because of it.
+            What components could not take, as far as no skill has failed because of it; and which skills did not
+            stop when they were told to.
         """
         for activation in {start.activation for start, _ in self._running.values()}:
             self._cancel(activation)
@@ -129,21 +168,39 @@ class Dispatcher:
             stopped, late = await asyncio.wait(tasks, timeout=CLOSING)
             for task in late:
                 task.cancel()
+                give_up(task)
             for task in stopped:
                 _failure(task)  # of a skill that was cancelled, nobody wants to hear it
-        return [_untaken(name, task) for name, task in self._configuring.items() if not _succeeded(task)]
+        untaken = [_untaken(name, task) for name, task in self._configuring.items() if not _succeeded(task)]
+        return [*untaken, *self._given_up]
 
     def _switch(self, output: SwitchMode) -> None:
         component = self.component(output.component)
-        self._configure(component, lambda: component.switch(output.mode))
+        self._configure(component, lambda: component.change_mode(output.mode))
 
     def _start(self, start: Start) -> None:
         component = self.component(start.component)
         task = asyncio.get_running_loop().create_task(self._execute(component, start))
         self._running[start.action_id] = (start, task)
+        if math.isfinite(self._within(start)):
+            give_up_after(task, self._within(start) + GRACE, lambda: self._overdue(start))
+
+    def _overdue(self, start: Start) -> None:
+        """It swallowed that its time is over; the chart need not wait for it."""
+        if start.action_id in self._running:
+            self._not_stopped(start)
+            self._answered_for.add(start.action_id)
+            late = Outcome(TIMED_OUT, {"skill": f"{start.component}.{start.skill}", "seconds": self._within(start)})
+            self._post(SkillMessage(start, late, final=True))
+
+    def _not_stopped(self, start: Start) -> None:
+        skill = f"{start.component}.{start.skill}"
+        self._given_up.append(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
 
     async def _execute(self, component: Component, start: Start) -> None:
         outcome = await self._outcome(component, start)
+        if start.action_id in self._answered_for:
+            return
         self._post(SkillMessage(start, outcome, final=True))
 
     async def _outcome(self, component: Component, start: Start) -> Outcome:
@@ -151,20 +208,22 @@ class Dispatcher:
             if start.action_id in self._running:
                 self._post(SkillMessage(start, _declared(component, start, outcome), final=False))
 
-        call = SkillCall(start.action_id, self._clock, report)
-        within = start.within or DEFAULT_WITHIN
-        bound = asyncio.timeout(within)
+        within = self._within(start)
+        bound = asyncio.timeout(within if math.isfinite(within) else None)
+        call = SkillCall(start.action_id, self._clock, report, self._clock.now() + within, self._given_up.append)
         try:
             async with bound:
                 await self._configured(component)
-                outcome = await component.execute(start.skill, call, _encoded(start.arguments))
+                support = await self._roster.ready(component)
+                work = component.execute(start.skill, call, _encoded(start.arguments))
+                outcome = await self._roster.with_support(component, work, support)
             return _declared(component, start, outcome)
         except asyncio.CancelledError:
             if _cancelled_from_outside():
                 raise
             return _error(start, "CancelledError: it cancelled itself")
         except Exception as error:  # noqa: BLE001  # whatever a skill does wrong must not end the run
-            if bound.expired():
+            if bound.expired() or isinstance(error, DeadlineError):
                 return Outcome(TIMED_OUT, {"skill": f"{start.component}.{start.skill}", "seconds": within})
             return _error(start, f"{type(error).__name__}: {error}")
 
@@ -187,8 +246,13 @@ class Dispatcher:
                 self._ending.add(task)
                 task.add_done_callback(self._ending.discard)
                 task.cancel()
+                give_up_after(task, GRACE, partial(self._leave_alone, start, task))
         for key in [key for key in self._timers if key[0] == activation]:
             self._timers.pop(key).cancel()
+
+    def _leave_alone(self, start: Start, task: asyncio.Task[None]) -> None:
+        self._ending.discard(task)
+        self._not_stopped(start)
 
     def _start_timer(self, timer: StartTimer) -> None:
         handle = asyncio.get_running_loop().call_later(timer.seconds, self._timer_due, timer)

@@ -113,6 +113,18 @@ class Sequencer:
         inside = frozenset() if owner is None else self.machine.state.activations_inside(owner)
         return frozenset(start.component for start in started if start.activation in inside)
 
+    def diagnose(self) -> dict[str, Any]:
+        """How the run is going, as plain data: active states, actions under way, how much waits to be taken."""
+        return {
+            "component": "sequencer",
+            "finished": self.machine.state.finished,
+            "active": list(self.machine.state.configuration()),
+            "working": [f"{start.component}.{start.skill}" for start in self.dispatcher.started()],
+            "in_use": sorted(self.dispatcher.in_use),
+            "waiting": self._inbox.qsize(),
+            "knowledge_version": self.knowledge.version,
+        }
+
     def post(self, event: Event, *, after: float = 0.0) -> None:
         """Hand in an event from outside, e.g. an operator's `stop`; from the loop's own thread.
 

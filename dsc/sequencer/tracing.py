@@ -13,6 +13,7 @@ from dsc.engine.steps import (
     Output,
     Revoke,
     SendLater,
+    SendMessage,
     SetParameter,
     Start,
     StartTimer,
@@ -114,6 +115,9 @@ class StepTracer:
             return self._trace.record("action", action="set", port=port, value=output.value)
         if isinstance(output, SwitchMode):
             return self._trace.record("action", action="switch", component=output.component, mode=output.mode)
+        if isinstance(output, SendMessage):
+            port = f"{output.component}.{output.port}"
+            return self._trace.record("action", action="send", port=port, arguments=dict(output.arguments))
         if isinstance(output, Note):
             return self._trace.record("log", label=output.label, text=output.text)
         assert isinstance(output, Cancel | StartTimer | SendLater | Revoke)  # noqa: S101

@@ -48,7 +48,7 @@ def plot_to_yaml(plot: ActionPlot) -> str:
 
 _ORDER = (
     "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs",
-    "receives", "emits", "seconds", "set", "switch", "to", "pass", "when", "of", "trigger", "use", "dynamic",
+    "receives", "emits", "seconds", "set", "switch", "send", "to", "pass", "when", "of", "trigger", "use", "dynamic",
     "assign", "tell", "emit", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit", "rule",
     "choice", "select", "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on",
     "after", "every", "always", "exit", "on_break", "rules",

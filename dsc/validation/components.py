@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from dsc.errors import Finding
-from dsc.model.actions import Configure, ExternalAction, Internal, Switch
+from dsc.model.actions import Configure, ExternalAction, Internal, Send, Switch
 from dsc.model.plot import ActionPlot
 from dsc.model.states import State
 from knowledge_base.errors import UnknownNameError
 
 
 def check_components(plot: ActionPlot, components: Collection[str]) -> Iterator[Finding]:
-    """Findings about `set` and `switch` actions towards components that are not there."""
+    """Findings about `set`, `send` and `switch` actions towards components that are not there."""
     for _, state, path in plot.walk():
         if not isinstance(state, State):
             continue
@@ -30,4 +30,6 @@ def check_components(plot: ActionPlot, components: Collection[str]) -> Iterator[
 def _addressed(action: ExternalAction | Internal) -> str | None:
     if isinstance(action, Configure):
         return action.set.split(".")[0]
+    if isinstance(action, Send):
+        return action.send.split(".")[0]
     return action.switch if isinstance(action, Switch) else None

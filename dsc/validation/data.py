@@ -10,7 +10,7 @@ from dsc.dynamic.outcomes import Outcomes, outcomes_of, outputs_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
-from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Switch, Tell, Trigger, Withdraw
+from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Send, Switch, Tell, Trigger, Withdraw
 from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot, Parameter, Path, Rule, Variable
 from dsc.model.states import DynamicState, FinalState, State, SubmachineState
@@ -184,6 +184,9 @@ class _Data:
 
     def _external(self, action: ExternalAction, path: Path) -> Iterator[Finding]:
         if isinstance(action, Switch):
+            return
+        if isinstance(action, Send):
+            yield from self._terms(action.arguments.items(), None, (*path, "with"))
             return
         if not isinstance(action, Trigger):
             yield from self._terms([("to", action.to)], None, path)

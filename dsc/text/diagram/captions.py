@@ -14,6 +14,7 @@ from dsc.model.actions import (
     ExternalAction,
     Internal,
     Log,
+    Send,
     Switch,
     Tell,
     Trigger,
@@ -200,6 +201,8 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
             return f"{skill}{_values(arguments)}" + (f" within {within:g} s" if within is not None else "")
         case Configure(set=parameter, to=value):
             return f"{parameter} := {to_text(value)}"
+        case Send(send=port, arguments=arguments):
+            return f"{port}!{_values(arguments)}"
         case Switch(switch=component, to=mode):
             return f"{component} → {mode}"
         case Withdraw(withdraw=sent):

@@ -1,0 +1,209 @@
+"""Skills that block: in a thread, or in a process of their own. Cancellation and a deadline always arrive.
+
+Simulated time stands still meanwhile, so the seconds of the deadline are real ones here. Threads are daemons: one that
+does not stop is left alone after `STOPPING` seconds and does not keep the program alive. A process is ended.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import multiprocessing
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dsc.skills import Outcome, SkillCall
+
+STOPPING = 2.0
+"""Real seconds for a body that was told to stop."""
+_POLL = 0.02
+"""Real seconds after which a body's supervisor looks again whether it shall stop."""
+
+
+class DeadlineError(TimeoutError):
+    """The time of a skill is over."""
+
+
+class StoppedError(BaseException):
+    """A blocking body was told to stop; no `Exception`, so that it is not caught by mistake."""
+
+
+@dataclass(frozen=True, slots=True)
+class BlockingCall:
+    """One execution of a skill, as its blocking body sees it.
+
+    Attributes:
+        action_id: as in `SkillCall`.
+        report: as in `SkillCall`; may be used from the thread or process that the body runs in.
+        seconds: real seconds that the body has at most.
+        stopping: is set when the body shall stop; in a process never, since that is ended.
+    """
+
+    action_id: str
+    report: Callable[[Outcome], None]
+    seconds: float
+    stopping: threading.Event = field(default_factory=threading.Event)
+
+    def sleep(self, seconds: float = 0.0) -> None:
+        """Wait for real seconds; with none, only look whether to stop.
+
+        Raises:
+            StoppedError: the skill was cancelled, or its deadline has passed.
+        """
+        if self.stopping.wait(seconds):
+            raise StoppedError
+
+
+async def in_thread(body: Callable[..., Outcome], call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    """Run `body(BlockingCall, **arguments)` in a thread.
+
+    Raises:
+        DeadlineError: the deadline has passed.
+    """
+    blocking = _blocking(call)
+    return await _supervised(lambda: body(blocking, **arguments), blocking, call)
+
+
+async def in_process(
+    body: Callable[..., Outcome], name: str, call: SkillCall, arguments: Mapping[str, Any]
+) -> Outcome:
+    """Run `body(BlockingCall, **arguments)` in a fresh process; raises as `in_thread`.
+
+    Raises:
+        RuntimeError: the body raised, or its process ended by itself.
+    """
+    blocking = _blocking(call)
+    return await _supervised(lambda: _in_child(body, name, blocking, arguments), blocking, call)
+
+
+def _blocking(call: SkillCall) -> BlockingCall:
+    loop = asyncio.get_running_loop()
+
+    def report(outcome: Outcome) -> None:
+        loop.call_soon_threadsafe(call.report, outcome)
+
+    return BlockingCall(call.action_id, report, call.remaining)
+
+
+async def _supervised(work: Callable[[], Outcome], blocking: BlockingCall, call: SkillCall) -> Outcome:
+    """Run work in a daemon thread; tell it to stop when we are cancelled or its time is over."""
+    loop = asyncio.get_running_loop()
+    ended: asyncio.Future[Outcome] = loop.create_future()
+
+    def post(tell: Callable[[Any], None], value: object) -> None:
+        with suppress(RuntimeError):  # the loop is closed: we were left alone, and nobody listens
+            loop.call_soon_threadsafe(lambda: None if ended.done() else tell(value))
+
+    def run() -> None:
+        try:
+            outcome = work()
+        except StoppedError:
+            post(ended.set_exception, DeadlineError())
+        except BaseException as error:  # noqa: BLE001  # e.g. SystemExit: it must not end in silence
+            post(ended.set_exception, error if isinstance(error, Exception) else RuntimeError(repr(error)))
+        else:
+            post(ended.set_result, outcome)
+
+    def stop() -> None:
+        blocking.stopping.set()
+        watchers.append(_later(STOPPING, lambda: post(leave_alone, None)))
+
+    def leave_alone(_: None) -> None:
+        call.give_up(f"the thread of action '{call.action_id}' went on for {STOPPING:g} s after it was told to stop")
+        ended.set_exception(DeadlineError())
+
+    watchers: list[threading.Timer] = []
+    if math.isfinite(blocking.seconds):
+        watchers.append(_later(max(blocking.seconds, 0.0), stop))
+    threading.Thread(target=run, name=f"skill {blocking.action_id}", daemon=True).start()
+    try:
+        with _hold(call):
+            return await _until_stopped(ended, stop)
+    finally:
+        for watcher in tuple(watchers):
+            watcher.cancel()
+
+
+async def _until_stopped(ended: asyncio.Future[Outcome], stop: Callable[[], None]) -> Outcome:
+    try:
+        return await asyncio.shield(ended)
+    except asyncio.CancelledError:
+        stop()
+        with suppress(Exception):
+            await asyncio.shield(ended)
+        raise
+
+
+def _later(seconds: float, do: Callable[[], None]) -> threading.Timer:
+    timer = threading.Timer(seconds, do)
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
+def _hold(call: SkillCall) -> AbstractContextManager[None]:
+    hold: Callable[[], AbstractContextManager[None]] = getattr(call.clock, "hold", nullcontext)
+    return hold()
+
+
+# -- the process ---------------------------------------------------------------------------------------------
+
+
+def _in_child(
+    body: Callable[..., Outcome], name: str, blocking: BlockingCall, arguments: Mapping[str, Any]
+) -> Outcome:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    given = (theirs, body, blocking.action_id, blocking.seconds, dict(arguments))
+    process = context.Process(target=_child, args=given, name=f"skill of {name}", daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        return _heard(ours, process, blocking)
+    finally:
+        _end(process)
+        ours.close()
+
+
+def _heard(ours: Connection, process: BaseProcess, blocking: BlockingCall) -> Outcome:
+    """What the child says, until it says how it ended."""
+    while True:
+        while not ours.poll(_POLL):
+            blocking.sleep()
+        try:
+            kind, said = ours.recv()
+        except EOFError:
+            process.join(STOPPING)
+            raise RuntimeError(f"its process ended with exit code {process.exitcode}") from None
+        if kind == "report":
+            blocking.report(said)
+        elif kind == "error":
+            raise RuntimeError(said)
+        else:
+            ended: Outcome = said
+            return ended
+
+
+def _end(process: BaseProcess) -> None:
+    process.terminate()
+    process.join(STOPPING)
+    if process.is_alive():
+        process.kill()
+        process.join()
+    process.close()
+
+
+def _child(
+    theirs: Connection, body: Callable[..., Outcome], action_id: str, seconds: float, arguments: Mapping[str, Any]
+) -> None:
+    call = BlockingCall(action_id, lambda outcome: theirs.send(("report", outcome)), seconds)
+    try:
+        theirs.send(("ended", body(call, **arguments)))
+    except Exception as error:  # noqa: BLE001  # whatever it is goes to the parent, in words
+        theirs.send(("error", f"{type(error).__name__}: {error}"))

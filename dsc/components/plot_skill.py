@@ -1,0 +1,89 @@
+"""A plot as a skill: a component of its own runs it, with components and a world model of its own (S2.6, S0.9).
+
+A plot in the same run is better `use`d: it sees the same knowledge, and its states are part of the chart. As a skill a
+plot is closed: what it knows it was given, what it found out it emits. So it can also be hosted elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.events import Event
+from dsc.model.plot import ActionPlot
+from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.sequencer import Sequencer
+from dsc.skills import Component, Outcome, SkillCall, SkillSignature, check_arguments
+from knowledge_base.errors import UnknownNameError
+from knowledge_base.language.expression import Constant
+from knowledge_base.schema import Schema
+from knowledge_base.store import KnowledgeBase
+
+COMPLETED = "completed"
+"""The outcome of a plot that came to its end without emitting any."""
+
+
+class PlotComponent(Component):
+    """A component whose skills are plots.
+
+    Args:
+        name: how charts address it.
+        library: the plots; each is a skill, whose outcomes are what it emits, and `completed`.
+        components: what the plots use.
+        knowledge: makes the world model for one execution; empty if left out.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        library: Library,
+        components: Iterable[Component] = (),
+        knowledge: Callable[[], KnowledgeBase] = lambda: KnowledgeBase(Schema()),
+    ) -> None:
+        super().__init__(name)
+        self._library = library
+        self._components = tuple(components)
+        self._knowledge = knowledge
+
+    def skills(self) -> dict[str, SkillSignature]:
+        """A signature for each plot."""
+        return {plot.name: _signature(self.name, plot) for plot in self._library}
+
+    async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+        """Run the plot to its end; what it emits before the last event is reported. Cancelled, it leaves its states.
+
+        Raises:
+            UnknownNameError: there is no such plot.
+            InputError: an argument is missing or unknown.
+            RuntimeError: it ended otherwise than by reaching its end.
+        """
+        signatures = self.skills()
+        if skill_name not in signatures:
+            raise UnknownNameError(
+                f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
+            )
+        check_arguments(signatures[skill_name], arguments)
+        sequencer = Sequencer(self._library, self._knowledge(), self._components, LoopClock())
+        end = await sequencer.run(skill_name, arguments)
+        if not end.finished or end.problem is not None:
+            raise RuntimeError(end.problem or "it did not reach its end")
+        *before, last = map(_outcome, end.emitted or (Event(COMPLETED),))
+        for outcome in before:
+            call.report(outcome)
+        return last
+
+
+def _outcome(event: Event) -> Outcome:
+    return Outcome(event.name, dict(event.attributes))
+
+
+def _signature(component: str, plot: ActionPlot) -> SkillSignature:
+    defaults = {name: one.default for name, one in plot.parameters.items() if one.default is not None}
+    return SkillSignature(
+        component=component,
+        name=plot.name,
+        parameters={name: one.type for name, one in plot.parameters.items()},
+        defaults={name: value.value if isinstance(value, Constant) else value for name, value in defaults.items()},
+        outcomes={**{event: dict(attributes or {}) for event, attributes in plot.emits.items()}, COMPLETED: {}},
+    )

@@ -1,0 +1,98 @@
+"""Who is deployed, and whether what a component needs is there: waited for, lost, back again (S2.12)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, MutableMapping
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, TypeVar
+
+from dsc.components.life import Life
+from knowledge_base.errors import InputError
+
+if TYPE_CHECKING:
+    from dsc.skills import Component
+
+_Result = TypeVar("_Result")
+
+
+class NotAliveError(Exception):
+    """A component that is needed is not alive, and why."""
+
+
+class Roster:
+    """The deployed components by name, and who needs whom."""
+
+    def __init__(self, components: MutableMapping[str, Component]) -> None:
+        self._components = components
+        self._deployed = asyncio.Event()
+
+    def deploy(self, component: Component) -> None:
+        """Add a component, maybe late; it replaces one of the same name."""
+        self._components[component.name] = component
+        self._deployed.set()
+
+    async def ready(self, component: Component) -> list[Component]:
+        """Wait until all that the component needs in its present mode is alive, then bring it to life itself.
+
+        Returns:
+            The component and all that it needs, directly or not.
+
+        Raises:
+            NotAliveError: the component itself is in FatalError or Shutdown; what it needs is waited for instead.
+            InputError: components need each other in a circle.
+        """
+        found: dict[str, Component] = {}
+        await self._needed(component, found, ())
+        await component.come_alive()
+        if component.life.state is not Life.ALIVE:
+            raise NotAliveError(_state_of(component))
+        return [component, *found.values()]
+
+    async def with_support(self, component: Component, work: Awaitable[_Result], support: list[Component]) -> _Result:
+        """Do a skill's work as long as everything is alive that it needs.
+
+        Raises:
+            NotAliveError: something was lost; the work has been cancelled.
+        """
+        me = asyncio.current_task()
+        lost: list[Component] = []
+
+        def listener(one: Component) -> Callable[[], None]:
+            def changed() -> None:
+                if one.life.state is not Life.ALIVE and not lost and me is not None:
+                    lost.append(one)
+                    me.cancel()
+
+            return changed
+
+        with ExitStack() as listening:
+            for one in support:
+                listening.enter_context(one.life.heard(listener(one)))
+            try:
+                return await work
+            except asyncio.CancelledError:
+                if not lost or me is None or me.uncancel() > 0:  # or the state was left, too
+                    raise
+                said = _state_of(lost[0])
+                raise NotAliveError(said if lost[0] is component else f"it needs {said}") from None
+
+    async def _needed(self, component: Component, found: dict[str, Component], above: tuple[str, ...]) -> None:
+        if component.name in above:
+            raise InputError(f"components need each other in a circle: {' -> '.join((*above, component.name))}")
+        for name in component.needed():
+            needed = found[name] = await self._find(name)
+            await self._needed(needed, found, (*above, component.name))
+            await needed.come_alive()
+            await needed.life.until(lambda life: life is Life.ALIVE)
+
+    async def _find(self, name: str) -> Component:
+        while name not in self._components:
+            self._deployed.clear()
+            await self._deployed.wait()
+        return self._components[name]
+
+
+def _state_of(component: Component) -> str:
+    why = f": {component.life.reason}" if component.life.reason else ""
+    return f"component '{component.name}', which is in '{component.life.state}'{why}"

@@ -1,0 +1,55 @@
+"""How frames travel between components. A transport may do without guarantees: `Endpoint` makes up for that."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Protocol
+
+Receive = Callable[[str, bytes], None]
+"""Is given the sender's address and a frame."""
+EVERYBODY = "*"
+"""The address of all who are attached, but for the sender."""
+
+
+class Transport(Protocol):
+    """Carries frames, at its best; `dsc.testing.transport_suite` is what it has to pass."""
+
+    def attach(self, address: str, receive: Receive) -> None:
+        """Hand frames for the address to `receive`, from the loop's own thread; it replaces who was there."""
+        ...
+
+    def detach(self, address: str) -> None:
+        """Hand over no more frames for the address; nothing happens if nobody is there."""
+        ...
+
+    def send(self, sender: str, to: str, frame: bytes) -> None:
+        """Send a frame to an address, or to `EVERYBODY`. It may be lost, doubled, late, or overtaken."""
+        ...
+
+
+class LocalTransport:
+    """Inside one process: every frame arrives, once, in order."""
+
+    def __init__(self) -> None:
+        self._attached: dict[str, Receive] = {}
+
+    def attach(self, address: str, receive: Receive) -> None:
+        """Hand frames for the address to `receive`."""
+        self._attached[address] = receive
+
+    def detach(self, address: str) -> None:
+        """Hand over no more frames for the address."""
+        self._attached.pop(address, None)
+
+    def send(self, sender: str, to: str, frame: bytes) -> None:
+        """Send a frame; it arrives with the loop's next turn."""
+        asyncio.get_running_loop().call_soon(self.deliver, sender, to, frame)
+
+    def deliver(self, sender: str, to: str, frame: bytes) -> None:
+        """Hand a frame over now."""
+        if to == EVERYBODY:
+            for address in [address for address in self._attached if address != sender]:
+                self._attached[address](sender, frame)
+        elif to in self._attached:
+            self._attached[to](sender, frame)

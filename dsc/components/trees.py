@@ -1,0 +1,150 @@
+"""A behaviour tree as a skill (S4.7), through the extra `bt` (py_trees): it is ticked only while the skill is active.
+
+    class Butler(Component):
+        @tree_skill(success="served", failure="not_served", outcomes={"not_served": {}, "served": {}})
+        def serve(self, call: SkillCall, item: str) -> Behaviour:
+            return sequence(
+                retry(action("grasp", lambda: self.arm.grasp(call, item), ends={"grasped"}), 3),
+                fallback(condition("open", lambda: self.door), action("open", lambda: self.arm.push(call), {"pushed"})),
+            )
+
+py_trees is met here alone. Its trees are used as they are: any `Behaviour` may stand among these.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Collection, Mapping
+from typing import Any, TypeVar
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Selector, Sequence
+from py_trees.decorators import Repeat, Retry
+
+from dsc.skills import Component, Declared, Outcome, SkillBody, SkillCall
+from knowledge_base.facts import Delta
+
+PERIOD = 0.1
+"""Seconds between two ticks."""
+FOREVER = -1
+"""How often `repeat` repeats without end."""
+_Body = TypeVar("_Body", bound=Callable[..., Behaviour])
+
+
+def tree_skill(
+    success: str,
+    failure: str,
+    outcomes: Mapping[str, Mapping[str, str | None]],
+    types: Mapping[str, str] | None = None,
+    period: float = PERIOD,
+) -> Callable[[_Body], _Body]:
+    """Declare a method that makes a behaviour tree as a skill; each call makes a fresh tree.
+
+    What the actions in the tree observe is handed over when the skill ends.
+
+    Args:
+        success: the outcome when the root succeeds.
+        failure: the outcome when it fails.
+        outcomes: these two, and what else actions report; neither has attributes.
+        types: of the parameters, as for `skill`.
+        period: seconds of run time between two ticks.
+    """
+
+    async def carry_out(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+        root: Behaviour = body(call, **arguments)
+        try:
+            root.tick_once()
+            while root.status is Status.RUNNING:
+                await call.clock.sleep(period)
+                root.tick_once()
+            succeeded = root.status is Status.SUCCESS
+        finally:
+            await _halt(root)
+        return Outcome(success if succeeded else failure, observed=_observed(root))
+
+    return Declared(dict(types or {}), {name: dict(one) for name, one in outcomes.items()}, carry_out)
+
+
+def sequence(*children: Behaviour, name: str = "sequence") -> Behaviour:
+    """One after the other, until one fails; what has succeeded is not ticked again."""
+    return Sequence(name, memory=True, children=list(children))
+
+
+def fallback(*children: Behaviour, name: str = "fallback", reactive: bool = False) -> Behaviour:
+    """One after the other, until one succeeds; if `reactive`, earlier ones are tried anew at each tick."""
+    return Selector(name, memory=not reactive, children=list(children))
+
+
+def repeat(child: Behaviour, times: int = FOREVER) -> Behaviour:
+    """The child again, until it has succeeded so many times; it fails when the child fails."""
+    return Repeat(f"repeat {child.name}", child, times)
+
+
+def retry(child: Behaviour, times: int) -> Behaviour:
+    """The child again when it fails, so many times in all."""
+    return Retry(f"retry {child.name}", child, times)
+
+
+def condition(name: str, holds: Callable[[], bool]) -> Behaviour:
+    """Succeeds if the test holds when it is ticked, else fails."""
+    return _Condition(name, holds)
+
+
+def action(name: str, begin: Callable[[], Awaitable[Outcome]], ends: Collection[str]) -> Behaviour:
+    """Runs while a coroutine does, e.g. another skill; succeeds if it ends with one of these outcomes, else fails.
+
+    What the coroutine raises ends the whole skill. When the tree turns elsewhere, it is cancelled.
+    """
+    return _Action(name, begin, frozenset(ends))
+
+
+class _Condition(Behaviour):
+    def __init__(self, name: str, holds: Callable[[], bool]) -> None:
+        super().__init__(name)
+        self._holds = holds
+
+    def update(self) -> Status:
+        return Status.SUCCESS if self._holds() else Status.FAILURE
+
+
+class _Action(Behaviour):
+    def __init__(self, name: str, begin: Callable[[], Awaitable[Outcome]], ends: frozenset[str]) -> None:
+        super().__init__(name)
+        self._begin = begin
+        self._ends = ends
+        self._task: asyncio.Future[Outcome] | None = None
+        self.stopping: list[asyncio.Future[Outcome]] = []
+        self.observed = Delta()
+
+    def initialise(self) -> None:
+        self._task = asyncio.ensure_future(self._begin())
+
+    def update(self) -> Status:
+        if self._task is None or not self._task.done():
+            return Status.RUNNING
+        outcome = self._task.result()
+        self.observed = self.observed.then(outcome.observed)
+        return Status.SUCCESS if outcome.event in self._ends else Status.FAILURE
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status is Status.INVALID and self._task is not None and not self._task.done():
+            self._task.cancel()
+            self.stopping.append(self._task)
+
+
+def _observed(root: Behaviour) -> Delta:
+    observed = Delta()
+    for one in root.iterate():
+        if isinstance(one, _Action):
+            observed = observed.then(one.observed)
+    return observed
+
+
+async def _halt(root: Behaviour) -> None:
+    """Cancel what still runs in the tree, and wait for it."""
+    if root.status is Status.RUNNING:
+        root.stop(Status.INVALID)
+    stopping = [task for one in root.iterate() if isinstance(one, _Action) for task in one.stopping]
+    if stopping:
+        await asyncio.gather(*stopping, return_exceptions=True)

@@ -1,0 +1,473 @@
+"""What any transport must pass: subclass `TransportSuite` in a test file and say how one is made.
+
+    class TestZenoh(TransportSuite):
+        run = staticmethod(run_real)
+
+        def transport(self) -> Transport:
+            return ZenohTransport()
+
+Two endpoints, or a hosted component and its user, talk over one transport; what the patterns promise is judged, so a
+transport may lose, double, delay and reorder frames.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager, suppress
+from typing import Any
+
+import pytest
+
+from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
+from dsc.components.heartbeats import BEAT, SILENCE, Heart
+from dsc.components.life import Life
+from dsc.components.ports import event, query, takes
+from dsc.components.pushing import Publisher, Subscription
+from dsc.components.remote import Host, RemoteComponent
+from dsc.components.transport import Transport
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.skills import Component, Outcome, SkillCall, skill
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Delta, fact
+
+PATIENCE = 20.0
+"""Seconds of loop time in which what was promised has to come true."""
+
+
+class Robot(Component):
+    """Has every port there is."""
+
+    name = "robot"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.log: list[Any] = []
+
+    @skill(outcomes={"there": {"to": None}, "passed": {"n": "number"}})
+    async def go(self, call: SkillCall, to: str, steps: int = 3) -> Outcome:
+        """Report each step."""
+        self.log.append(f"go {to}")
+        try:
+            for n in range(steps):
+                await call.clock.sleep(0.3)
+                call.report(Outcome("passed", {"n": n}))
+        except asyncio.CancelledError:
+            self.log.append("cancelled")
+            raise
+        return Outcome("there", {"to": to}, Delta(added=(fact("at", to),)))
+
+    @skill(outcomes={})
+    async def fall(self, call: SkillCall) -> Outcome:
+        """Fail."""
+        raise RuntimeError(f"{call.action_id} fell")
+
+    @query({"n": "number"})
+    async def doubled(self, n: float) -> dict[str, Any]:
+        """Answer."""
+        return {"n": 2 * n}
+
+    @event({"level": "number"})
+    def low(self, level: float, below: float = 20.0) -> dict[str, Any] | None:
+        """Whether the level is low."""
+        return {"level": level} if level < below else None
+
+    @takes
+    async def say(self, text: str) -> None:
+        """Remember it."""
+        self.log.append(text)
+
+    async def configure(self, parameter: str, value: object) -> None:
+        """Remember it."""
+        self.log.append((parameter, value))
+
+
+async def until(holds: Callable[[], bool]) -> None:
+    """Wait until something holds; fails after `PATIENCE`."""
+    async with asyncio.timeout(PATIENCE):
+        while not holds():  # noqa: ASYNC110  # of anything, which may have no event
+            await asyncio.sleep(0.05)
+
+
+@asynccontextmanager
+async def running(*work: Coroutine[Any, Any, None]) -> AsyncIterator[list[asyncio.Task[None]]]:
+    """Run something meanwhile."""
+    tasks = [asyncio.ensure_future(one) for one in work]
+    try:
+        yield tasks
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+class TransportSuite:
+    """The promises of the patterns.
+
+    Attributes:
+        run: runs a coroutine; `run_real` for a transport that needs real time.
+    """
+
+    run: Callable[[Coroutine[Any, Any, Any]], Any] = staticmethod(run_simulated)
+
+    def transport(self) -> Transport:
+        """A fresh transport; called inside the running loop."""
+        raise NotImplementedError
+
+    # -- calls -------------------------------------------------------------------------------------------
+
+    def test_a_call_is_carried_out_once_and_answered(self) -> None:
+        """However often its frame arrives."""
+
+        async def main() -> None:
+            transport, done = self.transport(), []
+            server, client = Endpoint("server", transport), Endpoint("client", transport)
+
+            async def note(sender: str, body: Any) -> Any:
+                await asyncio.sleep(0.3)
+                done.append((sender, body))
+                return {"got": body}
+
+            server.answer("note", note)
+            for n in range(20):
+                assert await client.call("server", "note", n, PATIENCE) == {"got": n}
+            assert done == [("client", n) for n in range(20)]
+            answers = await asyncio.gather(*(client.call("server", "note", n, PATIENCE) for n in range(20, 40)))
+            assert answers == [{"got": n} for n in range(20, 40)]
+            assert sorted(n for _, n in done) == list(range(40))
+
+        self.run(main())
+
+    def test_what_cannot_be_done_is_refused_with_the_reason(self) -> None:
+        """A handler that raises, a kind that nobody answers, an answer that is no plain data."""
+
+        async def main() -> None:
+            transport = self.transport()
+            server, client = Endpoint("server", transport), Endpoint("client", transport)
+
+            async def broken(_: str, __: Any) -> Any:
+                raise RuntimeError("it is stuck")
+
+            async def strange(_: str, __: Any) -> Any:
+                return object()
+
+            server.answer("broken", broken)
+            server.answer("strange", strange)
+            for kind, why in [("broken", "stuck"), ("strange", "plain data"), ("absent", "does not answer 'absent'")]:
+                with pytest.raises(RefusedError, match=why):
+                    await client.call("server", kind, None, PATIENCE)
+
+        self.run(main())
+
+    def test_a_call_has_a_timeout(self) -> None:
+        """To nobody, and to somebody who left."""
+
+        async def main() -> None:
+            transport = self.transport()
+            client, gone = Endpoint("client", transport), Endpoint("gone", transport)
+            await gone.close()
+            for to in ("nobody", "gone"):
+                began = asyncio.get_running_loop().time()
+                with pytest.raises(NoAnswerError, match=f"'{to}' has not answered 'x' within 1 s"):
+                    await client.call(to, "x", None, 1.0)
+                assert asyncio.get_running_loop().time() - began >= 0.99
+
+        self.run(main())
+
+    def test_nothing_is_shared_by_accident(self) -> None:
+        """Messages are encoded, whatever the distance."""
+
+        async def main() -> None:
+            transport, kept = self.transport(), []
+            server, client = Endpoint("server", transport), Endpoint("client", transport)
+
+            async def keep(_: str, body: Any) -> Any:
+                kept.append(body)
+
+            server.answer("keep", keep)
+            mine = {"list": [1]}
+            await client.call("server", "keep", mine, PATIENCE)
+            mine["list"].append(2)
+            assert kept == [{"list": [1]}]
+            with pytest.raises(InputError, match="only plain data"):
+                await client.call("server", "keep", {"thing": object()}, PATIENCE)
+
+        self.run(main())
+
+    def test_who_came_back_is_somebody_new(self) -> None:
+        """Its calls are not taken for those of its earlier life."""
+
+        async def main() -> None:
+            transport, done = self.transport(), []
+            server = Endpoint("server", transport)
+
+            async def note(_: str, body: Any) -> Any:
+                done.append(body)
+
+            server.answer("note", note)
+            for life in ("first", "second"):
+                client = Endpoint("client", transport, life)
+                for n in range(3):
+                    await client.call("server", "note", f"{life} {n}", PATIENCE)
+                await client.close()
+            assert done == [f"{life} {n}" for life in ("first", "second") for n in range(3)]
+
+        self.run(main())
+
+    # -- pushes ------------------------------------------------------------------------------------------
+
+    def test_the_newest_value_arrives_and_time_never_runs_backwards(self) -> None:
+        """*Push newest*: values may be left out, never go back, and the last one comes through."""
+
+        async def main() -> None:
+            transport, seen = self.transport(), []
+            mine, theirs = Endpoint("user", transport), Endpoint("laser", transport)
+            subscription, publisher = Subscription(mine, "laser", "scan"), Publisher(theirs, "scan")
+
+            async def watch() -> None:
+                while True:
+                    seen.append(await subscription.next(PATIENCE))
+
+            async with running(subscription.run(), watch()):
+                for n in range(50):
+                    publisher.put(n)
+                    await asyncio.sleep(0.1)
+                await until(lambda: subscription.value == 49)
+            assert seen == sorted(set(seen))
+
+        self.run(main())
+
+    def test_a_timed_push_comes_again_and_its_silence_is_noticed(self) -> None:
+        """*Push timed*."""
+
+        async def main() -> None:
+            transport = self.transport()
+            mine, theirs = Endpoint("user", transport), Endpoint("laser", transport)
+            subscription, publisher = Subscription(mine, "laser", "scan"), Publisher(theirs, "scan", period=0.1)
+            async with running(subscription.run()):
+                async with running(publisher.run()):
+                    publisher.put(1)
+                    await until(lambda: subscription.value == 1)
+                    for _ in range(5):
+                        await asyncio.sleep(2.0)
+                        assert subscription.age < 2.0
+                await theirs.close()
+                with pytest.raises(NoAnswerError, match="'laser' has pushed no 'scan' within 4 s"):
+                    await subscription.next(4.0)
+                assert subscription.age > 3.0
+
+        self.run(main())
+
+    def test_a_publisher_that_came_back_is_heard(self) -> None:
+        """It counts anew; its subscribers find it."""
+
+        async def main() -> None:
+            transport = self.transport()
+            subscription = Subscription(Endpoint("user", transport), "laser", "scan")
+            async with running(subscription.run()):
+                for value in ("first", "second"):
+                    theirs = Endpoint("laser", transport)
+                    Publisher(theirs, "scan").put(value)
+                    await until(lambda value=value: subscription.value == value)  # type: ignore[misc]
+                    await theirs.close()
+
+        self.run(main())
+
+    # -- components --------------------------------------------------------------------------------------
+
+    @asynccontextmanager
+    async def _robot(self) -> AsyncIterator[tuple[Robot, RemoteComponent, Host]]:
+        transport, robot = self.transport(), Robot()
+        host = Host(robot, transport, LoopClock())
+        remote = await RemoteComponent.connect("robot", transport, PATIENCE)
+        await remote.come_alive()
+        try:
+            yield robot, remote, host
+        finally:
+            await host.close()
+
+    def test_a_skill_reports_in_order_and_ends_once(self) -> None:
+        """With what was observed; asked again under the same id it is not carried out again."""
+
+        async def main() -> None:
+            async with self._robot() as (robot, remote, _):
+                assert remote.skills() == robot.skills()
+                assert robot.life.state is Life.ALIVE
+                reports: list[Outcome] = []
+                call = SkillCall("a1.0", LoopClock(), reports.append)
+                outcome = await remote.execute("go", call, {"to": "kitchen", "steps": 5})
+                assert outcome == Outcome("there", {"to": "kitchen"}, Delta(added=(fact("at", "kitchen"),)))
+                assert [one.attributes["n"] for one in reports] == list(range(5))
+                assert robot.log == ["go kitchen"]
+
+        self.run(main())
+
+    def test_a_skill_that_fails_there_fails_here(self) -> None:
+        """With the reason."""
+
+        async def main() -> None:
+            async with self._robot() as (_, remote, __):
+                with pytest.raises(RefusedError, match=r"RuntimeError: a2\.0 fell"):
+                    await remote.execute("fall", SkillCall("a2.0", LoopClock(), lambda _: None), {})
+
+        self.run(main())
+
+    def test_a_cancellation_arrives(self) -> None:
+        """And has arrived when the one who cancels goes on."""
+
+        async def main() -> None:
+            async with self._robot() as (robot, remote, _):
+                call = SkillCall("a3.0", LoopClock(), lambda _: None)
+                task = asyncio.ensure_future(remote.execute("go", call, {"to": "kitchen", "steps": 1000}))
+                await until(lambda: bool(robot.log))
+                task.cancel()
+                with suppress(asyncio.CancelledError):
+                    await task
+                assert robot.log == ["go kitchen", "cancelled"]
+
+        self.run(main())
+
+    def test_a_silent_death_is_noticed_and_a_return_too(self) -> None:
+        """The skill fails, the component is in FatalError; the next skill finds it again."""
+
+        async def main() -> None:
+            transport, robot = self.transport(), Robot()
+            host = Host(robot, transport, LoopClock())
+            remote = await RemoteComponent.connect("robot", transport, PATIENCE)
+            await remote.come_alive()
+            call = SkillCall("a4.0", LoopClock(), lambda _: None)
+            task = asyncio.ensure_future(remote.execute("go", call, {"to": "kitchen", "steps": 1000}))
+            await until(lambda: bool(robot.log))
+            await host.close()
+            with pytest.raises(NoAnswerError):
+                await task
+            assert remote.life.state == "fatal_error"
+            again = Host(Robot(), transport, LoopClock())
+            await remote.come_alive()
+            assert remote.life.state == "alive"
+            assert await remote.execute("doubled", SkillCall("a5.0", LoopClock(), lambda _: None), {"n": 4}) == Outcome(
+                "answered", {"n": 8}
+            )
+            await again.close()
+
+        self.run(main())
+
+    def test_what_a_component_is_told_arrives_once_in_order(self) -> None:
+        """*Param* and *send*, one after the other."""
+
+        async def main() -> None:
+            async with self._robot() as (robot, remote, _):
+                for n in range(10):
+                    await remote.configure("speed", n)
+                    await remote.take("say", {"text": f"now {n}"})
+                await remote.change_mode("fast")
+                assert robot.log == [one for n in range(10) for one in (("speed", n), f"now {n}")]
+                assert (await remote.diagnose())["mode"] == "fast"
+
+        self.run(main())
+
+    def test_an_event_comes_once_for_each_time_it_happens(self) -> None:
+        """In order, until it is deactivated."""
+
+        async def main() -> None:
+            async with self._robot() as (robot, remote, _):
+                heard: list[Any] = []
+                call = SkillCall("a6.0", LoopClock(), lambda outcome: heard.append(outcome.attributes["level"]))
+                async with running(_watched(remote, call)):
+                    await until(lambda: robot.activations.active("low"))
+                    for level in (30, 19, 18, 25, 15, 10, 40, 5):
+                        robot.update("low", level)
+                    await until(lambda: len(heard) == 3)
+                assert heard == [19, 15, 5]
+                assert not robot.activations.active("low")
+
+        self.run(main())
+
+    def test_a_hosted_component_is_active_while_it_is_needed(self) -> None:
+        """It takes its resources, and frees them."""
+
+        async def main() -> None:
+            transport, told = self.transport(), []
+
+            class Camera(Component):
+                async def activate(self, active: bool) -> None:  # noqa: FBT001
+                    told.append(active)
+
+            async def ignore(_: bool) -> None:  # noqa: FBT001
+                pass
+
+            host = Host(Camera(), transport, LoopClock())
+            root = Heart(Endpoint("sequencer", transport), lambda: ["camera"], ignore, root=True)
+            async with running(root.run()):
+                await until(lambda: told == [True])
+            await until(lambda: told == [True, False])
+            await host.close()
+
+        self.run(main())
+
+    # -- activation trees --------------------------------------------------------------------------------
+
+    def test_components_are_active_while_somebody_active_needs_them(self) -> None:
+        """From the root down, whoever comes late; freed when no longer needed, and when their activator dies."""
+
+        async def main() -> None:
+            transport = self.transport()
+            active: set[str] = set()
+            needs = {"root": ["arm"], "arm": ["motor"], "motor": [], "camera": []}
+            hearts: dict[str, Heart] = {}
+
+            def heart(name: str) -> Coroutine[Any, Any, None]:
+                async def changed(now: bool) -> None:  # noqa: FBT001
+                    (active.add if now else active.discard)(name)
+
+                endpoint = Endpoint(name, transport)
+                hearts[name] = Heart(endpoint, lambda: needs[name], changed, root=name == "root")
+                return hearts[name].run()
+
+            async with running(heart("root"), heart("motor"), heart("camera")) as tasks:
+                await asyncio.sleep(4 * BEAT)
+                assert active == {"root"}
+                async with running(heart("arm")):  # late
+                    await until(lambda: active == {"root", "arm", "motor"})
+                    await asyncio.sleep(3 * SILENCE)
+                    assert active == {"root", "arm", "motor"}
+                    assert hearts["motor"].activators == {"arm"}
+                    needs["arm"] = ["camera"]  # another state of the arm
+                    hearts["arm"].stir()
+                    await until(lambda: active == {"root", "arm", "camera"})
+                await until(lambda: active == {"root"})
+                tasks[0].cancel()
+                await until(lambda: not active)
+
+        self.run(main())
+
+    def test_a_silent_death_frees_what_the_dead_one_needed(self) -> None:
+        """Without a last word."""
+
+        async def main() -> None:
+            transport, told = self.transport(), []
+
+            async def ignore(_: bool) -> None:  # noqa: FBT001
+                pass
+
+            async def note(now: bool) -> None:  # noqa: FBT001
+                told.append(now)
+
+            dying = Endpoint("arm", transport)
+            arm = Heart(dying, lambda: ["motor"], ignore, root=True)
+            motor = Heart(Endpoint("motor", transport), list, note)
+            async with running(motor.run()):
+                task = asyncio.ensure_future(arm.run())
+                await until(lambda: told == [True])
+                transport.detach("arm")
+                dying.broadcast = lambda *_: None  # type: ignore[method-assign]
+                assert motor.alive("arm")
+                await until(lambda: told == [True, False])
+                assert not motor.alive("arm")
+                task.cancel()
+
+        self.run(main())
+
+
+async def _watched(remote: RemoteComponent, call: SkillCall) -> None:
+    await remote.execute("low", call, {"below": 20})

@@ -1,0 +1,251 @@
+"""Skills that block, in threads and processes; skills that do not stop."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from dsc_runs import Arm, Ran
+
+from dsc.components import blocking
+from dsc.components.functions import component_of
+from dsc.sequencer.clock import LoopClock, run_real, run_simulated
+from dsc.skills import Component, Outcome, SkillCall, skill
+from knowledge_base.errors import InputError
+
+
+class Worker(Arm):
+    """Blocks in every way there is."""
+
+    name = "arm"
+
+    def __init__(self):
+        super().__init__()
+        self.stopped = threading.Event()
+        self.release = threading.Event()
+
+    @skill(outcomes={"added": {"sum": "number"}, "half": {}}, blocking="thread")
+    def add(self, call, a: float, b: float):
+        call.report(Outcome("half"))
+        return Outcome("added", {"sum": a + b})
+
+    @skill(outcomes={"ok": {}}, blocking="thread")
+    def dawdles(self, call):
+        try:
+            while True:
+                call.sleep(0.005)
+        finally:
+            self.stopped.set()
+
+    @skill(outcomes={"ok": {}}, blocking="thread")
+    def deaf(self, call):
+        self.release.wait()
+        return Outcome("ok")
+
+    @skill(outcomes={"ok": {}}, blocking="thread")
+    def raises(self, call):
+        raise RuntimeError("the bus is stuck")
+
+    @skill(outcomes={"ok": {}})
+    async def swallows(self, call):
+        while True:
+            try:
+                await asyncio.sleep(1)
+            except asyncio.CancelledError:
+                self.note("no")
+
+
+class Far(Component):
+    """Skills in processes of their own: must be importable there, hence no Arm."""
+
+    name = "far"
+
+    @skill(outcomes={"pid": {"pid": "number"}, "begun": {"n": "number"}}, blocking="process")
+    def whoami(self, call, n: int):
+        call.report(Outcome("begun", {"n": n}))
+        return Outcome("pid", {"pid": os.getpid()})
+
+    @skill(outcomes={"ok": {}}, blocking="process")
+    def raises(self, call):
+        raise RuntimeError("the bus is stuck")
+
+    @skill(outcomes={"ok": {}}, blocking="process")
+    def dies(self, call):
+        os._exit(7)
+
+    @skill(outcomes={"ok": {}}, blocking="process")
+    def sleeps(self, call):
+        time.sleep(3600)
+        return Outcome("ok")
+
+
+def execute(component, name, run=run_simulated, seconds=None, cancel_after=None, **arguments):
+    """Outcome, reports, and what was given up."""
+    reports, given_up = [], []
+
+    async def main():
+        clock = LoopClock()
+        deadline = {} if seconds is None else {"deadline": clock.now() + seconds}
+        call = SkillCall("a1.0", clock, reports.append, give_up=given_up.append, **deadline)
+        task = asyncio.ensure_future(component.execute(name, call, arguments))
+        if cancel_after is not None:
+            await asyncio.to_thread(cancel_after)
+            task.cancel()
+        return await task
+
+    return run(main()), reports, given_up
+
+
+# -- threads -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("run", [run_simulated, run_real])
+def test_a_blocking_skill_runs_in_a_thread_and_reports(run):
+    outcome, reports, given_up = execute(Worker(), "add", run, a=1, b=2)
+    assert outcome == Outcome("added", {"sum": 3})
+    assert [one.event for one in reports] == ["half"]
+    assert not given_up
+
+
+def test_what_a_thread_raises_reaches_the_chart():
+    ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.raises}, on: {ok: e}}, e: {final: true}}}", arm=Worker())
+    assert "the bus is stuck" in ran.end.problem
+
+
+@pytest.mark.parametrize("run", [run_simulated, run_real])
+def test_a_deadline_reaches_a_thread(run):
+    worker = Worker()
+    with pytest.raises(blocking.DeadlineError):
+        execute(worker, "dawdles", run, seconds=0.05)
+    assert worker.stopped.is_set()
+
+
+def test_a_deadline_is_the_event_timed_out():
+    text = "{plot: p, states: {a: {entry: {trigger: arm.dawdles, within: 0.05}, on: {ok: x, timed_out: e}}, x: {}, e: {final: true}}}"
+    ran = Ran(text, arm=Worker())
+    assert ran.end.finished
+    assert ran.end.problem is None
+
+
+def test_a_cancellation_reaches_a_thread():
+    worker = Worker()
+    with pytest.raises(asyncio.CancelledError):
+        execute(worker, "dawdles", run_real, cancel_after=lambda: None)
+    assert worker.stopped.is_set()
+
+
+def test_a_thread_that_does_not_stop_is_left_alone_and_said(monkeypatch):
+    monkeypatch.setattr(blocking, "STOPPING", 0.05)
+    worker = Worker()
+    text = "{plot: p, states: {a: {entry: {trigger: arm.deaf, within: 0.05}, on: {ok: x, timed_out: e}}, x: {}, e: {final: true}}}"
+    ran = Ran(text, arm=worker)
+    assert ran.end.finished
+    assert "went on for 0.05 s after it was told to stop" in ran.end.problem
+    worker.release.set()
+
+
+# -- processes ---------------------------------------------------------------------------------------------
+
+
+def test_a_blocking_skill_runs_in_a_process_and_reports():
+    outcome, reports, _ = execute(Far(), "whoami", n=3)
+    assert outcome.attributes["pid"] != os.getpid()
+    assert reports == [Outcome("begun", {"n": 3})]
+
+
+@pytest.mark.parametrize(("name", "why"), [("raises", "RuntimeError: the bus is stuck"), ("dies", "exit code 7")])
+def test_what_goes_wrong_in_a_process_is_told(name, why):
+    with pytest.raises(RuntimeError, match=why):
+        execute(Far(), name)
+
+
+def test_a_deadline_ends_a_process():
+    with pytest.raises(blocking.DeadlineError):
+        execute(Far(), "sleeps", seconds=0.2)
+
+
+# -- skills that do not stop -------------------------------------------------------------------------------
+
+SWALLOWS = """
+    plot: p
+    states:
+      a: {entry: {trigger: arm.swallows, within: WITHIN}, after: {seconds: 5, to: b}, on: {ok: x, timed_out: b}}
+      b: {after: {seconds: 100, to: e}}
+      x:
+      e: {final: true}
+"""
+
+
+@pytest.mark.parametrize("within", [100, 3])
+def test_a_skill_that_swallows_its_cancellation_holds_nothing_up_and_is_said(within):
+    ran = Ran(SWALLOWS.replace("WITHIN", str(within)), arm=Worker())
+    assert ran.end.finished
+    assert "skill 'arm.swallows' went on for 30 s after it was cancelled and was given up" in ran.end.problem
+    assert ran.at == pytest.approx(105)
+
+
+def test_a_skill_that_swallows_its_deadline_is_timed_out_for_the_chart():
+    ran = Ran(SWALLOWS.replace("WITHIN", "3").replace("seconds: 5,", "seconds: 500,"), arm=Worker())
+    assert ran.end.finished
+    assert ran.at == pytest.approx(133)
+
+
+def test_a_skill_that_swallows_its_cancellation_does_not_keep_the_process():
+    program = """
+import asyncio
+from dsc.components.stopping import give_up
+
+async def swallows():
+    while True:
+        try:
+            await asyncio.sleep(3600)
+        except asyncio.CancelledError:
+            pass
+
+async def main():
+    task = asyncio.ensure_future(swallows())
+    await asyncio.sleep(0)
+    task.cancel()
+    await asyncio.sleep(0)
+    give_up(task)
+
+asyncio.run(main())
+print("over")
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "over\n"
+
+
+# -- functions ---------------------------------------------------------------------------------------------
+
+
+@skill(outcomes={"greeted": {"person": "text"}})
+async def greet(call, person, times: int = 1):
+    return Outcome("greeted", {"person": person * times})
+
+
+@skill(outcomes={"ok": {}}, blocking="thread")
+def waits(call):
+    return Outcome("ok")
+
+
+def test_a_skill_may_be_a_function():
+    voice = component_of("voice", greet, waits)
+    signature = voice.skills()["greet"]
+    assert (signature.component, signature.parameters) == ("voice", {"person": None, "times": "number"})
+    outcome, _, _ = execute(voice, "greet", person="bob", times=2)
+    assert outcome.attributes == {"person": "bobbob"}
+    assert execute(voice, "waits")[0].event == "ok"
+
+
+def test_a_function_that_is_no_skill_is_refused():
+    async def plain(call):
+        return None
+
+    with pytest.raises(InputError, match="'plain' is no skill: decorate it"):
+        component_of("voice", plain)

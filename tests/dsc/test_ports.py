@@ -1,0 +1,205 @@
+"""Events, queries and messages of components, as charts use them."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from dsc_charts import plot
+from dsc_runs import Ran
+
+from dsc.components.ports import event, query, takes
+from dsc.dynamic.library import Library
+from dsc.skills import Component, Outcome, skill
+from dsc.validation import validate_plot
+from knowledge_base.errors import InputError, UnknownNameError
+
+
+class Battery(Component):
+    """Discharges by one percent a second while somebody has it `run`."""
+
+    name = "battery"
+
+    def __init__(self):
+        super().__init__()
+        self.level = 30.0
+        self.told = []
+
+    @event({"level": "number"})
+    def low(self, level: float, below: float = 20.0):
+        return {"level": level} if level < below else None
+
+    @query({"seconds": "number"})
+    async def lasts(self, until: float = 0.0):
+        return {"seconds": self.level - until}
+
+    @query({"seconds": "number"})
+    async def ponders(self):
+        await asyncio.sleep(1e6)
+
+    @takes
+    async def label(self, text, size: int = 1):
+        if text == "unprintable":
+            raise RuntimeError("no ink")
+        self.told.append((text, size))
+
+    @skill(outcomes={"ran": {}})
+    async def run(self, call, levels=(25, 15, 14, 40, 10)):
+        for level in levels:
+            await call.clock.sleep(1)
+            self.update("low", level)
+        return Outcome("ran")
+
+
+def ran(text, battery=None, **more):
+    return Ran(text, arm=battery or Battery(), **more)
+
+
+LOW = """
+    plot: p
+    variables: {n: {type: number, initial: 0}}
+    emits: {counted: {n: number}}
+    states:
+      a:
+        entry: [{trigger: battery.low, with: {below: BELOW}, as: {low: low_bat}}, {trigger: battery.run}]
+        on:
+          low_bat: {assign: {n: (+ ?n 1)}}
+          ran: {to: e, emit: counted, with: {n: ?n}}
+      e: {final: true}
+"""
+
+
+@pytest.mark.parametrize(("below", "times"), [(20, 2), (5, 0), (100, 1), (14.5, 2)])
+def test_an_event_comes_each_time_its_test_begins_to_hold(below, times):
+    end = ran(LOW.replace("BELOW", str(below))).end
+    assert end.emitted[0].attributes == {"n": times}
+
+
+def test_an_event_ends_with_the_state_that_activated_it():
+    done = ran("""
+        plot: p
+        states:
+          a: {entry: {trigger: battery.low}, after: {seconds: 1, to: b}, on: {low: wrong}}
+          b: {entry: {trigger: battery.run}, on: {ran: e}}
+          wrong: {final: true}
+          e: {final: true}
+    """)
+    assert done.end.finished
+    assert [one["name"] for one in done.of_type("event")] == ["after", "ran"]
+
+
+def test_a_value_said_before_counts_for_who_comes_later():
+    battery = Battery()
+    battery.update("low", 3.0)
+    text = "{plot: p, states: {a: {entry: {trigger: battery.low, within: 5}, on: {low: e, timed_out: x}}, x: {}, e: {final: true}}}"
+    assert ran(text, battery).end.finished
+
+
+def test_an_event_may_never_come_and_does_not_keep_the_run():
+    text = "{plot: p, states: {a: {entry: {trigger: battery.low}, on: {low: e}}, e: {final: true}}}"
+    end = ran(text).end
+    assert not end.finished
+    assert "nothing can happen" in end.problem
+
+
+def test_an_event_is_waited_for_within_a_bound():
+    done = ran("""
+        plot: p
+        states:
+          a: {entry: {trigger: battery.low, within: 1000}, on: {low: wrong, timed_out: e}}
+          wrong:
+          e: {final: true}
+    """)
+    assert done.end.finished
+    assert done.at == pytest.approx(1000)
+
+
+def test_a_query_is_answered_in_an_event():
+    done = ran("""
+        plot: p
+        emits: {told: {seconds: number}}
+        states:
+          a: {entry: {trigger: battery.lasts, with: {until: 10}}, on: {answered: {to: e, emit: told, with: {seconds: ?event.seconds}}}}
+          e: {final: true}
+    """)
+    assert done.end.emitted[0].attributes == {"seconds": 20}
+
+
+def test_a_query_has_a_timeout():
+    text = "{plot: p, states: {a: {entry: {trigger: battery.ponders, within: 2}, on: {answered: x, timed_out: e}}, x: {}, e: {final: true}}}"
+    done = ran(text)
+    assert done.end.finished
+    assert done.at == pytest.approx(2)
+
+
+SAY = """
+    plot: p
+    states:
+      a: {entry: [{send: battery.label, with: {text: TEXT}}, {send: battery.label, with: {text: two, size: 2}}], after: {seconds: 1, to: e}}
+      e: {final: true}
+"""
+
+
+def test_messages_are_taken_in_order_and_traced():
+    done = ran(SAY.replace("TEXT", "one"))
+    assert done.end.problem is None
+    assert done.arm.told == [("one", 1), ("two", 2)]
+    sent = [one for one in done.of_type("action") if one["action"] == "send"]
+    assert sent[0] == {"action": "send", "port": "battery.label", "arguments": {"text": "one"}}
+
+
+def test_a_message_that_cannot_be_taken_is_told():
+    end = ran(SAY.replace("TEXT", "unprintable")).end
+    assert end.finished
+    assert "no ink" in end.problem
+
+
+def test_what_a_component_does_not_take_is_refused():
+    battery = Battery()
+    with pytest.raises(UnknownNameError, match="did you mean 'label'"):
+        asyncio.run(battery.take("labl", {}))
+    with pytest.raises(InputError, match="needs its parameter 'text'"):
+        asyncio.run(battery.take("label", {}))
+    with pytest.raises(UnknownNameError, match="did you mean 'low'"):
+        battery.update("lov", 1)
+
+
+def test_ports_are_checked_before_the_run():
+    battery = Battery()
+
+    def findings(entry, on="low_bat: {}"):
+        text = f"{{plot: p, states: {{a: {{entry: {entry}, on: {{{on}}}, after: {{seconds: 1, to: e}}}}, e: {{final: true}}}}}}"
+        parsed = plot(text)
+        return [str(f) for f in validate_plot(parsed, Library([parsed]), None, battery.skills().values(), {"battery"})]
+
+    assert findings("{trigger: battery.low, with: {below: 10}, as: {low: low_bat}}") == []
+    (below,) = findings("{trigger: battery.low, with: {belo: 10}, as: {low: low_bat}}")
+    assert "did you mean 'below'" in below
+    assert any("outcome 'low_bat'" in one or "'low_bat'" in one for one in findings("{send: battery.label}"))
+    (unknown,) = findings("[{send: batery.label}, {trigger: battery.lasts}]", "answered: e")
+    assert "did you mean 'battery'" in unknown
+
+
+def test_a_component_says_how_it_is():
+    battery = Battery()
+    said = asyncio.run(battery.diagnose())
+    assert said["life"] == "init"
+    assert said["skills"] == ["lasts", "low", "ponders", "run"]
+
+
+def test_the_sequencer_says_how_the_run_is_going():
+    said = []
+
+    def prepare(sequencer):
+        async def ask():
+            said.append(sequencer.diagnose())
+
+        said.append(sequencer.diagnose())
+        sequencer.wait_before_events(ask)
+
+    done = ran(LOW.replace("BELOW", "20"), prepare=prepare)
+    assert said[0]["active"] == []
+    assert said[1]["active"] == ["a"]
+    assert said[1]["working"] == ["battery.low", "battery.run"]
+    assert said[1]["in_use"] == ["battery"]
+    assert done.sequencer.diagnose()["finished"]

@@ -1,0 +1,79 @@
+"""Every transport passes the suite; endpoints forget what nobody asks for any more."""
+
+from __future__ import annotations
+
+import pytest
+
+from dsc.components.endpoint import Endpoint
+from dsc.components.transport import LocalTransport
+from dsc.sequencer.clock import run_real, run_simulated
+from dsc.testing.lossy import LossyTransport
+from dsc.testing.transport_suite import TransportSuite
+
+
+class TestLocal(TransportSuite):
+    def transport(self):
+        return LocalTransport()
+
+
+class TestLocalInRealTime(TransportSuite):
+    """What takes no time anyway."""
+
+    run = staticmethod(run_real)
+
+    def transport(self):
+        return LocalTransport()
+
+    test_a_call_has_a_timeout = None
+    test_a_timed_push_comes_again_and_its_silence_is_noticed = None
+    test_the_newest_value_arrives_and_time_never_runs_backwards = None
+    test_components_are_active_while_somebody_active_needs_them = None
+    test_a_silent_death_frees_what_the_dead_one_needed = None
+    test_a_silent_death_is_noticed_and_a_return_too = None
+    test_a_call_is_carried_out_once_and_answered = None
+
+
+@pytest.mark.parametrize("seed", range(5))
+class TestLossy(TransportSuite):
+    @pytest.fixture(autouse=True)
+    def _seeded(self, seed):
+        self.seed = seed
+
+    def transport(self):
+        return LossyTransport(self.seed, loss=0.2, double=0.3, delay=0.3)
+
+
+def test_a_lossy_transport_does_the_same_with_the_same_seed():
+    def fates(seed):
+        async def main():
+            transport, arrived = LossyTransport(seed), []
+            transport.attach("b", lambda sender, frame: arrived.append(frame))
+            for n in range(100):
+                transport.send("a", "b", str(n).encode())
+            import asyncio
+
+            await asyncio.sleep(1)
+            return arrived
+
+        return run_simulated(main())
+
+    assert fates(1) == fates(1) != fates(2)
+    assert fates(1) != sorted(fates(1), key=int)
+    assert len(set(fates(1))) < len(fates(1))
+
+
+def test_answers_are_forgotten_when_nobody_waits_for_them():
+    async def main():
+        transport = LocalTransport()
+        server, client = Endpoint("server", transport), Endpoint("client", transport)
+
+        async def big(_, __):
+            return "x" * 1000
+
+        server.answer("big", big)
+        for _ in range(100):
+            await client.call("server", "big")
+        (peer,) = server._peers["client"].values()
+        return len(peer.answers)
+
+    assert run_simulated(main()) <= 1
