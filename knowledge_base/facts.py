@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from knowledge_base.spelling import value_text
+
 Value = str | int | float | bool
 VALUE_TYPES = frozenset({str, int, float, bool})
 """What a fact's argument or a bound variable may be: an object's name, a number, a truth value."""
@@ -23,8 +25,8 @@ class Fact:
     args: tuple[Value, ...] = ()
 
     def __str__(self) -> str:
-        """In PDDL: `(on cup3 table1)`."""
-        return "(" + " ".join([self.predicate, *map(str, self.args)]) + ")"
+        """In the language: `(on cup3 table1)`."""
+        return "(" + " ".join([self.predicate, *map(value_text, self.args)]) + ")"
 
 
 def fact(predicate: str, *args: Value) -> Fact:

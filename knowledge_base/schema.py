@@ -252,6 +252,9 @@ class Schema:
             if name in self.functions:
                 hint = f"compare what it is worth: (= ({name} ...) VALUE)"
                 raise SchemaError(f"'{name}' is a function; {hint}", place=place)
+            if name in self.types:
+                said = f"'{name}' is a type, which is asked of one thing, ({name} THING)"
+                raise SchemaError(f"{said}; things get theirs when they come", place=place)
             valid = (*self.predicates, *self.computed, *self.types, *KEYWORDS)
             raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
         of = self.computed[name]

@@ -12,7 +12,8 @@ from pydantic_core import PydanticCustomError
 from dsc.model.language import LOCATED, TermField
 from dsc.model.transitions import FormPath, Source, Transition, Transitions, as_transition
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import TRUTH_VALUES, And, Comparison, Constant, is_number
+from knowledge_base.language.expression import And, Comparison, Constant
+from knowledge_base.spelling import TRUTH_VALUES, is_number
 
 CHOICE = "choice"
 """Label of the transitions of connectors, which have no trigger."""

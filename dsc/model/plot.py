@@ -22,7 +22,7 @@ from dsc.model.states import (
     SubmachineState,
 )
 from knowledge_base.errors import Place
-from knowledge_base.language.expression import is_plain_name
+from knowledge_base.spelling import is_plain_name
 
 Path = tuple[str | int, ...]
 """Where in a plot's form something stands, e.g. `("states", "look", "on", "recognised")`."""

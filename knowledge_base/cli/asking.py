@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from knowledge_base.cli.printing import print_json, print_table
-from knowledge_base.cli.sources import Domain, Json, Source, Store, opened
+from knowledge_base.cli.sources import Domain, Json, Source, Store, opened, opened_store
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,10 +29,24 @@ NO = 1
 """Exit status of an answer `no`; 2 is a mistake, as for every command."""
 
 
-def query(source: Source, expression: Expr, domain: Domain = None, param: Params = None, json: Json = False) -> None:
+def query(
+    source: Source,
+    expression: Expr,
+    domain: Domain = None,
+    param: Params = None,
+    explain: Explain = False,
+    json: Json = False,
+) -> None:
     """List the values of EXPR's variables that make it true, e.g. '(and (on ?o table1) (cup ?o))'."""
     with opened(source, domain) as (kb, _):
-        _answer(kb, expression, _params(param), as_json=json)
+        if not explain:
+            _answer(kb, expression, _params(param), as_json=json)
+            return
+        plan = kb.explain_query(_parsed(expression), _params(param))
+    if json:
+        print_json(asdict(plan))
+    else:
+        typer.echo(str(plan))
 
 
 def ask(
@@ -77,7 +92,7 @@ def at(
     """Show a store's world of then, or ask it."""
     from knowledge_base.cli.moments import moment
 
-    with opened(store) as (kb, _):
+    with opened_store(store) as kb:
         then = kb.at(**moment(when))
         if expression is None:
             _show(then, None, None, as_json=json)
@@ -101,7 +116,8 @@ def _answer(world: View, expression: str, params: Mapping[str, Value], *, as_jso
 
 def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_json: bool) -> None:
     from knowledge_base.errors import UnknownNameError
-    from knowledge_base.language.printer import to_text, value_text
+    from knowledge_base.language.printer import to_text
+    from knowledge_base.spelling import value_text
 
     things, facts, values = world.nodes(), world.facts(), world.values()
     if thing is not None:

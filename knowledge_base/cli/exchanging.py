@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from knowledge_base.cli.sources import Domain, Source, Store, opened, writable
+from knowledge_base.cli.sources import Domain, Source, Store, is_store, opened, writable
 
 
 class Form(StrEnum):
@@ -69,6 +69,8 @@ def _write(text: str, to: Path | None) -> None:
     if to is None:
         typer.echo(text)
         return
+    if is_store(to):
+        raise InputError(f"'{to}' is a store, with its history; nothing else is written in its place")
     try:
         to.write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8")
     except OSError as error:

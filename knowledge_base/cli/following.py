@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from knowledge_base.cli.printing import change_form, clock_time, delta_lines, print_json, print_line, print_table
-from knowledge_base.cli.sources import Json, Store, opened
+from knowledge_base.cli.sources import Json, Store, opened_store
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,7 +31,7 @@ def history(
     json: Json = False,
 ) -> None:
     """List what changed, when, and who did it."""
-    with opened(store) as (kb, _):
+    with opened_store(store) as kb:
         touches = _touches(kb, pattern)
         first = kb.oldest if since is None else since
         changes = [change for change in kb.changes(first, until) if touches(change)]
@@ -50,7 +50,7 @@ def watch(
     json: Json = False,
 ) -> None:
     """Print changes as others commit them, until Ctrl-C."""
-    with opened(store) as (kb, _):
+    with opened_store(store) as kb:
         touches, left = _touches(kb, pattern), count
         end = None if seconds is None else time.monotonic() + seconds
 
@@ -74,9 +74,11 @@ def _touches(kb: KnowledgeBase, pattern: str | None) -> Callable[[Change], bool]
 
 
 def _print(change: Change, *, as_json: bool) -> None:
+    from knowledge_base.errors import printable
+
     if as_json:
         print_line(change_form(change))
         return
     typer.echo(f"version {change.version}, {clock_time(change.time)}, {change.author}")
     for line in delta_lines(change.delta):
-        typer.echo(f"  {line}")
+        typer.echo(f"  {printable(line)}")

@@ -7,6 +7,9 @@ from typing import TypedDict
 
 from knowledge_base.errors import InputError
 
+_MOST_DIGITS = 15
+"""Of a version: more than any store has, and no more than are read in no time."""
+
 
 class Moment(TypedDict, total=False):
     """What `KnowledgeBase.at` takes: one of the two."""
@@ -21,7 +24,7 @@ def moment(text: str) -> Moment:
     Raises:
         InputError: it is neither.
     """
-    if text.isdecimal():
+    if text.isdecimal() and len(text) <= _MOST_DIGITS:
         return {"version": int(text)}
     try:
         return {"time": datetime.fromisoformat(text).timestamp()}

@@ -35,11 +35,13 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from knowledge_base.errors import printable
+
     table = Table()
     for title in head:
         table.add_column(Text(title))
     for row in rows:
-        table.add_row(*(Text(str(cell)) for cell in row))
+        table.add_row(*(Text("\n".join(map(printable, str(cell).split("\n")))) for cell in row))
     Console().print(table)
 
 
@@ -61,10 +63,10 @@ def delta_form(delta: Delta) -> dict[str, Any]:
 
 def delta_lines(delta: Delta) -> Iterator[str]:
     """What became different, each with a sign in front: `+ (on cup1 table)`."""
-    from knowledge_base.language.printer import value_text
+    from knowledge_base.spelling import value_text
 
-    yield from (f"- {name} and all about it" for name in delta.removed_nodes)
-    yield from (f"+ ({type_name} {name})" for name, type_name in delta.nodes.items())
+    yield from (f"- {value_text(name)} and all about it" for name in delta.removed_nodes)
+    yield from (f"+ ({type_name} {value_text(name)})" for name, type_name in delta.nodes.items())
     yield from (f"- {fact}" for fact in delta.removed)
     yield from (f"+ {fact}" for fact in delta.added)
     for fluent, content in delta.values.items():

@@ -49,6 +49,19 @@ def opened(source: Path, domain: Path | None = None) -> Iterator[Opened]:
 
 
 @contextmanager
+def opened_store(store: Path) -> Iterator[KnowledgeBase]:
+    """A store, and nothing else, to be looked into: only a store has a past.
+
+    Raises:
+        StoreError: it is not there, or is no store.
+    """
+    from knowledge_base.store import KnowledgeBase
+
+    with KnowledgeBase.open(None, store, read_only=True) as kb:
+        yield kb
+
+
+@contextmanager
 def writable(store: Path) -> Iterator[KnowledgeBase]:
     """A store that is there, to be changed.
 

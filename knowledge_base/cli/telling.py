@@ -83,17 +83,23 @@ def _change(
     *,
     as_json: bool,
 ) -> None:
-    from knowledge_base.errors import ConflictError, InputError
+    from knowledge_base.errors import ConflictError, InputError, printable
 
     with writable(store) as kb:
+        before = kb.version
         try:
             change = kb.apply(meaning(statements, kb, "FACT"), author, expect=expect, key=key)
         except ConflictError as error:
             raise InputError(str(error)) from None
+        again = key is not None and kb.version == before and bool(change.delta)
     if as_json:
-        print_json(change_form(change))
+        print_json({**change_form(change), "again": again})
         return
-    lines = list(delta_lines(change.delta))
-    for line in lines or ["nothing new"]:
+    if again:
+        typer.echo(f"the key '{key}' was used already, for version {change.version}: nothing new")
+        return
+    for line in map(printable, delta_lines(change.delta)):
         typer.echo(line)
+    if not change.delta:
+        typer.echo("nothing new")
     typer.echo(f"version {change.version}")

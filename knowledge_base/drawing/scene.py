@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Content, Fact
-from knowledge_base.language.printer import value_text
+from knowledge_base.spelling import value_text
 from knowledge_base.view import View
 
 MOST_LINES = 12

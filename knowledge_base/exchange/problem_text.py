@@ -24,12 +24,12 @@ from knowledge_base.language.expression import (
     Expression,
     Not,
     Term,
-    is_number,
 )
 from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.language.sexpr import Group, Node, Word
 from knowledge_base.language.typed_list import TypedName, parse_names
 from knowledge_base.schema import ROOT_TYPE, Schema, Signature
+from knowledge_base.spelling import is_number
 
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
 TOTAL_TIME = Call("total-time")

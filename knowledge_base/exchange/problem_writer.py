@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Content, Fact
-from knowledge_base.language.expression import TRUE, Expression, is_plain_name
+from knowledge_base.language.expression import TRUE, Expression
 from knowledge_base.language.parser import LONGEST_NUMBER
-from knowledge_base.language.printer import to_text, value_text
+from knowledge_base.language.printer import to_text
 from knowledge_base.schema import Signature
+from knowledge_base.spelling import is_plain_name, value_text
 from knowledge_base.state import WorldState
 
 

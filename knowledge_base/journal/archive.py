@@ -20,6 +20,7 @@ from knowledge_base.state import WorldState
 
 _JOURNAL = "SELECT version, time, author, delta FROM changes WHERE version > ? AND version <= ? ORDER BY version"
 _LAST = "SELECT max(version) FROM (SELECT version FROM changes UNION ALL SELECT version FROM snapshots)"
+_BOTH_THERE = "SELECT EXISTS (SELECT 1 FROM schemas) AND EXISTS (SELECT 1 FROM snapshots)"
 _BY_KEY = (
     "SELECT version, keys.time, keys.author, coalesce(keys.delta, changes.delta) "
     "FROM keys LEFT JOIN changes USING (version) WHERE key = ?"
@@ -119,6 +120,9 @@ class Archive:
 
     def written_schema(self, connection: sqlite3.Connection) -> Schema:
         """The schema that the store has now."""
+        (parts,) = connection.execute(_BOTH_THERE).fetchone()
+        if not parts:
+            raise StoreError("the store is damaged: its schema or its first world is gone", place=self._place)
         (text,) = connection.execute("SELECT declarations FROM schemas ORDER BY rowid DESC LIMIT 1").fetchone()
         try:
             return schema_of(json.loads(text))

@@ -31,9 +31,10 @@ from knowledge_base.language.expression import (
     substitute,
     substitute_term,
 )
-from knowledge_base.language.printer import to_text, value_text
+from knowledge_base.language.printer import to_text
 from knowledge_base.language.terms import Bindings
 from knowledge_base.language.world import World
+from knowledge_base.spelling import value_text
 
 _Judged = tuple["Explanation", InputError | None]
 """A part, and why it cannot be computed."""

@@ -7,35 +7,13 @@ places take no part in comparison.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place
 from knowledge_base.facts import Value
-
-# What can be written without quotes and is read back as the same text (names are folded to lower case).
-_PLAIN_NAME = re.compile(r"[^\s()\";?:]+[^\s()\";?]*")
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?")
-TRUTH_VALUES: Mapping[str, bool] = {"true": True, "false": False}
-"""The two words that are read as truth values, not as names."""
-
-
-def is_number(text: str) -> bool:
-    """Whether `text` is written as a number: `3`, `-0.5`, `1e-3`."""
-    return _NUMBER.fullmatch(text) is not None
-
-
-def is_plain_name(text: str) -> bool:
-    """Whether `text` is a name that needs no quotes: lower case, no blanks, no number, no truth value."""
-    return (
-        _PLAIN_NAME.fullmatch(text) is not None
-        and text == text.lower()
-        and not is_number(text)
-        and text not in TRUTH_VALUES
-        and text != "-"
-    )
+from knowledge_base.spelling import is_plain_name
 
 
 @dataclass(frozen=True, slots=True)

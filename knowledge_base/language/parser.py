@@ -26,7 +26,6 @@ from knowledge_base.language.expression import (
     COMPARISONS,
     COMPUTING,
     KEYWORDS,
-    TRUTH_VALUES,
     And,
     Arithmetic,
     Atom,
@@ -41,10 +40,10 @@ from knowledge_base.language.expression import (
     Or,
     Term,
     Variable,
-    is_number,
 )
 from knowledge_base.language.sexpr import Group, Node, Word, read
 from knowledge_base.language.typed_list import parse_typed_list, parse_variables
+from knowledge_base.spelling import TRUTH_VALUES, is_number
 
 __all__ = ["parse_condition", "parse_effect", "parse_term", "parse_typed_list", "parse_variables"]
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from knowledge_base.content import GEOMETRY
-from knowledge_base.facts import Content
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
 from knowledge_base.language.expression import (
     And,
@@ -24,6 +22,7 @@ from knowledge_base.language.expression import (
     TypedVariable,
     Variable,
 )
+from knowledge_base.spelling import value_text
 
 _Form = Call | Arithmetic | Atom | And | Or | Not | Imply | Comparison | AllOf | Delete | When | Assign
 
@@ -43,20 +42,6 @@ def to_text(node: Expression | Term | Effect) -> str:
         case _:
             head, parts = _form(node)
             return "(" + " ".join([head, *map(to_text, parts)]) + ")"
-
-
-def value_text(value: Content, *, quoted: bool = False) -> str:
-    """A value as the language writes it: `cup1`, `0.5`, `true`, `"red cup"`, `(geometry 0.4 0.1)`."""
-    if isinstance(value, tuple):
-        return "(" + " ".join([GEOMETRY, *map(value_text, value)]) + ")"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if not isinstance(value, str):
-        return repr(value)
-    if not Constant(value, quoted).quoted:
-        return value
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
 
 
 def variables_text(variables: Iterable[TypedVariable]) -> str:

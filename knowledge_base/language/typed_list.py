@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from knowledge_base.errors import ParseError, Place
-from knowledge_base.language.expression import TRUTH_VALUES, TypedVariable, is_number
+from knowledge_base.language.expression import TypedVariable
 from knowledge_base.language.sexpr import Group, Node, Word
+from knowledge_base.spelling import TRUTH_VALUES, is_number
 
 
 class TypedName(NamedTuple):

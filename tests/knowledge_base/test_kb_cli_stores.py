@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 import threading
 from datetime import datetime
 from xml.etree import ElementTree as ET
@@ -81,6 +82,7 @@ def test_an_expected_version_and_a_key_guard_against_saying_it_twice(store) -> N
         run("tell", store, "(clean mug)", "--expect", "7")
     first = json.loads(run("tell", store, "(= (weight mug) 1)", "--key", "w1", "--json"))
     again = json.loads(run("tell", store, "(= (weight mug) 1)", "--key", "w1", "--json"))
+    assert (first.pop("again"), again.pop("again")) == (False, True)
     assert first == again
     assert first["values"] == {"(weight mug)": 1}
 
@@ -211,3 +213,51 @@ def test_content_is_told_and_shown_as_the_language_writes_it(tmp_path) -> None:
     assert told == '+ (cup c)\n= (label c) "Red one"\n= (pose c) (geometry 0.5 1)\nversion 1\n'
     assert json.loads(run("show", store, "--json"))["values"] == {"(label c)": "Red one", "(pose c)": [0.5, 1.0]}
     assert '"Red one"' in run("show", store)
+
+
+def test_nothing_is_written_in_the_place_of_a_store(store, tmp_path) -> None:
+    for command in (("export", store), ("draw", store)):
+        with pytest.raises(InputError, match="is a store, with its history"):
+            run(*command, "--to", store)
+    assert json.loads(run("show", store, "--json"))["version"] == 1
+
+
+@pytest.mark.parametrize("command", [("history",), ("at", "0"), ("watch", "--seconds", "0")])
+def test_only_a_store_has_a_past(tmp_path, command: tuple[str, ...]) -> None:
+    (tmp_path / "domain.pddl").write_text(DOMAIN, encoding="utf-8")
+    (tmp_path / "problem.pddl").write_text("(define (problem p) (:domain kitchen))", encoding="utf-8")
+    verb, *rest = command
+    with pytest.raises(StoreError):
+        run(verb, str(tmp_path / "problem.pddl"), *rest)
+
+
+def test_a_version_of_many_digits_is_no_moment(store) -> None:
+    with pytest.raises(InputError, match="a moment is a version such as 12"):
+        run("at", store, "9" * 5000)
+
+
+def test_a_key_that_was_used_says_so(store) -> None:
+    run("tell", store, "(cup red)", "--key", "k")
+    assert (
+        run("tell", store, "(cup blue)", "--key", "k") == "the key 'k' was used already, for version 2: nothing new\n"
+    )
+
+
+def test_how_a_query_will_be_looked_up(store) -> None:
+    assert "(on ?c table)" in run("query", store, "(on ?c table)", "--explain")
+    assert json.loads(run("query", store, "(on ?c table)", "--explain", "--json"))["steps"]
+
+
+def test_names_are_printed_so_that_they_are_read_back_and_do_nothing_to_a_terminal(store) -> None:
+    run("tell", store, '(cup "Red one")', '(on "Red one" table)', '(cup "\x1b[31m")')
+    (said,) = [fact for fact in json.loads(run("show", store, "--json"))["facts"] if "Red" in fact]
+    assert run("retract", store, said).startswith('- (on "Red one" table)')
+    assert "\x1b" not in run("show", store) + run("history", store)
+
+
+def test_a_store_without_its_first_world_is_damaged(store) -> None:
+    with sqlite3.connect(store) as connection:
+        connection.execute("DELETE FROM snapshots")
+    connection.close()
+    with pytest.raises(StoreError, match="the store is damaged"):
+        run("show", store)

@@ -26,7 +26,8 @@ from dsc.model.transitions import Source, TimedTransition, Transition
 from dsc.text.diagram.layout import TextStyle
 from dsc.text.diagram.measure import pack
 from knowledge_base.language.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
-from knowledge_base.language.printer import to_text, value_text
+from knowledge_base.language.printer import to_text
+from knowledge_base.spelling import value_text
 
 WIDTH = 190.0
 """Of one line at an edge."""

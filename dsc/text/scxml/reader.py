@@ -27,7 +27,8 @@ from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.vocabulary import STATES, check
 from dsc.text.yaml import Document
 from knowledge_base.errors import InputError, Place
-from knowledge_base.language.expression import Arithmetic, Constant, Term, is_plain_name
+from knowledge_base.language.expression import Arithmetic, Constant, Term
+from knowledge_base.spelling import is_plain_name
 
 
 def parse_scxml(text: str, source: str | None = None) -> ActionPlot:
