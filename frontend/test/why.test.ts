@@ -2,7 +2,7 @@ import { expect, it } from "vitest";
 import { deciding } from "../src/core/explanations";
 import { History } from "../src/core/history";
 import { stepsOf, type PlotForm } from "../src/core/plots";
-import type { Candidate, PlanBrokenRec } from "../src/core/records";
+import type { PlanBrokenRec } from "../src/core/records";
 import { breaker, changesBetween, conditionsInto, factIn, lanesOf } from "../src/core/why";
 import { run } from "./run";
 
@@ -28,12 +28,12 @@ it("has what changed while a step ran", () => {
   expect(changesBetween(history, 10, 2, 3)).toEqual([]);
 });
 
-it("marks the leaf that a candidate's reason names, not the whole", () => {
+it("marks the leaf that decides, not the whole", () => {
   const leaf = { text: "(= (tries a) 0)", truth: false };
-  const condition = { text: "(and (p) (= (tries a) 0))", truth: false, children: [{ text: "(p)", truth: true }, leaf] };
-  const candidate: Candidate = { plot: "x", fits: false, reason: "(= (tries a) 0) is false: 1 = 0", condition };
-  expect(deciding(candidate)).toBe(leaf);
-  expect(deciding({ ...candidate, reason: "no condition" })).toBeNull();
+  const inner = { text: "(not (= (tries a) 0))", truth: true, children: [leaf], decider: 0 };
+  const whole = { text: "(and (p) (not (= (tries a) 0)))", truth: true, children: [{ text: "(p)", truth: true }, inner], decider: 1 };
+  expect(deciding(whole)).toBe(leaf);
+  expect(deciding(leaf)).toBe(leaf);
 });
 
 const lanes: PlotForm = {

@@ -35,9 +35,9 @@ export interface Explanation {
   readonly text?: string;
   readonly truth?: boolean | null;
   readonly detail?: string | null;
-  readonly decider?: boolean;
+  /** The number of the child that decides, from 0. */
+  readonly decider?: number;
   readonly children?: readonly Explanation[];
-  readonly parts?: readonly Explanation[];
 }
 
 export interface Candidate {

@@ -1,6 +1,7 @@
 /** What is known: facts with a filter in the one language, what changed, what is said of a thing. */
 
 import { useEffect, useMemo, useState } from "react";
+import { deciding } from "../core/explanations";
 import { written, type Fact, type KnowledgeRec, type Value } from "../core/records";
 import { query, type Answer } from "../link/requests";
 import { session, useMoment, useSelection } from "../session";
@@ -103,7 +104,7 @@ function Answers({ seq, text }: { seq: number; text: string }) {
   return (
     <div aria-label="Answers" aria-live="polite">
       <p><b>{answer.variables.length ? `${answer.answers.length} answers` : answer.holds ? "true" : "false"}</b><span className="quiet">{` · version ${answer.version}`}</span></p>
-      {answer.why && <div role="tree" aria-label="Why"><Tree why={answer.why} decider={null} /></div>}
+      {answer.why && <div role="tree" aria-label="Why"><Tree why={answer.why} decider={deciding(answer.why)} /></div>}
       {answer.variables.length > 0 && (
         <table className="known">
           <thead><tr>{answer.variables.map((name) => <th key={name} scope="col">{`?${name}`}</th>)}</tr></thead>

@@ -53,7 +53,7 @@ function CandidateView({ one, chosen }: { one: Candidate; chosen: boolean }) {
         <span className={`badge ${one.fits ? "" : "bad"}`}>{verdict}</span>
         {one.score !== undefined && <span className="quiet">{`score ${one.score}`}</span>}
       </div>
-      {one.condition.text === undefined ? <p className="quiet">{one.reason}</p> : <Tree why={one.condition} decider={deciding(one)} />}
+      {one.condition.text === undefined ? <p className="quiet">{one.reason}</p> : <Tree why={one.condition} decider={deciding(one.condition)} />}
     </div>
   );
 }

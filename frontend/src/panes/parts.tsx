@@ -1,6 +1,5 @@
 /** Small parts that several panes show: records by name, condition trees, tables of values. */
 
-import { partsOf } from "../core/explanations";
 import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
   type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type StepRec } from "../core/records";
 import { session } from "../session";
@@ -64,10 +63,10 @@ export function Causes({ seq }: { seq: number }) {
 const TRUTH = new Map<unknown, [string, string]>([[true, ["✓", "true"]], [false, ["✕", "false"]]]);
 
 /** A condition as a tree: each part with its truth, the one that decided marked. */
-export function Tree({ why, decider }: { why: Explanation; decider: Explanation | null }) {
-  const parts = partsOf(why);
+export function Tree({ why, decider }: { why: Explanation; decider: Explanation }) {
+  const parts = why.children ?? [];
   const [sign, truth] = TRUTH.get(why.truth) ?? ["?", "unknown"];
-  const decides = why === decider || (why.decider === true && parts.length === 0);
+  const decides = why === decider;
   const whole = why.text ?? "";
   // The parts say the rest: a long conjunction is not written out twice.
   const text = parts.length && whole.length > 60 ? `${whole.slice(0, whole.indexOf(" ") > 0 ? whole.indexOf(" ") : 20)} …)` : whole;
