@@ -23,13 +23,15 @@ GAVE_UP = "gave_up"
 TIMED_OUT = "timed_out"
 """A skill did not end within its time and was cancelled."""
 SKILL_ERROR = "skill_error"
-"""A skill raised instead of ending with one of its outcomes."""
+"""A skill raised, or said what cannot be, instead of ending with one of its outcomes."""
 ERROR = "error"
 """An action or guard could not be evaluated."""
 DONE_STATE = "done.state."
 """What `done` is called in profile `scxml`, with the state's name after it (SCXML 3.13)."""
 EXECUTION_ERROR = "error.execution"
 """What `error` is called in profile `scxml` (SCXML 3.13)."""
+FAILURES = frozenset({SKILL_ERROR, TIMED_OUT})
+"""How any skill may end. What no state of its plot takes goes outwards, to the states that hold plots."""
 ERRORS = frozenset({ERROR, EXECUTION_ERROR})
 
 TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
@@ -37,6 +39,8 @@ TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
 RESERVED = TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR}
 """Events the executive fires itself. Nobody else declares any of them, except that plots and skills that plan may end
 with `no_plan` and `gave_up`."""
+EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
+"""Events that are nobody else's; the other two are passed on by who plans."""
 
 
 class Event(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from dsc.model.plot import ActionPlot
-from dsc.skills import SkillSignature
+from dsc.skills import SkillSignature, refuse_reserved
 from knowledge_base.errors import UnknownNameError
 
 
@@ -20,6 +20,8 @@ def primitive_plot(
 ) -> ActionPlot:
     """A plot that triggers the skill, is done after the outcome `done`, and emits every other outcome.
 
+    A skill that raises or takes too long leaves it where it is; as a step of a plan, it has failed.
+
     Args:
         skill: the skill's signature, e.g. `arm.skills()["grasp"]`.
         done: the outcome that completes the plot.
@@ -30,7 +32,9 @@ def primitive_plot(
 
     Raises:
         UnknownNameError: the skill has no outcome `done`.
+        SchemaError: an outcome of the skill has the name of an event that only the executive fires.
     """
+    refuse_reserved(f"{skill.component}.{skill.name}", skill.outcomes)
     if done not in skill.outcomes:
         raise UnknownNameError(f"skill '{skill.name}' has no outcome '{done}'", found=done, valid=skill.outcomes)
     others = {event: attributes for event, attributes in skill.outcomes.items() if event != done}

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -24,7 +24,8 @@ from typing import Any, ClassVar, Literal, Protocol, TypeVar, cast
 from dsc.components.activations import Activations
 from dsc.components.blocking import in_process, in_thread
 from dsc.components.life import Life, LifeCycle
-from knowledge_base.errors import InputError, UnknownNameError
+from dsc.events import EXECUTIVES
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta
 
 
@@ -127,7 +128,8 @@ class Declared:
     pattern: Pattern = "skill"
 
     def __call__(self, body: _Body) -> _Body:
-        """Note it."""
+        """Note it; raises `SchemaError` for an outcome that is an event of the executive's own."""
+        refuse_reserved(body.__qualname__.rpartition("<locals>.")[2], self.outcomes)
         setattr(body, DECLARED, self)
         return body
 
@@ -341,6 +343,15 @@ def signatures(kind: type[Component], name: str) -> Mapping[str, SkillSignature]
         if declared is not None:
             found[attribute] = signature_of(name, attribute, body, declared)
     return found
+
+
+def refuse_reserved(skill_name: str, outcomes: Iterable[str]) -> None:
+    """Raise `SchemaError` for an outcome that only the executive fires, e.g. `done`."""
+    for event in outcomes:
+        if event in EXECUTIVES:
+            raise SchemaError(
+                f"skill '{skill_name}' cannot have the outcome '{event}', which the executive itself fires", found=event
+            )
 
 
 def check_arguments(signature: SkillSignature, arguments: Mapping[str, Any]) -> None:

@@ -8,6 +8,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Self
 
+from pydantic import ValidationError
+
 from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
@@ -19,7 +21,7 @@ from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
 from dsc.validation import raise_findings, validate_library
 from knowledge_base.compatibility import require_extension
-from knowledge_base.errors import SchemaError
+from knowledge_base.errors import InputError, SchemaError
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
@@ -34,6 +36,7 @@ from planning.posing.problem import check_goal
 
 Prepare = Callable[[Sequencer], None]
 """Called before a run starts, e.g. to post events or to keep the sequencer at hand."""
+_BUDGET = Budget()
 
 
 class Executive:
@@ -115,19 +118,37 @@ class Executive:
         runner = run_simulated if simulated else run_real
         return runner(self.execute(plot, arguments or {}, prepare, open_ended=open_ended))
 
-    def achieve(self, goal: str, *, simulated: bool = True) -> RunEnd:
+    def achieve(
+        self,
+        goal: str,
+        *,
+        seconds: float = _BUDGET.seconds,
+        replans: int = _BUDGET.replans,
+        simulated: bool = True,
+        open_ended: bool = False,
+        prepare: Prepare | None = None,
+    ) -> RunEnd:
         """Plan for a goal, carry the plan out, and plan again when the world disagrees.
 
-        The end is `finished` when the attempt has come to its end; a goal that was not reached shows in what
-        it `emitted`: `no_plan` or `gave_up`, with the reason.
+        The end is `finished` when the attempt has come to its end, and says whether the goal was `reached`; if not,
+        it `emitted` why: `no_plan` or `gave_up`, with the reason.
+
+        Args:
+            goal: a condition.
+            seconds: real time for each search.
+            replans: how often to plan again after the first plan.
+            simulated: as for `run`.
+            open_ended: as for `run`.
+            prepare: as for `run`.
 
         Raises:
-            InputError: the goal is no condition, or names something that is not declared or not known.
+            InputError: the goal is no condition, or names something that is not declared or not known; or a bound is
+                no number that makes sense.
         """
         check_goal(parse_condition(goal), self.knowledge)
-        budget = Budget()
+        budget = _budget(seconds, replans)
         arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
-        return self.run(ACHIEVE, arguments, simulated=simulated)
+        return self.run(ACHIEVE, arguments, simulated=simulated, open_ended=open_ended, prepare=prepare)
 
     async def execute(
         self, plot: str, arguments: Mapping[str, Any], prepare: Prepare | None = None, *, open_ended: bool = False
@@ -178,6 +199,15 @@ def achieve_plot() -> ActionPlot:
     """The plot that stands in where no designed candidate fits; read once, since plots never change."""
     resource = files("planning") / "plots" / "achieve.yaml"
     return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
+
+
+def _budget(seconds: float, replans: int) -> Budget:
+    try:
+        return Budget(seconds=seconds, replans=replans)
+    except ValidationError as error:
+        first = error.errors()[0]
+        wrong = f"'{first['loc'][0]}' is {first['input']!r}: {first['msg']}"
+        raise InputError(wrong, found=str(first["input"])) from None
 
 
 def _refuse_namesakes(components: Iterable[Component]) -> None:

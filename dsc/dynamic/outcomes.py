@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from dsc.events import GAVE_UP, NO_CANDIDATE, NO_PLAN
+from dsc.events import GAVE_UP, NO_CANDIDATE, NO_PLAN, SKILL_ERROR, TIMED_OUT
 from dsc.model.plot import ActionPlot
 from dsc.model.states import AnyState, DynamicState, SubmachineState
 
 Outcomes = Mapping[str, Mapping[str, str] | None]
 """Event name -> its attributes with their types."""
+
+_FAILED: Outcomes = {
+    SKILL_ERROR: {"skill": "text", "reason": "text"},
+    TIMED_OUT: {"skill": "text", "reason": "text", "seconds": "number"},
+}
 
 
 class Plots(Protocol):
@@ -59,3 +64,13 @@ def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:
     if state.goal is None:
         return {**found, NO_CANDIDATE: {}}
     return {**found, NO_PLAN: {"reason": "text"}, GAVE_UP: {"reason": "text"}}
+
+
+def answerable(state: AnyState, plots: Plots) -> Outcomes:
+    """What a rule can answer at a state: its outcomes, and failures of skills that the plot inside does not take.
+
+    Raises:
+        UnknownNameError: the state names a plot that is not there.
+    """
+    outcomes = outcomes_of(state, plots)
+    return {**outcomes, **_FAILED} if isinstance(state, SubmachineState | DynamicState) else outcomes

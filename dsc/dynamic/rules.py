@@ -3,7 +3,7 @@
 For each submachine or dynamic state and each outcome that its own `on` does not settle, the rules of its plot
 follow in order. A rule that uses a recovery plot adds a state for it. How often a rule has answered for a
 state is counted in a variable of the plot, so that it is part of the machine's state like everything else.
-In a generated plot, what no rule takes leads to `replan`.
+In a generated plot, what no rule takes leads to `replan`. Failures of skills inside are answered like outcomes.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections import ChainMap
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 
-from dsc.dynamic.outcomes import Plots, outcomes_of
-from dsc.events import DONE, GAVE_UP, NO_CANDIDATE
+from dsc.dynamic.outcomes import Plots, answerable
+from dsc.events import DONE, FAILURES, GAVE_UP, NO_CANDIDATE
 from dsc.model.actions import Assign, Emit, Internal, Tell
 from dsc.model.plot import ActionPlot, Rule, Variable
 from dsc.model.states import (
@@ -88,7 +88,7 @@ class _Expansion:
     def _with_rules(self, name: str, state: SubmachineState | DynamicState) -> dict[str, AnyState]:
         on = dict(state.on)
         recoveries: dict[str, AnyState] = {}
-        for event in outcomes_of(state, self.plots):
+        for event in answerable(state, self.plots):
             own = list(on.get(event, ()))
             if own and own[-1].guard is None:
                 continue
@@ -96,13 +96,10 @@ class _Expansion:
                 if rule.on == event and (not rule.of or name in rule.of):
                     own += self._answer(rule, f"{name}_{event}_{number}", name, state, recoveries)
             if self.plot.generated:
-                own.append(self._replan(name, event))
+                own.append(self._ending(name, REPLAN, "no candidate fits" if event == NO_CANDIDATE else _reason(event)))
             if own:
                 on[event] = tuple(own)
         return {name: state.model_copy(update={"on": on}), **recoveries}
-
-    def _replan(self, name: str, event: str) -> Transition:
-        return self._ending(name, REPLAN, "no candidate fits" if event == NO_CANDIDATE else event)
 
     def _ending(self, name: str, outcome: str, reason: str) -> Transition:
         """To the final state beside a step that ends the generated plot with the outcome."""
@@ -145,13 +142,14 @@ class _Expansion:
 
     def _onward(self, rule: Rule, name: str, state: State) -> list[Transition]:
         then = rule.do.then
+        reason = rule.on if rule.do.use else _reason(rule.on)  # after a recovery, the event is another one
         if then == "continue":
             return self._wired(rule, name, state, DONE)
         if then == "replan" and self.plot.generated:
-            return [self._replan(name, rule.on)]
+            return [self._ending(name, REPLAN, reason)]
         if then == "give_up":
             if self.plot.generated:
-                return [self._ending(name, GAVE_UP, rule.on)]
+                return [self._ending(name, GAVE_UP, reason)]
             return [_because(rule.on, one) for one in self._wired(rule, name, state, GAVE_UP)]
         return [Transition(target=name if then in {"retry", "replan"} else then)]
 
@@ -162,6 +160,11 @@ class _Expansion:
                 place=self.plot.place(("rules", self.plot.rules.index(rule), "do", "then")),
             )
         return list(state.on[event])
+
+
+def _reason(event: str) -> str:
+    """Why a step did not go on: a failure says so itself."""
+    return "?event.reason" if event in FAILURES else event
 
 
 def _because(outcome: str, giving_up: Transition) -> Transition:

@@ -148,6 +148,16 @@ class Dispatcher:
         """The final answer of a skill has been taken; until then its component counts as busy."""
         self._running.pop(start.action_id, None)
 
+    def stop(self, start: Start) -> None:
+        """Cancel a skill; nobody waits for its answer any more."""
+        if start.action_id not in self._running:
+            return
+        _, task = self._running.pop(start.action_id)
+        self._ending.add(task)
+        task.add_done_callback(self._ending.discard)
+        task.cancel()
+        give_up_after(task, GRACE, partial(self._leave_alone, start, task))
+
     async def close(self) -> list[str]:
         """Cancel skills and timers, and wait until they have stopped and components are told what they were sent.
 
@@ -190,8 +200,7 @@ class Dispatcher:
         if start.action_id in self._running:
             self._not_stopped(start)
             self._answered_for.add(start.action_id)
-            late = Outcome(TIMED_OUT, {"skill": f"{start.component}.{start.skill}", "seconds": self._within(start)})
-            self._post(SkillMessage(start, late, final=True))
+            self._post(SkillMessage(start, late(start, self._within(start)), final=True))
 
     def _not_stopped(self, start: Start) -> None:
         skill = f"{start.component}.{start.skill}"
@@ -221,11 +230,11 @@ class Dispatcher:
         except asyncio.CancelledError:
             if _cancelled_from_outside():
                 raise
-            return _error(start, "CancelledError: it cancelled itself")
+            return broken(start, "CancelledError: it cancelled itself")
         except Exception as error:  # noqa: BLE001  # whatever a skill does wrong must not end the run
             if bound.expired() or isinstance(error, DeadlineError):
-                return Outcome(TIMED_OUT, {"skill": f"{start.component}.{start.skill}", "seconds": within})
-            return _error(start, f"{type(error).__name__}: {error}")
+                return late(start, within)
+            return broken(start, f"{type(error).__name__}: {error}")
 
     async def _configured(self, component: Component) -> None:
         """Wait until the component has taken what it was told; raises what it raised, once."""
@@ -240,13 +249,9 @@ class Dispatcher:
             raise failure
 
     def _cancel(self, activation: int) -> None:
-        for action_id, (start, task) in list(self._running.items()):
+        for start in self.started():
             if start.activation == activation:
-                del self._running[action_id]
-                self._ending.add(task)
-                task.add_done_callback(self._ending.discard)
-                task.cancel()
-                give_up_after(task, GRACE, partial(self._leave_alone, start, task))
+                self.stop(start)
         for key in [key for key in self._timers if key[0] == activation]:
             self._timers.pop(key).cancel()
 
@@ -319,12 +324,21 @@ def _encoded(value: Any) -> Any:
 def _declared(component: Component, start: Start, outcome: object) -> Outcome:
     """The outcome, encoded; an error if the skill's signature does not declare it."""
     if not isinstance(outcome, Outcome):
-        return _error(start, f"it ended with {outcome!r}, which is no outcome")
+        return broken(start, f"it ended with {outcome!r}, which is no outcome")
     outcomes: Mapping[str, Any] = component.skills()[start.skill].outcomes
     if outcome.event not in outcomes:
-        return _error(start, f"it ended with '{outcome.event}', which it does not declare")
+        return broken(start, f"it ended with '{outcome.event}', which it does not declare")
     return Outcome(outcome.event, _encoded(dict(outcome.attributes)), outcome.observed)
 
 
-def _error(start: Start, reason: str) -> Outcome:
-    return Outcome(SKILL_ERROR, {"skill": f"{start.component}.{start.skill}", "reason": reason})
+def broken(start: Start, reason: str) -> Outcome:
+    """How a skill ends that did what no skill may do; the reason becomes one line."""
+    skill = f"{start.component}.{start.skill}"
+    return Outcome(SKILL_ERROR, {"skill": skill, "reason": f"{skill}: {' '.join(reason.split())}"})
+
+
+def late(start: Start, seconds: float) -> Outcome:
+    """How a skill ends that did not end within its time."""
+    skill = f"{start.component}.{start.skill}"
+    reason = f"{skill}: no outcome within {seconds:g} s"
+    return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason})

@@ -13,9 +13,9 @@ from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Start, StartTimer, Step
 from dsc.errors import RunawayError
-from dsc.events import EVERY, RESERVED, Event
+from dsc.events import EVERY, FAILURES, GAVE_UP, NO_PLAN, RESERVED, Event
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.dispatcher import Dispatcher, SkillMessage, TimerMessage
+from dsc.sequencer.dispatcher import Dispatcher, SkillMessage, TimerMessage, broken
 from dsc.sequencer.tracing import StepTracer
 from dsc.skills import Component
 from dsc.trace import Trace
@@ -48,6 +48,11 @@ class RunEnd:
     finished: bool
     emitted: tuple[Event, ...] = ()
     problem: str | None = None
+
+    @property
+    def reached(self) -> bool:
+        """Whether it finished and no goal of its own was left open, by `no_plan` or `gave_up`."""
+        return self.finished and not any(event.name in {NO_PLAN, GAVE_UP} for event in self.emitted)
 
 
 Message = SkillMessage | TimerMessage | KnowledgeMessage | Event
@@ -227,6 +232,7 @@ class Sequencer:
 
     def _take(self, message: Message, progress: _Progress) -> None:
         try:
+            message = self._believable(message)
             event = self._received(message)
             before = self.machine.state
             step = self.machine.send(event, self._situation())
@@ -270,6 +276,18 @@ class Sequencer:
         self._apply(outcome.observed, start.component)
         return event
 
+    def _believable(self, message: Message) -> Message:
+        """A skill that observes what cannot be has failed, and nothing of it is believed."""
+        if not isinstance(message, SkillMessage) or not message.outcome.observed:
+            return message
+        try:
+            self.knowledge.overlay().apply(message.outcome.observed)
+        except InputError as error:
+            if not message.final:
+                self.dispatcher.stop(message.start)
+            return SkillMessage(message.start, broken(message.start, str(error)), final=True)
+        return message
+
     def _apply(self, delta: Delta, author: str) -> None:
         if delta:
             self.knowledge.apply(delta, author)
@@ -296,8 +314,8 @@ class Sequencer:
             return
         if self.machine.state.has_activation(event.to):
             skill = f"{message.start.component}.{message.start.skill}"
-            why = event.attributes.get("reason") if event.name in RESERVED else None
-            progress.problem = f"nobody handles '{event.name}' of {skill}" + (f": {why}" if why else "")
+            whose = f": {event.attributes['reason']}" if event.name in FAILURES else f" of {skill}"
+            progress.problem = f"nobody handles '{event.name}'{whose}"
 
 
 def _is_vain(step: Step) -> bool:

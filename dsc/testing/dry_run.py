@@ -10,9 +10,9 @@ from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Cancel, Output, Revoke, SendLater, Start, StartTimer, Step
-from dsc.events import TIMED_OUT, Event
+from dsc.events import Event
 from dsc.model.plot import ActionPlot
-from dsc.sequencer.dispatcher import DEFAULT_WITHIN
+from dsc.sequencer.dispatcher import DEFAULT_WITHIN, late
 from dsc.sequencer.sequencer import CHART
 from dsc.testing.worlds import change_of, world
 from knowledge_base.errors import InputError, UnknownNameError
@@ -166,8 +166,9 @@ class DryRun:
             case Start():
                 self.running.append(output)
                 within = output.within or DEFAULT_WITHIN
-                late = Event(TIMED_OUT, {"skill": _skill(output), "seconds": within}, to=output.activation)
-                self._due.append(_Due(self.now + within, late, output.activation, output.action_id))
+                outcome = late(output, within)
+                timeout = Event(outcome.event, outcome.attributes, to=output.activation)
+                self._due.append(_Due(self.now + within, timeout, output.activation, output.action_id))
             case StartTimer(activation, index, seconds, name):
                 timeout = Event(name, to=activation, exact=True, number=index)
                 self._due.append(_Due(self.now + seconds, timeout, activation))

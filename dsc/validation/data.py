@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.outcomes import Outcomes, outcomes_of, outputs_of
+from dsc.dynamic.outcomes import Outcomes, answerable, outputs_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
@@ -50,7 +50,7 @@ class _Data:
         self._assigned = {**plot.variables, **plot.outputs}
         declared: dict[str, Parameter | Variable] = {**plot.parameters, **self._assigned}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
-        self._sources = [outcomes for _, state, _ in nesting.states if (outcomes := outcomes_of(state, library))]
+        self._sources = [outcomes for _, state, _ in nesting.states if (outcomes := answerable(state, library))]
         self._sources += [other.emits for other in library if other.implements]
 
     def findings(self) -> Iterator[Finding]:
@@ -94,7 +94,7 @@ class _Data:
     def _handing_back(self) -> list[tuple[str, State, Outcomes]]:
         """The states that bring outputs when they are done, with their outcomes."""
         states = ((name, state) for name, state, _ in self._nesting.states if isinstance(state, State))
-        return [(n, s, outcomes_of(s, self._library)) for n, s in states if outputs_of(s, self._library)]
+        return [(n, s, answerable(s, self._library)) for n, s in states if outputs_of(s, self._library)]
 
     # -- parts of a plot ---------------------------------------------------------------------------------
 
@@ -284,7 +284,7 @@ class _Data:
         return found if known else None
 
     def _unknown_event(self, event: str, path: Path) -> Finding:
-        valid = {name for _, state, _ in self._nesting.states for name in outcomes_of(state, self._library)}
+        valid = {name for _, state, _ in self._nesting.states for name in answerable(state, self._library)}
         valid |= {name for plot in self._library if plot.implements for name in plot.emits}
         error = UnknownNameError(
             f"no state of this plot can end with '{event}'", place=self._plot.place(path), found=event, valid=valid

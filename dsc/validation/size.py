@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.outcomes import outcomes_of
+from dsc.dynamic.outcomes import answerable
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot
 from dsc.validation.nesting import Nesting
@@ -20,7 +20,7 @@ def check_size(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator
     """A finding if carrying out the plot's rules would take too long."""
     if not plot.rules:
         return
-    answered = Counter(event for _, state, _ in nesting.states for event in outcomes_of(state, library))
+    answered = Counter(event for _, state, _ in nesting.states for event in answerable(state, library))
     each = [min(answered[rule.on], len(rule.of) or answered[rule.on]) for rule in plot.rules]
     if sum(each) > MAX_ANSWERS:
         message = f"the rules would make {sum(each)} transitions; at most {MAX_ANSWERS} are made"

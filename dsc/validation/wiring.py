@@ -8,9 +8,9 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.outcomes import outcomes_of
+from dsc.dynamic.outcomes import answerable, outcomes_of
 from dsc.errors import Finding
-from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, NO_PLAN, RESERVED, TIMERS
+from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, TIMERS
 from dsc.model.actions import Trigger
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import (
@@ -24,9 +24,6 @@ from dsc.validation.completion import check_completion
 from dsc.validation.nesting import Nesting
 from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-
-_EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
-"""Events that are nobody else's; the other two are passed on by who plans."""
 
 
 def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> Iterator[Finding]:
@@ -60,7 +57,7 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Ne
 
 def _declared_events(plot: ActionPlot) -> Iterator[Finding]:
     for event in plot.emits:
-        if event in _EXECUTIVES:
+        if event in EXECUTIVES:
             yield _reserved(plot, event, ("emits", event))
     for event in plot.receives:
         if event in RESERVED:
@@ -71,14 +68,14 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
     error = SchemaError(
         f"the event '{event}' is fired by the executive itself", place=plot.place(path), found=event
     )
-    return Finding(error, "reserved event", "give yours another name; `as` renames a skill's")
+    return Finding(error, "reserved event", "give yours another name")
 
 
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
     leading = [(number, rule) for number, rule in enumerate(plot.rules) if rule.do.then not in RESPONSES]
     every = (scope.states for scope in plot.scopes()) if leading else ()
-    scopes = [(siblings, [(name, outcomes_of(s, library)) for name, s in siblings.items()]) for siblings in every]
+    scopes = [(siblings, [(name, answerable(s, library)) for name, s in siblings.items()]) for siblings in every]
     for number, rule in leading:
         for siblings, ends in scopes:
             for name, outcomes in ends:
@@ -143,9 +140,9 @@ def _skills(
                 yield Finding(unknown, "known outcome")
         events = [action.names.get(event, event) for event in signature.outcomes]
         for event in events:
-            if event in _EXECUTIVES:
+            if event in EXECUTIVES:
                 yield _reserved(plot, event, here)
-        yield from _outcomes(plot, name, [event for event in events if event not in _EXECUTIVES], handled, path)
+        yield from _outcomes(plot, name, [event for event in events if event not in EXECUTIVES], handled, path)
 
 
 @dataclass(frozen=True, slots=True)

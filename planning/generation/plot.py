@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dsc.dynamic.rules import REPLAN
-from dsc.events import GAVE_UP
+from dsc.events import FAILURES, GAVE_UP
 from dsc.model.plot import ActionPlot, Rule
 from dsc.validation.structure import RESPONSES
 from planning.generation.lane import FINISHED, Lane, Writer
@@ -80,7 +80,7 @@ def plot_from_plan(
             "variables": {"reason": {"type": "text", "initial": "unknown"}, **writer.variables},
             "emits": {REPLAN: {"reason": "text"}, GAVE_UP: {"reason": "text"}},
             "states": states,
-            "rules": [rule for rule in rules if any(rule.on in step.outcomes for step in steps)],
+            "rules": [rule for rule in rules if any(rule.on in step.outcomes | FAILURES for step in steps)],
             "generated": True,
         }
     )

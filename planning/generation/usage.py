@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
+from dsc.events import FAILURES
 from dsc.model.actions import Configure, Switch, Trigger, flat
 from dsc.model.plot import ActionPlot, Rule
 from dsc.model.states import DynamicState, State, SubmachineState
@@ -41,7 +42,7 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
     """
     found: dict[str, ActionPlot] = {}
     waiting, rules = list(plots), tuple(rules)
-    emitted = {event for plot in waiting for event in plot.emits}
+    emitted = FAILURES.union(*(plot.emits for plot in waiting))
     waiting += [library.plot(rule.do.use) for rule in rules if rule.do.use and rule.on in emitted]
     while waiting:
         plot = waiting.pop()

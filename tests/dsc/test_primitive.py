@@ -3,7 +3,8 @@
 import pytest
 
 from dsc import Component, Library, Outcome, primitive_plot, skill, validate_plot
-from knowledge_base import UnknownNameError
+from dsc.skills import SkillSignature
+from knowledge_base import SchemaError, UnknownNameError
 
 
 class Arm(Component):
@@ -37,3 +38,9 @@ def test_a_parameter_that_the_skill_can_do_without_may_be_left_out():
 def test_an_outcome_that_the_skill_does_not_have_is_an_error():
     with pytest.raises(UnknownNameError, match="did you mean 'grasped'"):
         primitive_plot(GRASP, done="grapsed")
+
+
+def test_an_outcome_that_is_the_executives_is_an_error():
+    signature = SkillSignature("arm", "grasp", {}, {}, {"grasped": {}, "timed_out": {}})
+    with pytest.raises(SchemaError, match=r"skill 'arm\.grasp' cannot have the outcome 'timed_out'"):
+        primitive_plot(signature, done="grasped")

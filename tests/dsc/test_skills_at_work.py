@@ -7,7 +7,8 @@ from dsc_runs import SLOW, Arm, Ran
 
 from dsc.sequencer.clock import run_simulated
 from dsc.skills import Component, Outcome, check_arguments, skill
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.facts import Delta, fact
 
 GRASP = """
     plot: p
@@ -159,10 +160,88 @@ def test_whatever_a_skill_does_wrong_is_a_skill_error(how, reason):
     assert reason in event.attributes["why"]
 
 
-def test_an_observation_the_schema_does_not_know_ends_the_run_with_a_problem():
-    ran = Ran(BREAKS.replace("HOW", "observes"))
-    assert not ran.end.finished
-    assert "nonsense" in ran.end.problem
+@pytest.mark.parametrize(
+    "observed",
+    [
+        Delta(added=(fact("p"), fact("nonsense", "x"))),
+        Delta(added=(fact("p"), fact("seen", "nobody"))),
+        Delta(added=(fact("p"), fact("q", "too", "many"))),
+    ],
+)
+@pytest.mark.parametrize("skill_name", ["says", "reports"])
+def test_a_skill_that_observes_what_cannot_be_has_failed_and_nothing_of_it_is_known(observed, skill_name):
+    class Dreamer(Component):
+        name = "arm"
+
+        @skill(outcomes={"ok": {}})
+        async def says(self, call):
+            return Outcome("ok", observed=observed)
+
+        @skill(outcomes={"ok": {}, "so_far": {}})
+        async def reports(self, call):
+            call.report(Outcome("so_far", observed=observed))
+            await call.clock.sleep(5)
+            return Outcome("ok")
+
+    text = BREAKS.replace("arm.breaks, with: {how: HOW}", f"arm.{skill_name}")
+    ran = Ran(text, arm=Dreamer())
+    (event,) = ran.end.emitted
+    assert event.attributes["why"].startswith(f"arm.{skill_name}: ")
+    assert not ran.kb.ask("(p)")
+    assert ran.at == 0
+
+
+def test_what_goes_wrong_in_a_plot_inside_comes_to_the_state_that_holds_it():
+    inner = "{plot: inner, states: {a: {entry: {trigger: arm.breaks}, on: {ok: e}}, e: {final: true}}}"
+    middle = "{plot: middle, states: {a: {use: inner, on: {done: e}}, e: {final: true}}}"
+    ran = Ran(
+        """
+        plot: p
+        emits: {because: {why: text}}
+        states:
+          a: {use: middle, on: {done: e, skill_error: {to: e, emit: because, with: {why: ?event.reason}}}}
+          e: {final: true}
+        """,
+        inner,
+        middle,
+    )
+    (event,) = ran.end.emitted
+    assert event.attributes["why"] == "arm.breaks: RuntimeError: the gripper is stuck"
+
+
+def test_a_rule_answers_what_goes_wrong_in_a_plot_inside():
+    inner = """
+        plot: inner
+        emits: {slipped: }
+        states:
+          a: {entry: {trigger: arm.grasp, with: {seconds: 100}, within: 1}, on: {grasped: e, slipped: {to: f}}}
+          e: {final: true}
+          f: {final: true, emit: slipped}
+    """
+    ran = Ran(
+        """
+        plot: p
+        states:
+          a: {use: inner, on: {done: e, slipped: e}}
+          b: {final: true}
+          e: {final: true}
+        rules:
+          - {on: timed_out, when: (= ?event.skill "arm.grasp"), do: {then: retry, limit: 2}}
+          - {on: timed_out, do: {then: b}}
+        """,
+        inner,
+    )
+    assert ran.end.finished
+    assert ran.at == pytest.approx(3)
+
+
+def test_a_skill_cannot_have_an_outcome_that_is_the_executives():
+    with pytest.raises(SchemaError, match=r"skill 'Hand\.open' cannot have the outcome 'done'"):
+
+        class Hand(Component):
+            @skill(outcomes={"done": {}})
+            async def open(self, call):
+                return Outcome("done")
 
 
 def test_a_skill_that_takes_too_long_is_cancelled_and_timed_out():
@@ -176,13 +255,13 @@ def test_a_skill_that_takes_too_long_is_cancelled_and_timed_out():
     assert ran.at == pytest.approx(3)
     assert ran.arm.log == ["grasp cup1", "cancelled"]
     (event,) = ran.of_type("event")
-    assert event["attributes"] == {"skill": "arm.grasp", "seconds": 3.0}
+    assert event["attributes"] == {"skill": "arm.grasp", "seconds": 3.0, "reason": "arm.grasp: no outcome within 3 s"}
 
 
 def test_a_skill_has_a_bound_even_if_nobody_says_so():
     ran = Ran(GRASP.replace("{item: cup1}}, on", "{seconds: 1000000}}, on"))
     assert not ran.end.finished
-    assert "nobody handles 'timed_out' of arm.grasp" in ran.end.problem
+    assert "nobody handles 'timed_out': arm.grasp: no outcome within 300 s" in ran.end.problem
 
 
 @pytest.mark.parametrize("entry", ["{trigger: arm.grap}", "{trigger: arm.grasp, with: {itm: cup1}}", "{trigger: arm.grasp}"])

@@ -108,7 +108,7 @@ def test_a_skill_may_break_or_never_answer():
           e: {final: true}
     """
     broken = rehearse([plot(text)], "p", skills={"arm.grasp": RuntimeError("the gripper is stuck")})
-    assert broken.emitted == (Event("why", {"reason": "RuntimeError: the gripper is stuck"}),)
+    assert broken.emitted == (Event("why", {"reason": "arm.grasp: RuntimeError: the gripper is stuck"}),)
     late = rehearse([plot(text)], "p", skills={"arm.grasp": Answer("grasped", after=math.inf)})
     assert late.emitted == (Event("late"),)
     assert late.seconds == pytest.approx(40)
@@ -242,7 +242,7 @@ def test_a_failed_assertion_about_a_call_fails_the_test_whatever_the_plot_makes_
     with pytest.raises(AssertionError, match="the wrong item"):
         rehearse([coping], "p", skills={"arm.grasp": reply})
     broken = rehearse([coping], "p", skills={"arm.grasp": InputError("broken on purpose")})
-    assert consumed(broken, "skill_error", reason="InputError: broken on purpose")
+    assert consumed(broken, "skill_error", reason="arm.grasp: InputError: broken on purpose")
 
 
 @pytest.mark.parametrize("replies", [[None], lambda _call: None, ["grasped", 3]])

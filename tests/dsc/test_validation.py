@@ -32,9 +32,9 @@ class Arm(Component):
     async def grasp(self, call, item, speed=1):
         return Outcome("grasped")
 
-    @skill(outcomes={"done": {}})
+    @skill(outcomes={"pushed": {}})
     async def push(self, call):
-        return Outcome("done")
+        return Outcome("pushed")
 
 
 SKILLS = list(Arm().skills().values())
@@ -202,12 +202,12 @@ WRONG = [
     ("reserved event", S + "  a:\n    on:\n      done: {to: e, emit: error}\n      error: e\n" + E, 5, "'error'", ""),
     (
         "reserved event",
-        S + "  a:\n    entry: {trigger: arm.push}\n    on: {timed_out: e}\n" + E,
+        S + "  a:\n    entry: {trigger: arm.push, as: {pushed: done}}\n    on: {timed_out: e}\n" + E,
         4, "'done' is fired by the executive itself", "another name",
     ),
     (
         "done at once",
-        S + "  a:\n    entry: {trigger: arm.push, as: {done: pushed}}\n    on: {pushed: e, done: e}\n" + E,
+        S + "  a:\n    entry: {trigger: arm.push}\n    on: {pushed: e, done: e}\n" + E,
         5, "state 'a' has no content, so it is done at once and would cancel its skill", "the outcome of the skill",
     ),
     # -- data

@@ -428,3 +428,121 @@ def test_a_goal_with_a_mistake_is_refused_before_anything_runs(goal, said):
     robot, _ = executive(Answers(), lamps=("a",))
     with pytest.raises(InputError, match=said):
         robot.achieve(goal)
+
+
+# -- skills that misbehave ---------------------------------------------------------------------------------
+
+
+def light(answer):
+    lamps = Lamps()
+    lamps.answer = answer
+    plot = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
+    robot = Executive(DOMAIN, [plot], [lamps])
+    robot.knowledge.apply(Delta(nodes={"l1": "lamp"}, added=(fact("works", "l1"),)), "test")
+    return robot, lamps
+
+
+class Once:
+    """Answers wrongly the first time, and well after that."""
+
+    def __init__(self, wrong):
+        self.wrong = wrong
+
+    def __call__(self, lamp):
+        if self.wrong is None:
+            return Outcome("lit", observed=Delta(added=(fact("on", lamp),)))
+        wrong, self.wrong = self.wrong, None
+        return wrong(lamp)
+
+
+def stuck(_):
+    raise RuntimeError("the switch\nis stuck")
+
+
+MISBEHAVIOUR = [
+    (stuck, "lamps.light: RuntimeError: the switch is stuck"),
+    (lambda _: Outcome("dark"), "lamps.light: it ended with 'dark', which it does not declare"),
+    (lambda _: "lit", "lamps.light: it ended with 'lit', which is no outcome"),
+    (lambda lamp: Outcome("lit", observed=Delta(added=(fact("onn", lamp),))), "lamps.light: there is no predicate 'onn'"),
+    (lambda _: Outcome("lit", observed=Delta(added=(fact("on", "l9"),))), "lamps.light: there is no object 'l9'"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "reason"), MISBEHAVIOUR)
+def test_a_skill_that_misbehaves_is_a_failed_step(wrong, reason):
+    robot, lamps = light(wrong)
+    with robot:
+        end = robot.achieve("(on l1)")
+    (gave_up,) = end.emitted
+    assert reason in gave_up.attributes["reason"]
+    assert end.finished
+    assert not end.reached
+    assert len(lamps.switched) > 1
+
+
+@pytest.mark.parametrize(("wrong", "reason"), MISBEHAVIOUR)
+def test_a_skill_that_misbehaves_once_does_not_keep_the_goal_from_being_reached(wrong, reason):
+    robot, _ = light(Once(wrong))
+    records = []
+    robot.listen(records.append)
+    with robot:
+        assert robot.achieve("(on l1)").reached
+    (resumed,) = (record for record in records if record.type == "plan.resumed")
+    assert reason in resumed.data["why"]
+
+
+def test_a_skill_that_hangs_is_a_failed_step():
+    class Deaf(Lamps):
+        @skill(outcomes={"lit": {}}, types={"lamp": "lamp"})
+        async def light(self, call, lamp):
+            await asyncio.Event().wait()
+
+    deaf = Deaf()
+    with Executive(DOMAIN, [primitive_plot(deaf.skills()["light"], done="lit", implements="switch-on")], [deaf]) as robot:
+        robot.knowledge.apply(Delta(nodes={"l1": "lamp"}, added=(fact("works", "l1"),)), "test")
+        (gave_up,) = robot.achieve("(on l1)").emitted
+    assert "lamps.light: no outcome within 300 s" in gave_up.attributes["reason"]
+
+
+def test_a_rule_answers_a_step_whose_skill_fails():
+    lamps = Lamps()
+    lamps.answer = stuck
+    holder = parse_plot("""
+        plot: light_up
+        emits: {ended: {how: text}}
+        states:
+          lighting:
+            goal: (on l1)
+            on: {done: lit, no_plan: lit, gave_up: {to: lit, emit: ended, with: {how: ?event.reason}}}
+          lit: {final: true}
+        rules: [{on: skill_error, do: {then: give_up}}]
+    """)
+    plot = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
+    with Executive(DOMAIN, [plot, holder], [lamps]) as robot:
+        robot.knowledge.apply(Delta(nodes={"l1": "lamp"}, added=(fact("works", "l1"),)), "test")
+        (ended,) = robot.run("light_up").emitted
+    assert ended.attributes["how"] == "lamps.light: RuntimeError: the switch is stuck"
+    assert lamps.switched == ["l1"]
+
+
+def test_a_goal_is_given_bounds_and_may_be_prepared():
+    robot, lamps = light(lambda _: Outcome("nothing"))
+    records = []
+    robot.listen(records.append)
+
+    def prepare(sequencer):
+        sequencer.change(Delta(added=(fact("broken", "l1"),)), "somebody", after=0.5)
+
+    with robot:
+        end = robot.achieve("(on l1)", seconds=5, replans=0, prepare=prepare)
+    assert "the budget of 0 new plans is used up" in end.emitted[0].attributes["reason"]
+    assert robot.knowledge.ask("(broken l1)")
+    assert lamps.switched
+
+
+@pytest.mark.parametrize("bounds", [{"seconds": 0}, {"seconds": "5"}, {"replans": -1}, {"replans": 1.5}])
+def test_bounds_that_make_no_sense_are_refused(bounds):
+    robot, _ = light(None)
+    (name,) = bounds
+    with robot, pytest.raises(InputError, match=f"'{name}' is "):
+        robot.achieve("(on l1)", **bounds)
