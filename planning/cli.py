@@ -64,8 +64,8 @@ def plan_command(
     try:
         problem, outcome = _solved(domain, read, world, seconds, engine)
     except OutOfPatienceError as error:
-        late: dict[str, Any] = {"outcome": "timed_out", "steps": [], "engine": None, "seconds": seconds, "while": error.doing}
-        _end(TIMED_OUT, late, notes, as_json=as_json)
+        late: dict[str, Any] = {"outcome": "timed_out", "steps": [], "engine": None, "seconds": seconds}
+        _end(TIMED_OUT, late | {"while": error.doing}, notes, as_json=as_json)
     notes += problem.notes
     status, answer = _answer(outcome)
     if isinstance(outcome, NobodyCan):

@@ -227,9 +227,7 @@ class Search:
         excluded, patience = self._excluded_now(), Patience(seconds)
         try:
             with self._clock.hold():
-                how = await aside(
-                    lambda: mending(before, excluded, self._domain, snapshot, goal, patience), patience
-                )
+                how = await aside(lambda: mending(before, excluded, self._domain, snapshot, goal, patience), patience)
         except OutOfPatienceError:
             return TimedOut("mending", seconds)
         if how is None:
