@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import sys
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
@@ -41,7 +42,7 @@ def plan_command(
     engine: Annotated[
         str | None, typer.Option(metavar="NAME", help="Which engine plans.  [default: those that suit it race]")
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.0, help="Stop the planner after this long.")] = 10.0,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Stop posing and planning after this long.")] = 10.0,
     parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can go side by side.")] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete.")] = None,
     explain: Annotated[
@@ -53,22 +54,24 @@ def plan_command(
 
     Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
     """
-    from planning.engines.registry import timing
     from planning.ordering.order import deordered, scheduled
+    from planning.patience import OutOfPatienceError
     from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
     from planning.posing.constructs import why_no_engine
-    from planning.posing.problem import pose
-    from planning.posing.unsolvable import why_unsolvable
 
     domain, read, world = _read(files)
-    problem = pose(domain, world, read.goal, read.metric, durations=bool(timing()) or engine is not None)
-    outcome = _solve(problem, seconds, engine)
+    notes = [*domain.notes, *read.notes]
+    try:
+        problem, outcome = _solved(domain, read, world, seconds, engine)
+    except OutOfPatienceError as error:
+        late: dict[str, Any] = {"outcome": "timed_out", "steps": [], "engine": None, "seconds": seconds}
+        _end(TIMED_OUT, late | {"while": error.doing}, notes, as_json=as_json)
+    notes += problem.notes
     status, answer = _answer(outcome)
     if isinstance(outcome, NobodyCan):
         answer["reason"] = why_no_engine(domain, read.goal, outcome)
-    notes = [*domain.notes, *read.notes, *problem.notes]
     if isinstance(outcome, ProvenUnsolvable) and explain:
-        answer["why"] = list(why_unsolvable(domain, world, read.goal))
+        answer["why"] = _why(domain, read, world, seconds)
     if isinstance(outcome, PlanFound):
         plan = outcome.plan
         order = scheduled(plan) if plan.schedule else deordered(plan, domain, world, read.goal)
@@ -76,10 +79,7 @@ def plan_command(
         answer |= _purposes(order) if explain else {}
         if plot is not None:
             _write_plot(plot, outcome.plan, domain, order if parallel else None)
-    for note in () if as_json else notes:
-        typer.echo(f"note: {note}", err=True)
-    typer.echo(json.dumps(answer | {"notes": notes}) if as_json else _text(answer), err=status != FOUND and not as_json)
-    raise typer.Exit(status)
+    _end(status, answer, notes, as_json=as_json)
 
 
 def doctor_command(
@@ -104,6 +104,13 @@ def doctor_command(
     console.print(f"\n{said}; {found['system']}", markup=False, highlight=False)
 
 
+def _end(status: int, answer: dict[str, Any], notes: list[str], *, as_json: bool) -> NoReturn:
+    for note in () if as_json else notes:
+        typer.echo(f"note: {note}", err=True)
+    typer.echo(json.dumps(answer | {"notes": notes}) if as_json else _text(answer), err=status != FOUND and not as_json)
+    raise typer.Exit(status)
+
+
 def _read(files: list[Path]) -> tuple[PlanningDomain, ProblemText, KnowledgeBase]:
     from knowledge_base.errors import InputError, Place
     from knowledge_base.exchange.pddl import read_problem
@@ -122,22 +129,53 @@ def _read(files: list[Path]) -> tuple[PlanningDomain, ProblemText, KnowledgeBase
     return domain, read, world
 
 
-def _solve(problem: Problem, seconds: float, engine: str | None) -> PlanningOutcome:
+def _solved(
+    domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float, engine: str | None
+) -> tuple[Problem, PlanningOutcome]:
+    """The problem and what comes of it; the time is for both together.
+
+    Raises:
+        OutOfPatienceError: it was not even posed in time.
+    """
     import asyncio
 
-    from planning.engines.registry import chosen
+    from planning.engines.registry import chosen, timing
+    from planning.patience import Patience, aside
+    from planning.plan import TimedOut
+    from planning.posing.problem import pose
 
-    planner = _planner(problem, engine)
-    names = [engine] if engine else [one.name for one in chosen(problem)]
+    patience = Patience(seconds)
+    durations = bool(timing()) or engine is not None
 
-    async def solve() -> PlanningOutcome:
-        try:
-            return await planner.solve(problem, seconds)
-        finally:
-            await planner.close()
+    def posed() -> Problem:
+        return pose(domain, world, read.goal, read.metric, durations=durations, patience=patience)
 
-    with _progress(f"planning with {' and '.join(names)}, {len(problem.actions)} ground actions"):
-        return asyncio.run(solve())
+    async def solve() -> tuple[Problem, PlanningOutcome]:
+        with _progress("grounding the problem"):
+            problem = await aside(posed, patience)
+        planner = _planner(problem, engine)
+        names = [engine] if engine else [one.name for one in chosen(problem)]
+        with _progress(f"planning with {' and '.join(names)}, {len(problem.actions)} ground actions"):
+            try:
+                outcome = await planner.solve(problem, patience.left)
+            finally:
+                await planner.close()
+        return problem, replace(outcome, seconds=seconds) if isinstance(outcome, TimedOut) else outcome
+
+    return asyncio.run(solve())
+
+
+def _why(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float) -> list[str]:
+    import asyncio
+
+    from planning.patience import OutOfPatienceError, Patience, aside
+    from planning.posing.unsolvable import why_unsolvable
+
+    patience = Patience(seconds)
+    try:
+        return list(asyncio.run(aside(lambda: why_unsolvable(domain, world, read.goal, patience), patience)))
+    except OutOfPatienceError:
+        return [f"what is missing was not found out within {seconds:g} s"]
 
 
 def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRace:
@@ -240,7 +278,8 @@ def _text(answer: Mapping[str, Any]) -> str:
         case "unsolvable":
             return "\n".join([f"there is no plan ({answer['reason']})", *answer.get("why", ())])
         case "timed_out":
-            return f"no plan within {answer['seconds']:g} s ({answer['engine']})"
+            by = f"while {answer['while']}" if "while" in answer else answer["engine"]
+            return f"no plan within {answer['seconds']:g} s ({by})"
         case _:
             return f"the planner {answer['engine']} failed: {answer['reason']}"
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import can_time, cannot, in_concert, nobody
+from planning.patience import aside
 from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 
 if TYPE_CHECKING:
@@ -200,19 +201,7 @@ class PlannerProcess:
         return process
 
     async def _started(self, process: EngineProcess) -> None:
-        loop = asyncio.get_running_loop()
-        started: asyncio.Future[None] = loop.create_future()
-
-        def start() -> None:
-            failure: Exception | None = None
-            try:
-                process.start(self._start_up_seconds)
-            except Exception as error:  # noqa: BLE001  carried over to the one who waits
-                failure = error
-            _call(loop, lambda: _settle(started, failure))
-
-        threading.Thread(target=start, daemon=True).start()
-        await started
+        await aside(lambda: process.start(self._start_up_seconds))
 
     def _judged(self, answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:
         """What the engine's answer is worth: a plan counts only if it solves the problem."""
@@ -283,12 +272,3 @@ def _call(loop: asyncio.AbstractEventLoop, what: Callable[[], object]) -> None:
     """In the loop; if it is closed, nobody waits any more."""
     with contextlib.suppress(RuntimeError):
         loop.call_soon_threadsafe(what)
-
-
-def _settle(waiting: asyncio.Future[None], failure: Exception | None) -> None:
-    if waiting.done():
-        return
-    if failure is None:
-        waiting.set_result(None)
-    else:
-        waiting.set_exception(failure)

@@ -11,6 +11,7 @@ from knowledge_base.language.evaluation import World, holds
 from knowledge_base.language.expression import And, Expression
 from planning.domain import PlanningDomain
 from planning.execution.needs import Needs
+from planning.patience import Patience
 from planning.plan import Plan, PlanStep
 from planning.posing.derived import derivation
 from planning.posing.problem import pose
@@ -47,6 +48,7 @@ def mending(
     domain: PlanningDomain,
     world: World,
     goal: Expression,
+    patience: Patience | None = None,
 ) -> Mending | None:
     """How to mend what is left of a plan, if that promises to take little.
 
@@ -58,6 +60,10 @@ def mending(
         domain: has the steps' conditions and effects.
         world: the present.
         goal: what the plan is for.
+        patience: for how long.
+
+    Raises:
+        OutOfPatienceError: it takes too long.
     """
     derived = derivation(domain)
     closed, wanted = derived.world(world), derived.expand(goal)
@@ -74,7 +80,7 @@ def mending(
         return None
     _, end, needed = min(near, key=lambda one: one[0])
     try:
-        problem = pose(domain, world, And(tuple(needed)))
+        problem = pose(domain, world, And(tuple(needed)), patience=patience)
     except InputError:  # what the end needs cannot be asked for
         return None
     return None if problem.unreachable else Mending(end, problem)

@@ -6,6 +6,7 @@ However a planner behaves, the answer comes within a bound of real time, and onl
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from planning.engines.improving import Improving
 from planning.engines.registry import timing
 from planning.execution.mending import mending
 from planning.execution.repair import EXCLUDED_SECONDS, without
+from planning.patience import OutOfPatienceError, Patience, aside
 from planning.plan import (
     EngineFailed,
     NobodyCan,
@@ -178,21 +180,35 @@ class Search:
         mended = await self._mended(goal, seconds, before, snapshot) if before else None
         if isinstance(mended, Found):
             return mended
-        with self._clock.hold():  # grounding takes its time as well: in a thread, so that a stop is obeyed
-            durations = not self._clock.simulated and bool(timing())
-            problem = await asyncio.to_thread(pose, self._domain, snapshot, goal, durations=durations)
-        answer, better = await self._answer(problem, seconds, rejected)
+        patience = Patience(seconds)
+        try:
+            problem = await self._posed(goal, snapshot, patience)
+        except OutOfPatienceError as error:
+            return NotFound("timed_out", f"no plan within {seconds:g} s (while {error.doing})")
+        answer, better = await self._answer(problem, patience.left, rejected)
         if isinstance(answer, PlanFound):
             reproducible = answer.reproducible and mended is None
             return Found(replace(answer, reproducible=reproducible), better=better)
         if not isinstance(answer, ProvenUnsolvable):
-            return _unknown(answer, self._domain, goal)
+            return _unknown(answer, self._domain, goal, seconds)
         if rejected:
             reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
-        with self._clock.hold():
-            missing = await asyncio.to_thread(why_unsolvable, self._domain, snapshot, goal)
+        missing = await self._why_not(goal, snapshot, Patience(seconds))
         return NotFound("unsolvable", "; ".join(missing) or answer.reason)
+
+    async def _posed(self, goal: Expression, snapshot: WorldState, patience: Patience) -> Problem:
+        durations = not self._clock.simulated and bool(timing())
+        with self._clock.hold():  # grounding takes its time as well: in a thread, so that a stop is obeyed
+            return await aside(
+                lambda: pose(self._domain, snapshot, goal, durations=durations, patience=patience), patience
+            )
+
+    async def _why_not(self, goal: Expression, snapshot: WorldState, patience: Patience) -> tuple[str, ...]:
+        """What is missing for the goal; nothing if that takes too long to find out."""
+        with self._clock.hold(), contextlib.suppress(OutOfPatienceError):
+            return await aside(lambda: why_unsolvable(self._domain, snapshot, goal, patience), patience)
+        return ()
 
     async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> _Answer:
         """The planner's answer, without the excluded steps if there is a plan without them."""
@@ -208,9 +224,12 @@ class Search:
         self, goal: Expression, seconds: float, before: Sequence[PlanStep], snapshot: WorldState
     ) -> Found | TimedOut | None:
         """What was left of the plan before, mended; `TimedOut` if a limit of real time cut in."""
-        excluded = self._excluded_now()
-        with self._clock.hold():
-            how = await asyncio.to_thread(mending, before, excluded, self._domain, snapshot, goal)
+        excluded, patience = self._excluded_now(), Patience(seconds)
+        try:
+            with self._clock.hold():
+                how = await aside(lambda: mending(before, excluded, self._domain, snapshot, goal, patience), patience)
+        except OutOfPatienceError:
+            return TimedOut("mending", seconds)
         if how is None:
             return None
         seconds = min(seconds / 4, MENDING_SECONDS)
@@ -226,11 +245,12 @@ class Search:
         return set(self._excluded)
 
     async def _foreseen(self, found: Found) -> Validation:
-        if self._foresight is None:
+        foresight = self._foresight
+        if foresight is None:
             return Validation(valid=True)
         with self._clock.hold():
             world, plan = self._knowledge.snapshot(), found.answer.plan
-            verdict = await asyncio.to_thread(self._foresight.foresee, plan, world)
+            verdict = await aside(lambda: foresight.foresee(plan, world))
         if not verdict.valid:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
             self._telling.rejected(step, verdict.why, found.answer.engine)
@@ -275,13 +295,13 @@ class Search:
 
 
 def _unknown(
-    answer: NoneFound | TimedOut | EngineFailed | NobodyCan, domain: PlanningDomain, goal: Expression
+    answer: NoneFound | TimedOut | EngineFailed | NobodyCan, domain: PlanningDomain, goal: Expression, seconds: float
 ) -> NotFound:
     """No plan, and no proof that there is none."""
     match answer:
         case NoneFound(reason=reason):
             return NotFound("unsolvable", reason)
-        case TimedOut(engine=engine, seconds=seconds):
+        case TimedOut(engine=engine):
             return NotFound("timed_out", f"no plan within {seconds:g} s ({engine})")
         case EngineFailed(engine=engine, message=message):
             return NotFound("failed", f"{engine}: {message}")

@@ -8,7 +8,7 @@ its leaves literals and bounds on numbers that actions change.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError
@@ -35,6 +35,7 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.printer import to_text
 from planning.errors import UnsupportedActionError
+from planning.patience import Patience
 from planning.quantities import OPPOSITE, Assignment, Bound, Quantity, combined
 
 if TYPE_CHECKING:
@@ -160,11 +161,13 @@ class Grounder:
         changing: the predicates and functions that the considered actions change.
         keep_false: leave unchangeable facts that do not hold in the result, so that a goal which needs them
             can say which they are.
+        patience: for how long; every choice of objects takes some of it.
     """
 
     world: World
     changing: frozenset[str]
     keep_false: bool = False
+    patience: Patience = field(default_factory=Patience, compare=False)
 
     def precondition(self, e: Expression, bindings: Mapping[str, Value]) -> Residual:
         """As `residual`, but facts that must hold or not hold in any case are left in, also unchangeable ones.
@@ -233,9 +236,14 @@ class Grounder:
     def choices(
         self, variables: Iterable[TypedVariable], bindings: Mapping[str, Value]
     ) -> Iterator[dict[str, Value]]:
-        """The bindings extended by every choice of objects for `variables`."""
+        """The bindings extended by every choice of objects for `variables`.
+
+        Raises:
+            OutOfPatienceError: there are too many for the time that is left.
+        """
         chosen = list(variables)
         for values in itertools.product(*map(self.objects, chosen)):
+            self.patience.spend()
             yield {**bindings, **dict(zip((v.name for v in chosen), values, strict=True))}
 
     def objects(self, variable: TypedVariable) -> dict[str, None]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from knowledge_base.schema import Schema
     from planning.domain import PlanningAction
+    from planning.patience import Patience
 
 _MOST_CONDITIONS = 6  # of one ground action; each doubles the number of ways to take it
 _MOST_ALTERNATIVES = 64
@@ -58,6 +59,7 @@ def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Gr
             f" at most {_MOST_CONDITIONS} can be planned with",
             place=action.place,
         )
+    grounder.patience.spend()
     for taken in itertools.product((True, False), repeat=len(conditions)):
         chosen = [c if yes else negation(c) for c, yes in zip(conditions, taken, strict=True)]
         happening = {True, *(c for c, yes in zip(conditions, taken, strict=True) if yes)}
@@ -138,17 +140,19 @@ class Rule:
         action: the planning action.
         atoms: the positive conjuncts of its precondition.
         allowed: what each parameter may stand for.
+        patience: every fact tried takes some of it.
     """
 
     action: PlanningAction
     atoms: tuple[Atom, ...]
     allowed: Mapping[str, Mapping[str, None]]
+    patience: Patience
 
     @staticmethod
     def of(action: PlanningAction, grounder: Grounder) -> Rule:
         """The rule for an action."""
         atoms = joined_atoms(action, grounder.world.schema)
-        return Rule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters})
+        return Rule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters}, grounder.patience)
 
     def unify(self, atom: Atom, fact: Fact, bindings: Mapping[str, Value]) -> dict[str, Value] | None:
         """The bindings extended so that the atom is the fact, if that is possible."""
@@ -175,6 +179,7 @@ class Rule:
         found = [reached.candidates(atom, bindings) for atom in atoms]
         best = min(range(len(atoms)), key=lambda i: len(found[i]))
         for fact in found[best]:
+            self.patience.spend()
             extended = self.unify(atoms[best], fact, bindings)
             if extended is not None:
                 yield from self.join(reached, atoms[:best] + atoms[best + 1 :], extended)

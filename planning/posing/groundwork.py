@@ -9,12 +9,14 @@ actions that are out of reach there fall away later (`planning.posing.reduction`
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.effect import ForEach, effect_conditions, effect_parts
 from knowledge_base.language.expression import Exists, Expression, Forall, Term, Variable, parts_of
 from knowledge_base.schema import ROOT_TYPE
+from planning.patience import Patience
 from planning.plan import PlanStep
 from planning.posing.conditions import Grounder
 from planning.posing.costs import Costs
@@ -119,12 +121,20 @@ class Groundwork:
         same = not self._over_all or list(things_of(world)) == list(self._world.things)
         return same and self._world.agrees(world)
 
-    def extend(self, world: World) -> None:
+    def extend(self, world: World, patience: Patience | None = None) -> None:
         """Find the ways that are possible only in this world.
+
+        Args:
+            world: the next world it serves.
+            patience: for how long; after an error nothing here is of use any more.
 
         Raises:
             UnsupportedActionError: see `planning.posing.grounding.variants`.
+            OutOfPatienceError: it takes too long.
         """
+        patience = patience or Patience()
+        self._grounder = replace(self._grounder, patience=patience)
+        self._rules = [replace(rule, patience=patience) for rule in self._rules]
         found = list(self._found(world, more=self._world.follow(world)))
         if found:
             self.ways = Ways(sorted([*self.ways.all, *found], key=self._key))
@@ -148,6 +158,7 @@ class Groundwork:
             fact = self._queue.popleft()
             self._reached.add(fact)
             for rule, position in triggers.get(fact.predicate, ()):
+                self._grounder.patience.doing = f"grounding action '{rule.action.name}'"
                 start = rule.unify(rule.atoms[position], fact, {})
                 rest = rule.atoms[:position] + rule.atoms[position + 1 :]
                 for bindings in rule.join(self._reached, rest, start) if start is not None else ():
@@ -159,6 +170,7 @@ class Groundwork:
             self._queue.append(fact)
 
     def _take(self, rule: Rule, bindings: dict[str, Value]) -> Iterator[Way]:
+        self._grounder.patience.doing = f"grounding action '{rule.action.name}'"
         open_parameters = [p for p in rule.action.parameters if p.name not in bindings]
         for full in self._grounder.choices(open_parameters, bindings):
             step = PlanStep(rule.action.name, tuple([str(full[p.name]) for p in rule.action.parameters]))

@@ -18,6 +18,7 @@ from knowledge_base.language.expression import Expression, Term
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.printer import to_text
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
+from planning.patience import Patience
 from planning.posing.assembly import Assembly
 from planning.posing.conditions import Every, Grounder, Leaf, Literal, Residual, Some
 from planning.posing.costs import ignored, metric_of
@@ -46,7 +47,13 @@ _MOST_KEPT = 8  # goals of different kinds, each with its ground actions
 
 
 def pose(
-    domain: PlanningDomain, world: World, goal: Expression, metric: Metric | None = None, *, durations: bool = False
+    domain: PlanningDomain,
+    world: World,
+    goal: Expression,
+    metric: Metric | None = None,
+    *,
+    durations: bool = False,
+    patience: Patience | None = None,
 ) -> Problem:
     """The problem of reaching `goal` from `world`, which stays as it is.
 
@@ -58,15 +65,17 @@ def pose(
         goal: what shall hold.
         metric: what makes a plan better than another; to minimize `(total-cost)` if the domain declares that.
         durations: whether there is somebody to ask who plans with durations: `timed` of the problem is for him.
+        patience: for how long; for ever if left out.
 
     Raises:
         InputError: the goal has a free variable, or names something that is not declared or not known.
         UnsupportedGoalError: the goal states a fact about a number that actions change, or asks for a derived
             predicate that cannot be planned with, or for what no engine can foresee (`unforeseeable`).
         UnsupportedActionError: so does an action that matters, or it has too many alternatives.
+        OutOfPatienceError: it takes too long, as it may where many objects can be chosen for many parameters.
     """
     poser = _posers.find(domain, None) or _posers.keep(domain, None, Poser(domain))
-    return poser.pose(world, goal, metric, durations=durations)
+    return poser.pose(world, goal, metric, durations=durations, patience=patience)
 
 
 def check_goal(goal: Expression, world: World) -> None:
@@ -104,26 +113,33 @@ class Poser:
         self._lock = threading.Lock()
 
     def pose(
-        self, world: World, goal: Expression, metric: Metric | None = None, *, durations: bool = False
+        self,
+        world: World,
+        goal: Expression,
+        metric: Metric | None = None,
+        *,
+        durations: bool = False,
+        patience: Patience | None = None,
     ) -> Problem:
         """See `planning.posing.problem.pose`."""
         check_goal(goal, world)
         world, wanted = self._derivation.world(world), self._derivation.expand(goal)
         if holds(wanted, world):
             return self._nothing()
-        problem = self._one_at_a_time(world, goal, metric)
+        patience = patience or Patience()
+        problem = self._one_at_a_time(world, goal, metric, patience)
         if not durative(self._domain, wanted):
             return problem
-        timed = pose_timed(self._domain, world, wanted) if durations or problem.unreachable else None
+        timed = pose_timed(self._domain, world, wanted, patience) if durations or problem.unreachable else None
         if timed is not None and timed.unreachable:
             return timed
         return replace(problem, one_at_a_time=True, timed=timed if durations else None)
 
-    def _one_at_a_time(self, world: World, goal: Expression, metric: Metric | None) -> Problem:
+    def _one_at_a_time(self, world: World, goal: Expression, metric: Metric | None, patience: Patience) -> Problem:
         """The problem with durative actions as ordinary ones."""
         amount = metric_of(metric, world.schema)
         with self._lock:
-            posing = self.posing(world, goal, amount)
+            posing = self.posing(world, goal, amount, patience)
             if posing.task is None or posing.assembly is None:
                 return self._nothing(to_text(goal))
             reach, numbering = reachable(posing.task), posing.task.numbering
@@ -133,43 +149,50 @@ class Poser:
             task, notes = _priced(pruned(posing.task, reach), amount)
             return self._sliced(task, posing.assembly, world, notes)
 
-    def posing(self, world: World, goal: Expression, metric: Term | None = None) -> Posing:
+    def posing(
+        self, world: World, goal: Expression, metric: Term | None = None, patience: Patience | None = None
+    ) -> Posing:
         """The problem of reaching a checked goal, with everything evaluated that cannot change.
 
         Args:
             world: the present, with derived facts.
             goal: what shall hold.
             metric: what plans shall have little of.
+            patience: for how long.
 
         Raises:
-            UnsupportedGoalError, UnsupportedActionError: as for `pose`.
+            UnsupportedGoalError, UnsupportedActionError, OutOfPatienceError: as for `pose`.
         """
         goal = self._derivation.expand(goal)
         matters = relevant(goal, metric, self._domain.actions.values())
         self._derivation.require_supported(goal, matters.actions)
         refuse_unforeseeable(goal, matters.actions, self._domain)
-        grounder = Grounder(world, matters.changing, keep_false=True)
+        patience = patience or Patience()
+        patience.doing = "grounding the goal"
+        grounder = Grounder(world, matters.changing, keep_false=True, patience=patience)
         try:
             wanted = grounder.residual(goal, {})
         except UnsupportedActionError as error:
             raise UnsupportedGoalError(error.message, place=error.place) from None
         if wanted is False:
             return Posing(matters, wanted)
-        groundwork, assembly = self._prepared(matters, metric, world)
+        groundwork, assembly = self._prepared(matters, metric, world, patience)
         numbering = groundwork.numbering
         ways, goal_numbers = _with_conjunctive_goal(groundwork.ways, wanted, numbering)
         init = (numbering.present(world) - {numbering.of(_ACTING.negated)}) | {numbering.of(_ACTING)}
         task = Task(numbering, init, goal_numbers, ways)
         return Posing(matters, wanted, task, assembly)
 
-    def _prepared(self, matters: Relevant, metric: Term | None, world: World) -> tuple[Groundwork, Assembly]:
+    def _prepared(
+        self, matters: Relevant, metric: Term | None, world: World, patience: Patience
+    ) -> tuple[Groundwork, Assembly]:
         """The ground actions that may matter, those of an earlier problem if they serve."""
         key = (tuple(action.name for action in matters.actions), matters.changing, metric)
         known = self._kept.pop(key, None)  # taken out, so that an error on the way leaves nothing half done
         if known is None or not known[0].serves(world):
             groundwork = Groundwork(matters, metric, world)
             known = groundwork, Assembly(groundwork.numbering)
-        known[0].extend(world)
+        known[0].extend(world, patience)
         while len(self._kept) >= _MOST_KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[key] = known

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Value
     from knowledge_base.language.evaluation import World
     from planning.domain import PlanningAction, PlanningDomain
+    from planning.patience import Patience
     from planning.posing.relevance import Relevant
 
 LONGEST = 1e6
@@ -51,23 +52,27 @@ def durative(domain: PlanningDomain, goal: Expression) -> bool:
     return any(action.timed is not None for action in _relevant(domain, goal).actions)
 
 
-def pose_timed(domain: PlanningDomain, world: World, goal: Expression) -> Problem | None:
+def pose_timed(domain: PlanningDomain, world: World, goal: Expression, patience: Patience) -> Problem | None:
     """The problem of reaching `goal` with durations; `None` if it has more than facts, or its goal is a disjunction.
 
     Args:
         domain: without derived predicates, as `planning.posing.derived.derivation` has it.
         world: the present, with derived facts.
         goal: what shall hold, in the same way.
+        patience: for how long.
+
+    Raises:
+        OutOfPatienceError: it takes too long.
     """
     matters = _relevant(domain, goal)
     actions = {action.name: domain.actions[action.name] for action in matters.actions}
     changing = matters.changing.union(*(changed(action.effect) for action in matters.actions))  # also by durations
     try:
-        wanted = _literals(Grounder(world, matters.changing, keep_false=True).residual(goal, {}))
-        steps, missing = _possible(actions.values(), matters, wanted, world)
+        wanted = _literals(Grounder(world, matters.changing, keep_false=True, patience=patience).residual(goal, {}))
+        steps, missing = _possible(actions.values(), matters, wanted, world, patience)
         if missing:
             return Problem(domain.name, {}, (), (), (), missing)
-        grounding = _Grounding(actions, Grounder(world, changing), world)
+        grounding = _Grounding(actions, Grounder(world, changing, patience=patience), world)
         found = [action for step in steps for action in grounding.of(step)]
     except (_NotOfFactsError, UnsupportedActionError):
         return None
@@ -108,14 +113,18 @@ def _end(action: PlanningAction, *needed: Expression) -> Iterator[PlanningAction
 
 
 def _possible(
-    actions: Iterable[PlanningAction], matters: Relevant, wanted: tuple[Literal, ...], world: World
+    actions: Iterable[PlanningAction],
+    matters: Relevant,
+    wanted: tuple[Literal, ...],
+    world: World,
+    patience: Patience,
 ) -> tuple[list[PlanStep], tuple[str, ...]]:
     """The steps that can be taken if nothing ever becomes false, and what of the goal cannot be reached even then."""
     actions = tuple(actions)
     later = [one for action in actions if action.timed for one in _end(action, action.timed.over_all, action.timed.end)]
     ends = replace(matters, actions=(*map(_start, actions), *later))
     groundwork = Groundwork(ends, None, world)
-    groundwork.extend(world)
+    groundwork.extend(world, patience)
     numbering = groundwork.numbering
 
     def linked(way: Way, step: PlanStep) -> Way:

@@ -11,6 +11,7 @@ from knowledge_base.language.effect import Add, AllOf, Effect, ForEach, When, ef
 from knowledge_base.language.evaluation import World, explain
 from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
 from knowledge_base.language.printer import to_text
+from planning.patience import Patience
 from planning.plan import PlanStep
 from planning.posing.conditions import Every, Grounder, Literal, Residual, Some, is_so
 from planning.posing.derived import derivation
@@ -28,22 +29,24 @@ if TYPE_CHECKING:
 _LONGEST_CHAIN = 6
 
 
-def why_unsolvable(domain: PlanningDomain, world: World, goal: Expression) -> tuple[str, ...]:
+def why_unsolvable(
+    domain: PlanningDomain, world: World, goal: Expression, patience: Patience | None = None
+) -> tuple[str, ...]:
     """One sentence for each goal fact that no action sequence can reach even if nothing became false.
 
     Each follows the nearest action back to what is missing in the end. If every fact is reachable alone,
     the one sentence says so: then it is the deletions that stand in the way.
 
     Raises:
-        InputError: as for `planning.posing.problem.pose`.
+        InputError, OutOfPatienceError: as for `planning.posing.problem.pose`.
     """
     check_goal(goal, world)
     derived = derivation(domain)
     domain, world, goal = derived.domain, derived.world(world), derived.expand(goal)
-    posing = Poser(domain).posing(world, goal)
+    posing = Poser(domain).posing(world, goal, patience=patience)
     if posing.task is None:
         return (f"{explain(goal, world).deciding} and no planning action changes that",)
-    grounder = Grounder(world, posing.relevant.changing)
+    grounder = Grounder(world, posing.relevant.changing, patience=patience or Patience())
     rules = tuple(Rule.of(case, grounder) for action in posing.relevant.actions for case in _cases(action))
     reach = _Reach.of(posing.task, world)
     known = dict.fromkeys([*_present(rules, world), *sorted(reach.facts, key=str)])

@@ -260,3 +260,18 @@ def test_notes_about_files_and_the_problem_are_printed(run, tmp_path, monkeypatc
     answer = json.loads(run("--json", problem=SEAL, domains=[tmp_path / "jars.pddl"]).stdout)
     assert [f"note: {one}" for one in answer["notes"]] == [about_file, about_metric]
     assert answer["outcome"] == "no_engine"
+
+
+ANY = """(define (domain any) (:predicates (g)) (:action a :parameters (?a ?b ?c ?d ?e ?f ?h ?i) :effect (g)))"""
+
+
+def test_the_time_is_for_posing_as_well(run, tmp_path):
+    domain = tmp_path / "any.pddl"
+    domain.write_text(ANY)
+    things = " ".join(f"o{i}" for i in range(40))
+    problem = f"(define (problem p) (:domain any) (:objects {things}) (:init) (:goal (g)))"
+    result = run("--seconds", "0.05", problem=problem, domains=[domain])
+    assert result.exit_code == 3
+    assert result.stderr == "no plan within 0.05 s (while grounding action 'a')\n"
+    answer = json.loads(run("--json", "--seconds", "0.05", problem=problem, domains=[domain]).stdout)
+    assert (answer["outcome"], answer["while"]) == ("timed_out", "grounding action 'a'")

@@ -1,0 +1,128 @@
+"""Posing a problem ends when its time is up, and when nobody waits for it any more."""
+
+import asyncio
+import threading
+
+import pytest
+
+from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
+from knowledge_base import Delta, fact
+from knowledge_base.language.parser import parse_condition
+from planning import Executive, PlanningDomain
+from planning.patience import OutOfPatienceError, Patience, aside
+from planning.posing.problem import pose
+
+# Nothing needs the parameters, so that any choice will do, of which there are 30 ** 7.
+MANY = """(define (domain many) (:types thing) (:predicates (p ?a - thing) (g))
+  (:action a :parameters (?a ?b ?c ?d ?e ?f ?h - thing) :precondition PRECONDITION :effect (g)))"""
+LAMPS = """(define (domain lamps) (:types lamp) (:predicates (on ?l - lamp))
+  (:action light :parameters (?l ?near ?by - lamp) :effect (on ?l)))"""
+GOAL = parse_condition("(g)")
+THINGS = Delta(nodes={f"o{i}": "thing" for i in range(30)}, added=(fact("p", "o1"),))
+FACTS = Delta(nodes=THINGS.nodes, added=tuple(fact("p", name) for name in THINGS.nodes))
+JOINED = "(and (p ?a) (p ?b) (p ?c) (p ?d) (p ?e) (p ?f) (p ?h) (not (p ?a)))"
+
+
+def many(precondition="(p ?a)"):
+    return PlanningDomain.parse(MANY.replace("PRECONDITION", precondition))
+
+
+@pytest.mark.parametrize(
+    "precondition",
+    [
+        "(p ?a)",
+        JOINED,
+        "(exists (?x ?y ?z ?u ?v ?w - thing) (and (not (p ?x)) (g) (p ?y) (p ?z) (p ?u) (p ?v) (p ?w)))",
+    ],
+    ids=["choices of objects", "joins of facts", "quantifiers"],
+)
+def test_posing_ends_when_its_time_is_up(precondition, world_of):
+    domain = many(precondition)
+    world = world_of(domain.schema, FACTS.nodes, FACTS.added)
+    with pytest.raises(OutOfPatienceError, match="out of time while grounding action 'a'"):
+        pose(domain, world, GOAL, patience=Patience(0.01))
+
+
+def test_a_goal_with_too_many_parts_for_the_time_says_so(world_of):
+    domain = many()
+    world = world_of(domain.schema, THINGS.nodes)
+    goal = parse_condition("(exists (?x ?y ?z ?u ?v ?w - thing) (and (g) (not (p ?x)) (p ?y) (p ?z) (p ?u) (p ?v)))")
+    with pytest.raises(OutOfPatienceError, match="out of time while grounding the goal"):
+        pose(domain, world, goal, patience=Patience(0.01))
+
+
+def test_what_was_broken_off_is_no_part_of_the_next_problem(world_of):
+    domain = PlanningDomain.parse(LAMPS)
+    small, large = (world_of(domain.schema, {f"l{i}": "lamp" for i in range(n)}) for n in (2, 8))
+    goal = parse_condition("(forall (?l - lamp) (on ?l))")
+    first = pose(domain, small, goal)
+    with pytest.raises(OutOfPatienceError):
+        pose(domain, large, goal, patience=Patience(0.0))
+    assert pose(domain, small, goal) == first
+    assert pose(domain, large, goal) == pose(PlanningDomain.parse(LAMPS), large, goal)
+
+
+def test_without_a_limit_it_takes_what_it_takes():
+    patience = Patience()
+    for _ in range(10_000):
+        patience.spend()
+    patience.cancel()
+    with pytest.raises(OutOfPatienceError):
+        patience.spend()
+
+
+def test_work_that_does_not_ask_is_left_alone_when_its_time_is_up():
+    never = threading.Event()
+    with pytest.raises(OutOfPatienceError):
+        asyncio.run(aside(never.wait, Patience(0.01)))
+    never.set()
+
+
+def test_what_the_work_raises_comes_to_the_one_who_waits():
+    with pytest.raises(ZeroDivisionError):
+        asyncio.run(aside(lambda: 1 / 0))
+
+
+class Idle(Component):
+    name = "idle"
+
+    @skill(outcomes={"done": {}})
+    async def act(self, call: SkillCall) -> Outcome:
+        return Outcome("done")
+
+
+WORKING = """
+plot: top
+receives: {stop: }
+emits: {ended: {how: text}}
+states:
+  work:
+    goal: (g)
+    budget: {seconds: SECONDS}
+    on:
+      done: {to: end, emit: ended, with: {how: reached}}
+      no_plan: {to: end, emit: ended, with: {how: ?event.reason}}
+      gave_up: {to: end, emit: ended, with: {how: ?event.reason}}
+      stop: {to: end, emit: ended, with: {how: stopped}}
+  end: {final: true}
+"""
+
+
+def run(seconds, prepare=None, *, simulated):
+    program = Executive(many(), [parse_plot(WORKING.replace("SECONDS", str(seconds)))], [Idle()])
+    program.knowledge.apply(THINGS, "test")
+    end = program.run("top", prepare=prepare, simulated=simulated)
+    return end.emitted[-1].attributes["how"]
+
+
+def test_a_stop_while_the_problem_is_posed_ends_the_run_and_the_work():
+    before = set(threading.enumerate())
+    assert run(3600, lambda sequencer: sequencer.post(Event("stop"), after=0.05), simulated=False) == "stopped"
+    for thread in set(threading.enumerate()) - before:
+        thread.join(30)
+        assert not thread.is_alive()
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_the_budget_is_for_posing_as_well(simulated):
+    assert run(0.05, simulated=simulated).startswith("no plan within 0.05 s (while grounding action 'a')")
