@@ -101,11 +101,13 @@ class Transaction:
 
     def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[dict[str, Value]]:
         """As `KnowledgeBase.query`, with the changes so far."""
-        return self._questions.answers(text, params or {}, self._view)
+        params = self._questions.given(text, params, self._view, "answers")
+        return self._questions.answers(text, params, self._view)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """As `KnowledgeBase.ask`, with the changes so far."""
-        return self._questions.ask(text, params or {}, self._view)
+        params = self._questions.given(text, params, self._view, "error")
+        return self._questions.ask(text, params, self._view)
 
     def close(self) -> None:
         """No more changes; called when the block is left."""
