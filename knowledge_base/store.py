@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import get_ident
 from types import TracebackType
-from typing import Self
+from typing import Self, get_args
 
-from knowledge_base.errors import ConflictError, HistoryError, InputError
+from knowledge_base.errors import ConflictError, HistoryError, InputError, StoreError
 from knowledge_base.exchange.json import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
-from knowledge_base.inputs import require_time, require_version
+from knowledge_base.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability
 from knowledge_base.journal.history import History, Version, Writer, gone
@@ -80,13 +80,18 @@ class KnowledgeBase(Observable):
             SchemaMismatchError: the file was written with a schema that this one does not extend.
             InputError: there is no schema, or path and durability contradict each other.
         """
+        if not (schema is None or isinstance(schema, Schema)):
+            raise InputError(f"a schema is a Schema, not {shown(schema)}; Schema.parse reads its text")
+        if durability not in (None, *get_args(Durability)):
+            valid = get_args(Durability)
+            raise InputError(f"there is no durability {shown(durability)}", found=str(durability), valid=valid)
         if path is None:
             if schema is None or durability not in (None, "memory") or read_only:
                 raise InputError("a knowledge base without a file has a schema and durability 'memory'")
             return cls(schema, clock)
         if durability == "memory":
             raise InputError(f"with the file '{path}' durability is 'process' or 'power', not 'memory'")
-        file = Path(path).resolve()
+        file = _resolved(path)
         archive = Archive(file, schema) if read_only else Journal(file, schema, durability or "process", clock)
         try:
             return cls(archive.schema, clock, archive)
@@ -162,6 +167,7 @@ class KnowledgeBase(Observable):
             ConflictError: the version is not the expected one, or this thread is inside another transaction.
             StoreError: the file cannot be written, or the knowledge base is closed; nothing was changed.
         """
+        _require_names(author, key)
         try:
             with self._lock:
                 self._require_free()
@@ -200,6 +206,8 @@ class KnowledgeBase(Observable):
             ConflictError: the version is not the expected one, or this thread is inside a transaction.
             StoreError: the file cannot be written, or the knowledge base is closed; nothing was changed.
         """
+        require_delta(delta)
+        _require_names(author, key)
         with self._lock:
             self._require_free()
             change = self._first(key, expect)
@@ -333,3 +341,18 @@ class KnowledgeBase(Observable):
         self._require_open()
         if self._writer is not None and self._writer[0] == get_ident():
             raise ConflictError(f"a transaction by '{self._writer[1]}' is open in this thread already")
+
+
+def _resolved(path: object) -> Path:
+    if not isinstance(path, str | Path) or "\0" in str(path) or not str(path):
+        raise InputError(f"a store's path is text or a Path, not {shown(path)}")
+    try:
+        return Path(path).resolve()
+    except (OSError, RuntimeError) as error:  # links that lead to each other
+        raise StoreError(f"cannot open the store: {error}") from error
+
+
+def _require_names(author: object, key: object) -> None:
+    require_text(author, "an author")
+    if key is not None:
+        require_text(key, "a key")

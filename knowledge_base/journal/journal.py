@@ -76,6 +76,8 @@ class Journal(Archive):
         if not change.delta and key is None and along is None:
             return
         _require_text(change.author, key or "")
+        if along is not None and not callable(along):
+            raise InputError(f"what writes along is a function of a connection, not {along!r}")
         delta = compact(delta_form(change.delta))
         snapshot = None if self._tail < max(SNAPSHOT_AFTER, self._snapshot_size) else compact(world_form(before))
         with self._transaction() as connection:
