@@ -12,7 +12,7 @@ from knowledge_base.functional import require_single
 from knowledge_base.language.check import check_arity, value_fits
 from knowledge_base.language.expression import TypedVariable
 from knowledge_base.language.world import World
-from knowledge_base.schema import ROOT_TYPE, VALUE_TYPES, Signature
+from knowledge_base.schema import ROOT_TYPE, VALUE_TYPES, Schema, Signature
 
 
 def check_delta(delta: Delta, world: World) -> None:
@@ -45,8 +45,7 @@ def check_delta(delta: Delta, world: World) -> None:
         if name in world.schema.constants and name not in delta.nodes:
             raise SchemaError(f"'{name}' is a constant of the domain and cannot be removed")
     for fact in delta.replaced:
-        if not fact.args:
-            raise SchemaError(f"{fact} has no argument that could be replaced")
+        _require_replaceable(fact, world.schema)
     if delta.replaced or world.schema.functional:
         require_single(delta, world)
 
@@ -59,6 +58,14 @@ def check_fluent(fluent: Fact, world: World) -> None:
         SchemaError: a wrong number of arguments, a wrong type.
     """
     _Admission(Delta(), world).fact(fluent, world.schema.function(fluent.predicate))
+
+
+def _require_replaceable(fact: Fact, schema: Schema) -> None:
+    if not fact.args:
+        raise SchemaError(f"{fact} has no argument that could be replaced")
+    if len(fact.args) == 1 and fact.predicate not in schema.functional:
+        others = f"all other facts of '{fact.predicate}', which is not functional"
+        raise SchemaError(f"{fact} would replace {others}; retract those that hold no longer")
 
 
 class _Admission:

@@ -10,6 +10,7 @@ from knowledge_base.conditions.clock import Clock
 from knowledge_base.conditions.condition import Condition, Fire
 from knowledge_base.conditions.installed import Installed, terms
 from knowledge_base.conditions.watch import Watch, watch
+from knowledge_base.errors import StoreError
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import Expression
 from knowledge_base.state import WorldState
@@ -24,10 +25,12 @@ class Observable(View):
         self._announcer = Announcer(self._lock)
         self._installed = Installed(state, version, self._lock, self._announcer)
         self._watches: WeakSet[Watch] = WeakSet()
+        self._closed = False
 
     def close(self) -> None:
         """Cancel what is installed and end what is watched: whoever waits is told, no timer goes on."""
         with self._lock:
+            self._closed = True
             conditions, watches = self._installed.conditions(), list(self._watches)
         for condition in conditions:
             condition.cancel()
@@ -73,10 +76,12 @@ class Observable(View):
         Raises:
             InputError: as for `query`; a negative or not finite time, a time without a clock, a hysteresis
                 without a comparison; another word for `fire`.
+            StoreError: the knowledge base is closed.
         """
-        params = params or {}
         firing = terms(fire, hold_s=hold_s, once=once, clock=clock)
         with self._lock:
+            self._require_open()
+            params = self._questions.given(text, params, self._state, "answers")
             e = self._questions.query(text, params, self._state)
             condition = self._installed.install(e, params, firing, hysteresis)
         self._announcer.deliver()
@@ -97,8 +102,14 @@ class Observable(View):
 
         Raises:
             InputError: the pattern is none, or names what is not declared.
+            StoreError: the knowledge base is closed.
         """
         with self._lock:
-            made = watch(self, pattern, params or {}, limit)
+            self._require_open()
+            made = watch(self, pattern, {} if params is None else params, limit)
             self._watches.add(made)
             return made
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise StoreError("the knowledge base is closed; it can only be asked")

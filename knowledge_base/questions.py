@@ -7,9 +7,10 @@ from functools import lru_cache
 from typing import TypeVar
 
 from knowledge_base.facts import Value
+from knowledge_base.inputs import fitted_names, require_condition, require_params
 from knowledge_base.language.asking import Asked, Queried, asked, queried
 from knowledge_base.language.check import Free, check
-from knowledge_base.language.expression import Expression
+from knowledge_base.language.expression import Expression, free_variables
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.world import World
@@ -41,7 +42,35 @@ class Questions:
     def __init__(self) -> None:
         self._asked: dict[str | int, Asked] = {}
         self._queried: dict[_Key, Queried] = {}
+        self._given: dict[_Key, tuple[Expression, tuple[str, ...] | None]] = {}
         self._passed: IdentityCache[Expression, set[tuple[Free, frozenset[str]]]] = IdentityCache(1024)
+
+    def given(
+        self, text: str | Expression, params: Mapping[str, Value] | None, world: World, free: Free
+    ) -> Mapping[str, Value]:
+        """What people give a question, by the names that it has for it; looked at once for each set of names.
+
+        Raises:
+            UnknownNameError: the question has no such variable.
+            InputError: as for `condition` or `query`; these are no parameters.
+        """
+        if params is None:
+            return {}
+        require_params(params)
+        if not params:
+            return params
+        key = (text if isinstance(text, str) else id(text), *params)
+        found = self._given.get(key)
+        if found is None:
+            require_condition(text)
+            e = _parsed(text) if isinstance(text, str) else text
+            known = [name if name in free_variables(e) else name.lower() for name in params]
+            self._checked(e, dict.fromkeys(known, ""), world, free)  # what is wrong with the text comes first
+            names = fitted_names(e, params)
+            found = e, None if names == tuple(params) else names
+            _keep(self._given, key, found)
+        _, other = found
+        return params if other is None else dict(zip(other, params.values(), strict=True))
 
     def ask(self, text: str | Expression, params: Mapping[str, Value], world: World) -> bool:
         """Whether the condition is true of `world`; errors as for `condition`."""
@@ -82,6 +111,7 @@ class Questions:
         return self._checked(text, params, world, "answers")
 
     def _checked(self, text: str | Expression, params: Mapping[str, Value], world: World, free: Free) -> Expression:
+        require_condition(text)
         e = _parsed(text) if isinstance(text, str) else text
         passed = self._passed.find(e, world.schema)
         if passed is None:

@@ -8,14 +8,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import get_ident
 from types import TracebackType
-from typing import Self
+from typing import Self, get_args
 
-from knowledge_base.errors import ConflictError, HistoryError, InputError
+from knowledge_base.errors import ConflictError, HistoryError, InputError, StoreError
 from knowledge_base.exchange.json import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
+from knowledge_base.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability
-from knowledge_base.journal.history import History, Version, Writer
+from knowledge_base.journal.history import History, Version, Writer, gone
 from knowledge_base.journal.journal import Journal
 from knowledge_base.journal.memory import MemoryHistory
 from knowledge_base.observable import Observable
@@ -79,13 +80,18 @@ class KnowledgeBase(Observable):
             SchemaMismatchError: the file was written with a schema that this one does not extend.
             InputError: there is no schema, or path and durability contradict each other.
         """
+        if not (schema is None or isinstance(schema, Schema)):
+            raise InputError(f"a schema is a Schema, not {shown(schema)}; Schema.parse reads its text")
+        if durability not in (None, *get_args(Durability)):
+            valid = get_args(Durability)
+            raise InputError(f"there is no durability {shown(durability)}", found=str(durability), valid=valid)
         if path is None:
             if schema is None or durability not in (None, "memory") or read_only:
                 raise InputError("a knowledge base without a file has a schema and durability 'memory'")
             return cls(schema, clock)
         if durability == "memory":
             raise InputError(f"with the file '{path}' durability is 'process' or 'power', not 'memory'")
-        file = Path(path).resolve()
+        file = _resolved(path)
         archive = Archive(file, schema) if read_only else Journal(file, schema, durability or "process", clock)
         try:
             return cls(archive.schema, clock, archive)
@@ -135,7 +141,7 @@ class KnowledgeBase(Observable):
             StoreError: the file cannot be read, or the writer has a longer schema now; likewise.
         """
         with self._lock:
-            self._refuse_nesting()
+            self._require_free()
             for change in self._history.later(self._version):
                 self._time = change.time
                 self._take_in(change)
@@ -159,11 +165,12 @@ class KnowledgeBase(Observable):
 
         Raises:
             ConflictError: the version is not the expected one, or this thread is inside another transaction.
-            StoreError: the file cannot be written; nothing was changed.
+            StoreError: the file cannot be written, or the knowledge base is closed; nothing was changed.
         """
+        _require_names(author, key)
         try:
             with self._lock:
-                self._refuse_nesting()
+                self._require_free()
                 first = self._first(key, expect)
                 transaction = Transaction(Overlay(self._state), self._questions, first)
                 self._writer = (get_ident(), author)
@@ -197,10 +204,12 @@ class KnowledgeBase(Observable):
             SchemaError: a wrong number of arguments or a wrong type.
             InputError: a number that is not finite.
             ConflictError: the version is not the expected one, or this thread is inside a transaction.
-            StoreError: the file cannot be written; nothing was changed.
+            StoreError: the file cannot be written, or the knowledge base is closed; nothing was changed.
         """
+        require_delta(delta)
+        _require_names(author, key)
         with self._lock:
-            self._refuse_nesting()
+            self._require_free()
             change = self._first(key, expect)
             if change is None:
                 pending = Overlay(self._state)
@@ -226,9 +235,10 @@ class KnowledgeBase(Observable):
             SchemaError: a wrong number of arguments, a wrong type, or there is a source for it already.
             InputError: the reference is empty.
             ConflictError: this thread is inside a transaction.
+            StoreError: the knowledge base is closed.
         """
         with self._lock:
-            self._refuse_nesting()
+            self._require_free()
             return self._sources.bind(Fact(function, args), reference)
 
     def sources(self) -> list[Source]:
@@ -245,12 +255,13 @@ class KnowledgeBase(Observable):
         Raises:
             HistoryError: that is not kept any more (`compact`; in memory the last 10,000 things, facts and
                 numbers changed are kept), or it is not there yet.
-            InputError: not exactly one of the two is given.
+            InputError: not exactly one of the two is given, or it is no version or no time.
         """
         if (version is None) == (time is None):
             raise InputError("at(...) takes a version or a time")
         if version is None:
-            version = min(self._history.version_at(time or 0.0), self._version)
+            require_time(time)
+            version = min(self._history.version_at(float(time or 0.0)), self._version)
         self._require_reached(version)
         return View(self._history.state(version, self._present), version)
 
@@ -264,19 +275,25 @@ class KnowledgeBase(Observable):
 
         Raises:
             HistoryError: some of them are not kept any more, or are not there yet.
+            InputError: one of the two is no version, or `until` is before `since`.
         """
-        newest = self._version
-        self._require_reached(max(since, until or 0))
-        return self._history.changes(since, newest if until is None else until)
+        self._require_reached(since)
+        until = self._version if until is None else until
+        self._require_reached(until)
+        if until < since:
+            raise InputError(f"changes are told from a version on until a later one, not from {since} until {until}")
+        return self._history.changes(since, until)
 
     def compact(self, keep_since: int | None = None) -> None:
         """Forget what only versions before `keep_since` need (default: the present one); keys are remembered.
 
         Raises:
             HistoryError: that version is not kept any more or not there yet.
-            StoreError: the file cannot be written.
+            InputError: it is no version.
+            StoreError: the file cannot be written, or the knowledge base is closed.
         """
         with self._lock:
+            self._require_open()
             version = self._version if keep_since is None else keep_since
             self._require_reached(version)
             self._history.compact(version, self._present)
@@ -289,6 +306,7 @@ class KnowledgeBase(Observable):
         return first
 
     def _commit(self, effective: Delta, author: str, key: str | None, along: Writer | None) -> Change:
+        self._require_open()  # a transaction's own block may have closed it
         self._time = max(self._time, self._clock())
         change = Change(self._version + bool(effective), author, effective, self._time)
         self._history.append(change, key, self._state, along)
@@ -313,9 +331,28 @@ class KnowledgeBase(Observable):
             return Version(self._state.copy(), self._version, self._time)
 
     def _require_reached(self, version: int) -> None:
+        require_version(version)
+        if version < 0:
+            raise gone(version, self.oldest)
         if version > self._version:
             raise HistoryError(f"version {version} is not there yet; the newest is {self._version}")
 
-    def _refuse_nesting(self) -> None:
+    def _require_free(self) -> None:
+        self._require_open()
         if self._writer is not None and self._writer[0] == get_ident():
             raise ConflictError(f"a transaction by '{self._writer[1]}' is open in this thread already")
+
+
+def _resolved(path: object) -> Path:
+    if not isinstance(path, str | Path) or "\0" in str(path) or not str(path):
+        raise InputError(f"a store's path is text or a Path, not {shown(path)}")
+    try:
+        return Path(path).resolve()
+    except (OSError, RuntimeError) as error:  # links that lead to each other
+        raise StoreError(f"cannot open the store: {error}") from error
+
+
+def _require_names(author: object, key: object) -> None:
+    require_text(author, "an author")
+    if key is not None:
+        require_text(key, "a key")

@@ -7,6 +7,7 @@ from typing import cast
 
 from knowledge_base.errors import ConflictError, InputError, UnknownNameError
 from knowledge_base.facts import Change, Content, Delta, Fact, Value
+from knowledge_base.inputs import require_delta
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
 from knowledge_base.questions import Questions
@@ -69,7 +70,8 @@ class Transaction:
     def replace(self, predicate: str, *args: Value) -> None:
         """The fact holds now, and none any more that differs in the last argument: `tx.replace("at", "cup1", "shelf")`.
 
-        Errors as for `tell`; a predicate without arguments is one.
+        Errors as for `tell`; a predicate without arguments is one, and so is one with a single argument that is not
+        functional, of which nothing else would stay.
         """
         self.apply(Delta(replaced=(Fact(predicate, args),)))
 
@@ -96,16 +98,19 @@ class Transaction:
         """
         if self._closed:
             raise ConflictError("the transaction is over; changes are made inside its 'with' block")
+        require_delta(delta)
         if not self._repeated:  # the world may have moved on since, so it is not even checked
             self._view.apply(delta)
 
     def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[dict[str, Value]]:
         """As `KnowledgeBase.query`, with the changes so far."""
-        return self._questions.answers(text, params or {}, self._view)
+        params = self._questions.given(text, params, self._view, "answers")
+        return self._questions.answers(text, params, self._view)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """As `KnowledgeBase.ask`, with the changes so far."""
-        return self._questions.ask(text, params or {}, self._view)
+        params = self._questions.given(text, params, self._view, "error")
+        return self._questions.ask(text, params, self._view)
 
     def close(self) -> None:
         """No more changes; called when the block is left."""

@@ -65,30 +65,31 @@ class View:
 
         Raises:
             ParseError: the text is no condition.
-            UnknownNameError: an undeclared predicate, function or type, or a thing that is not there.
+            UnknownNameError: an undeclared predicate, function or type, a thing that is not there, or a parameter
+                that the text does not have.
             SchemaError: a wrong number of arguments or a type that can never fit.
             InputError: a variable occurs only under `not` or in a comparison.
         """
-        params = params or {}
         with self._lock:
+            params = self._questions.given(text, params, self._state, "answers")
             return self._questions.answers(text, params, self._state)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
-        params = params or {}
         with self._lock:
+            params = self._questions.given(text, params, self._state, "error")
             return self._questions.ask(text, params, self._state)
 
     def explain(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> Explanation:
         """Why the text is true or false; errors as for `ask`."""
-        params = params or {}
         with self._lock:
+            params = self._questions.given(text, params, self._state, "error")
             return explain(self._questions.condition(text, params, self._state), self._state, params)
 
     def explain_query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> QueryPlan:
         """How the query would run on the world as it is: what is looked up, in which order; errors as for `query`."""
-        params = params or {}
         with self._lock:
+            params = self._questions.given(text, params, self._state, "answers")
             return plan_query(self._questions.query(text, params, self._state), self._state, params)
 
     def overlay(self) -> Overlay:

@@ -22,6 +22,7 @@ from knowledge_base.conditions.rows import Row
 from knowledge_base.conditions.shape import Args, Lifted, Shape, lifted
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact, Value
+from knowledge_base.inputs import shown
 from knowledge_base.language.expression import Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.schema import Schema
@@ -37,9 +38,10 @@ def terms(fire: Fire, *, hold_s: float, once: bool, clock: Clock | None) -> Term
         InputError: an unknown way to fire, a time that is negative or not finite, or one without a clock.
     """
     if fire not in FIRE:
-        raise InputError(f"a condition fires at an 'edge' or at 'each' change, not '{fire}'", found=fire, valid=FIRE)
-    if not 0 <= hold_s < math.inf:
-        raise InputError(f"a hold time is a number of seconds, 0 or more, not {hold_s}")
+        message = f"a condition fires at an 'edge' or at 'each' change, not {shown(fire)}"
+        raise InputError(message, found=str(fire), valid=FIRE)
+    if isinstance(hold_s, bool) or not isinstance(hold_s, int | float) or not 0 <= hold_s < math.inf:
+        raise InputError(f"a hold time is a number of seconds, 0 or more, not {shown(hold_s)}")
     if not hold_s:
         return Terms(fire, once, None)
     if clock is None:

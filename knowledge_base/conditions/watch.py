@@ -14,6 +14,7 @@ from knowledge_base.conditions.pattern import Touches, touches
 from knowledge_base.conditions.waiters import Waiters
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Change, Value
+from knowledge_base.inputs import fitted_names, require_condition, require_params, shown
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.schema import Schema
@@ -52,12 +53,19 @@ class Observed(Protocol):
 
 def watch(observed: Observed, pattern: str | Expression | None, params: Mapping[str, Value], limit: int) -> Watch:
     """Watch `observed` from its present version on; see `KnowledgeBase.watch` for the rest."""
-    if limit < 1:
-        raise InputError(f"a watch keeps at least one change for its reader, not {limit}")
-    parsed = parse_condition(pattern) if isinstance(pattern, str) else pattern
-    made = Watch(None if parsed is None else touches(parsed, params, observed.schema), observed.version, limit)
+    if isinstance(limit, bool) or not isinstance(limit, int) or limit < 1:
+        raise InputError(f"a watch keeps at least one change for its reader, not {shown(limit)}")
+    touching = None if pattern is None else _touching(pattern, params, observed.schema)
+    made = Watch(touching, observed.version, limit)
     made.follow(observed.subscribe(made.hear))
     return made
+
+
+def _touching(pattern: str | Expression, params: Mapping[str, Value], schema: Schema) -> Touches:
+    require_condition(pattern)
+    require_params(params)
+    parsed = parse_condition(pattern) if isinstance(pattern, str) else pattern
+    return touches(parsed, dict(zip(fitted_names(parsed, params), params.values(), strict=True)), schema)
 
 
 class Watch:

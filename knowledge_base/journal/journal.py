@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from knowledge_base.compatibility import missing_constants, require_extension, require_functional
-from knowledge_base.errors import ConflictError, InputError, Place
+from knowledge_base.errors import ConflictError, InputError, Place, StoreError
 from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
 from knowledge_base.journal.archive import Archive
@@ -76,6 +76,8 @@ class Journal(Archive):
         if not change.delta and key is None and along is None:
             return
         _require_text(change.author, key or "")
+        if along is not None and not callable(along):
+            raise InputError(f"what writes along is a function of a connection, not {along!r}")
         delta = compact(delta_form(change.delta))
         snapshot = None if self._tail < max(SNAPSHOT_AFTER, self._snapshot_size) else compact(world_form(before))
         with self._transaction() as connection:
@@ -87,7 +89,8 @@ class Journal(Archive):
                 kept = None if change.delta else delta
                 connection.execute(_INSERT_KEY, (key, change.version, change.time, change.author, kept))
             if along is not None:
-                along(connection)
+                with _guarded(connection):
+                    along(connection)
         if snapshot is not None:
             self._tail, self._snapshot_size = 0, len(snapshot)
         self._tail += len(delta)
@@ -181,6 +184,29 @@ class Journal(Archive):
                 if self._connection.in_transaction:  # SQLite ends it by itself when the disk is full
                     self._connection.execute("ROLLBACK")
                 raise
+
+
+@contextmanager
+def _guarded(connection: sqlite3.Connection) -> Iterator[None]:
+    """Whoever writes in the block cannot end its transaction; what came before would be kept without the rest."""
+    refused = False
+
+    def judge(action: int, *_: str | None) -> int:
+        nonlocal refused
+        if action not in (sqlite3.SQLITE_TRANSACTION, sqlite3.SQLITE_SAVEPOINT):
+            return sqlite3.SQLITE_OK
+        refused = True
+        return sqlite3.SQLITE_DENY
+
+    connection.set_authorizer(judge)
+    try:
+        yield
+    except sqlite3.DatabaseError as error:
+        if refused:
+            raise StoreError("what is written along neither begins nor ends a transaction") from error
+        raise
+    finally:
+        connection.set_authorizer(None)
 
 
 def _no_schema(path: Path) -> InputError:

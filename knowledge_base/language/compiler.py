@@ -184,9 +184,12 @@ def _all(tests: list[Test]) -> Test:
         return tests[0]
 
     def test(world: World, bindings: Bindings) -> bool:
-        for part in tests:  # noqa: SIM110  a generator costs twice as much here
-            if not part(world, bindings):
-                return False
+        try:
+            for part in tests:  # a generator costs twice as much here
+                if not part(world, bindings):
+                    return False
+        except InputError as error:
+            return not _decided(tests, world, bindings, by=False, otherwise=error)
         return True
 
     return test
@@ -194,12 +197,26 @@ def _all(tests: list[Test]) -> Test:
 
 def _any(tests: list[Test]) -> Test:
     def test(world: World, bindings: Bindings) -> bool:
-        for part in tests:  # noqa: SIM110  as above
-            if part(world, bindings):
-                return True
+        try:
+            for part in tests:  # as above
+                if part(world, bindings):
+                    return True
+        except InputError as error:
+            return _decided(tests, world, bindings, by=True, otherwise=error)
         return False
 
     return test
+
+
+def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, otherwise: InputError) -> bool:
+    """That a part decides, although another one cannot be computed; if none does, that one's error counts."""
+    for part in tests:
+        try:
+            if part(world, bindings) is by:
+                return True
+        except InputError:
+            continue
+    raise otherwise
 
 
 def _found(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Test:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
+from math import isfinite
 from operator import itemgetter
 from typing import cast
 
@@ -140,8 +141,10 @@ def _arithmetic(term: Arithmetic, schema: Schema) -> Getter:
                 return -first
             for number in rest:
                 first = combine(first, number)
+            if isfinite(first):
+                return first
         except ArithmeticError as error:
             raise InputError(f"'{name}' cannot be computed: {error}", place=place) from None
-        return first
+        raise InputError(f"'{name}' cannot be computed: the result is too large", place=place)
 
     return compute

@@ -27,7 +27,7 @@ HOUSE = OPEN.with_functional("robot-at", "at")
 NODES = {"cup": "item", "can": "item", "hall": "place", "kitchen": "place", "yard": "place"}
 
 
-@pytest.fixture(params=[HOUSE, OPEN], ids=["functional", "any"])
+@pytest.fixture(params=[HOUSE, OPEN.with_functional("robot-at")], ids=["functional", "any"])
 def kb(request):
     return house(request.param)
 

@@ -147,6 +147,9 @@ def test_changes_since_a_version_come_in_order_with_author_and_delta(kb):
         (lambda kb: kb.compact(keep_since=9), "version 9 is not there yet; the newest is 1"),
         (lambda kb: kb.at(version=-1), "version -1 is not kept any more; the oldest kept is 0"),
         (lambda kb: kb.changes(since=-1), "version -1 is not kept any more; the oldest kept is 0"),
+        (lambda kb: kb.compact(keep_since=-1), "version -1 is not kept any more; the oldest kept is 0"),
+        (lambda kb: kb.changes(1, 0), "from 1 until 0"),
+        (lambda kb: kb.changes(0, -1), "version -1 is not kept any more; the oldest kept is 0"),
         (lambda kb: kb.at(), "takes a version or a time"),
         (lambda kb: kb.at(version=1, time=1.0), "takes a version or a time"),
     ],
@@ -154,6 +157,30 @@ def test_changes_since_a_version_come_in_order_with_author_and_delta(kb):
 def test_what_is_not_there_is_said(kb, ask, means):
     with pytest.raises(InputError, match=means):
         ask(kb)
+
+
+@pytest.mark.parametrize("version", [1.0, 1.5, True, "1", (1,), 10**30, -(10**30), pytest.param(10**5000, id="digits")])
+def test_a_version_is_a_whole_number(kb, version):
+    asked = [
+        lambda: kb.at(version=version),
+        lambda: kb.changes(version),
+        lambda: kb.changes(0, version),
+        lambda: kb.compact(version),
+    ]
+    for ask in asked:
+        with pytest.raises(InputError, match=r"^a version is a whole number, 0 or more, not [^\n]*$"):
+            ask()
+    assert kb.oldest == 0
+
+
+@pytest.mark.parametrize("time", [True, "x", (1,), float("nan"), float("inf"), 10**400, pytest.param(10**5000, id="digits")])
+def test_a_time_is_a_finite_number(kb, time):
+    with pytest.raises(InputError, match=r"^a time is a finite number of seconds, not [^\n]*$"):
+        kb.at(time=time)
+
+
+def test_a_whole_number_is_a_time_too(kb):
+    assert kb.at(time=10**40).version == kb.version
 
 
 def test_compaction_forgets_what_was_before_and_nothing_else(kb):
@@ -295,13 +322,39 @@ def test_when_somebody_locks_the_file_nothing_is_changed_and_it_is_said(path, mo
         assert kb.apply(QUIET, author="a").version == 1
 
 
-def test_a_closed_store_is_asked_but_not_changed(path):
-    with opened(path) as kb:
-        kb.apply(QUIET, author="a")
-    with pytest.raises(StoreError, match="closed"):
-        kb.apply(LOUD, author="a")
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda kb: kb.apply(LOUD, author="a"),
+        lambda kb: kb.apply(Delta(), author="a"),
+        lambda kb: kb.transaction(author="a").__enter__(),
+        lambda kb: kb.bind_source("weight", "cup1", reference="scale"),
+        lambda kb: kb.compact(),
+        lambda kb: kb.install("(quiet)"),
+        lambda kb: kb.watch(),
+        lambda kb: kb.refresh(),
+    ],
+)
+def test_a_closed_knowledge_base_is_asked_but_not_changed(kb, change):
+    kb.apply(QUIET, author="a")
+    kb.close()
+    kb.close()
+    before = everything(kb)
+    with pytest.raises(StoreError, match=r"^the knowledge base is closed; it can only be asked$"):
+        change(kb)
+    assert everything(kb) == before
     assert kb.ask("(quiet)")
-    assert kb.at(version=0).version == 0
+    assert not kb.at(version=1).ask("(quiet)")
+    assert len(kb.changes()) == 2
+
+
+def test_closing_inside_a_transaction_drops_it(kb):
+    transaction = kb.transaction(author="a")
+    transaction.__enter__().tell("quiet")
+    kb.close()
+    with pytest.raises(StoreError, match="closed"):
+        transaction.__exit__(None, None, None)
+    assert not kb.ask("(quiet)")
 
 
 def test_what_cannot_be_written_as_text_is_refused(path):
@@ -373,6 +426,39 @@ def test_others_write_along_or_not_at_all(path):
             kb.apply(LOUD, author="runs", along=lambda c: c.execute("INSERT INTO walks VALUES (1)"))
         assert (kb.version, kb.ask("(quiet)")) == (1, True)
     assert rows(path) == ["with a change", "alone"]
+
+
+@pytest.mark.parametrize(
+    "along",
+    [
+        lambda c: c.commit(),
+        lambda c: c.rollback(),
+        lambda c: c.execute("COMMIT"),
+        lambda c: c.execute("ROLLBACK"),
+        lambda c: c.execute("BEGIN"),
+        lambda c: c.execute("SAVEPOINT s"),
+        lambda c: c.executescript("CREATE TABLE runs (what TEXT)"),
+    ],
+)
+def test_who_writes_along_cannot_end_the_commit(path, along):
+    with opened(path) as kb:
+        with pytest.raises(StoreError, match="what is written along neither begins nor ends a transaction"):
+            kb.apply(QUIET, author="runs", along=along)
+        assert (kb.version, kb.ask("(quiet)")) == (0, False)
+        assert kb.apply(QUIET, author="a").version == 1
+    with opened(path) as again:
+        assert [change.author for change in again.changes()] == ["a"]
+
+
+def test_who_tries_to_end_the_commit_and_goes_on_does_no_harm(path):
+    def stubborn(connection):
+        with contextlib.suppress(sqlite3.Error):
+            connection.commit()
+
+    with opened(path) as kb:
+        assert kb.apply(QUIET, author="a", along=stubborn).version == 1
+    with opened(path) as again:
+        assert again.ask("(quiet)")
 
 
 def test_in_memory_nobody_can_write_along():

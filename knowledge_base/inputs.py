@@ -1,0 +1,108 @@
+"""What programs hand in where types are not checked: each judged once, at the entrance, with one line of error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.facts import VALUE_TYPES, Delta, Fact, Value
+from knowledge_base.language.expression import Expression, free_variables
+
+
+def shown(value: object) -> str:
+    """The value as a message says it, whatever it is."""
+    try:
+        return repr(value)
+    except ValueError:  # Python writes no number of that many digits
+        return "a number of thousands of digits"
+
+
+def require_condition(text: object) -> None:
+    """Raise `InputError` unless it is a text or an expression, which must still be read or checked."""
+    if isinstance(text, Fact):
+        raise InputError(f"a condition is text such as '(clean cup1)', not a Fact; write it as text: {text}")
+    if not isinstance(text, str | Expression):
+        raise InputError(f"a condition is text such as '(clean cup1)', not {shown(text)}")
+
+
+def require_params(params: object) -> None:
+    """Raise an error unless the parameters are a mapping to values that facts can be about.
+
+    Raises:
+        InputError: it is no mapping, a name is no text, or a value is none.
+        SchemaError: a value is a geometry.
+    """
+    if not isinstance(params, Mapping):
+        raise InputError(f"parameters are a mapping of variables' names to values, not {shown(params)}")
+    for name, value in params.items():
+        if not isinstance(name, str):
+            raise InputError(f"a parameter's name is text, not {shown(name)}")
+        if type(value) in VALUE_TYPES or isinstance(value, Value):
+            continue
+        if isinstance(value, tuple):
+            raise SchemaError(f"'?{name}' cannot be a geometry; write it into the condition: (geometry ...)")
+        raise InputError(f"'?{name}' is a name, a number or a truth value, not {shown(value)}")
+
+
+def fitted_names(e: Expression, params: Iterable[str]) -> tuple[str, ...]:
+    """The parameters' names as `e` spells them: in texts variables are in lower case, however they are written.
+
+    Raises:
+        UnknownNameError: `e` has no such variable that could be given a value.
+        InputError: two of the names are the same.
+    """
+    free = free_variables(e)
+    found: dict[str, None] = {}
+    for name in params:
+        own = name if name in free else name.lower()
+        if own not in free:
+            valid = [f"?{known}" for known in free]
+            message = f"the condition has no free variable '?{name}' that could be given a value"
+            raise UnknownNameError(message, place=e.place, found=f"?{name}", valid=valid)
+        if own in found:
+            raise InputError(f"the variable '?{own}' is given two values", place=e.place)
+        found[own] = None
+    return tuple(found)
+
+
+def require_text(value: object, what: str) -> None:
+    """Raise `InputError` unless it is text."""
+    if not isinstance(value, str):
+        raise InputError(f"{what} is text, not {shown(value)}")
+
+
+def require_version(version: object) -> None:
+    """Raise `InputError` unless it is a whole number, of a size that versions can have."""
+    if isinstance(version, bool) or not isinstance(version, int) or version.bit_length() > 63:
+        raise InputError(f"a version is a whole number, 0 or more, not {shown(version)}")
+
+
+def require_time(time: object) -> None:
+    """Raise `InputError` unless it is a finite number that a clock could tell."""
+    try:
+        if isinstance(time, int | float) and not isinstance(time, bool) and math.isfinite(time):
+            return
+    except OverflowError:
+        pass
+    raise InputError(f"a time is a finite number of seconds, not {shown(time)}")
+
+
+def require_delta(delta: object) -> None:
+    """Raise `InputError` unless it is a `Delta` whose parts are what they are declared to be."""
+    if not isinstance(delta, Delta):
+        raise InputError(f"a change is a Delta, not {shown(delta)}")
+    for name in ("nodes", "values"):
+        if not isinstance(part := getattr(delta, name), Mapping):
+            raise InputError(f"a Delta's '{name}' is a mapping, not {shown(part)}")
+    for name, kind in (("removed", Fact), ("added", Fact), ("replaced", Fact), ("removed_nodes", str)):
+        part = getattr(delta, name)
+        if not isinstance(part, tuple) or not all(isinstance(one, kind) for one in part):
+            said = "facts" if kind is Fact else "names"
+            raise InputError(f"a Delta's '{name}' is a tuple of {said}, not {shown(part)}")
+    for fluent in delta.values:
+        if not isinstance(fluent, Fact):
+            raise InputError(f"a Delta's 'values' are of functions with arguments, as Facts, not of {shown(fluent)}")
+    for fact in (*delta.removed, *delta.added, *delta.replaced, *delta.values):
+        if not (isinstance(fact.predicate, str) and isinstance(fact.args, tuple)):
+            raise InputError(f"a fact is a name with a tuple of arguments, not {shown(fact)}")
