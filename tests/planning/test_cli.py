@@ -88,7 +88,7 @@ def test_an_engine_that_cannot_do_the_problem_names_those_that_can(run, tmp_path
 
 def test_an_engine_that_is_not_installed_says_how_to_get_it(run, monkeypatch):
     monkeypatch.setattr("planning.engines.registry.Engine.version", None)
-    with pytest.raises(InputError, match=r"not installed: pip install 'dynamic-state-charts\[fast\]'"):
+    with pytest.raises(InputError, match=r"not installed: pip install 'up-fast-downward>=1\.0'"):
         run("--engine", "fast-downward")
 
 
@@ -96,7 +96,7 @@ def test_without_any_engine_the_command_says_what_could_be_installed(run, monkey
     monkeypatch.setattr("planning.engines.registry.Engine.version", None)
     result = run()
     assert result.exit_code == 4
-    assert "fast-downward could (pip install 'dynamic-state-charts[fast]')" in result.stderr
+    assert "fast-downward could (pip install 'up-fast-downward>=1.0')" in result.stderr
 
 
 def test_a_domain_may_come_in_fragments(run, tmp_path, domain_file):
