@@ -161,8 +161,8 @@ async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, sec
             spent = time.monotonic() - started
             with suppress(TimeoutError):
                 async with asyncio.timeout(min(seconds - spent, max(PATIENT_SECONDS, PATIENCE * spent))):
-                    async for best in plans:
-                        pass
+                    async for cheaper in plans:
+                        best = cheaper
     return best
 
 
