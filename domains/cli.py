@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 from collections.abc import Callable
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
+from typer.core import TyperGroup
 
 from dsc.cli import app as plot_app
 from dsc.viewer.cli import NoOpen, Port, view_command
@@ -21,10 +24,29 @@ if TYPE_CHECKING:
     from domains.clean_up_table.deployment import CleanUpTable
     from domains.clean_up_table.report import Report
     from dsc.sequencer.sequencer import Sequencer
+    from knowledge_base.errors import InputError
     from knowledge_base.store import KnowledgeBase
+
+BAD_INPUT, NOT_WRITTEN, NOBODY_READS = 2, 74, 141
+"""Exit statuses of every command; the last two are EX_IOERR of sysexits.h and what a shell gives for a broken pipe."""
+
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""What writing can fail with though the file could be opened."""
+
+
+class _Commands(TyperGroup):
+    """The commands, which end when nobody reads any more what they print."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise typer.Exit(NOBODY_READS) from None
+
 
 app = typer.Typer(
     name="dsc",
+    cls=_Commands,
     help="Dynamic State Charts: state charts for what you can foresee, a planner for what you cannot.",
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -186,11 +208,49 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):  # a terminal may not have the letters that a file has
             stream.reconfigure(errors="backslashreplace")
     try:
+        _command()
+    except BrokenPipeError:
+        sys.exit(NOBODY_READS)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        typer.echo(f"dsc: cannot write: {error.strerror}", err=True)
+        sys.exit(NOT_WRITTEN)
+    finally:
+        _drop_unwritten()
+
+
+def _command() -> None:
+    try:
         app()
     except Exception as error:
         from knowledge_base.errors import InputError
 
         if not isinstance(error, InputError):
             raise
+        _tell(error, as_json="--json" in sys.argv)
+        sys.exit(BAD_INPUT)
+
+
+def _tell(error: InputError, *, as_json: bool) -> None:
+    """On standard error for people, on standard output for programs, which look for their answer there."""
+    import json
+
+    from knowledge_base.errors import Place
+
+    if not as_json:
         typer.echo(f"dsc: {error}", err=True)
-        sys.exit(2)
+        return
+    place = error.place or Place()
+    where = {"file": place.source, "line": place.line, "column": place.column}
+    said = {"outcome": "bad_input", "message": error.message, **where, "found": error.found, "nearest": error.nearest}
+    typer.echo(json.dumps(said))
+
+
+def _drop_unwritten() -> None:
+    """What could not be written is not tried again when Python ends, which would complain once more."""
+    try:
+        if sys.stdout is not None:  # as it is when started without one
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -128,8 +128,8 @@ class Schema:
         Raises:
             SchemaError: two declarations contradict each other; both places are named.
         """
-        types = _typed_names((*domain.types, *domain.implied_types()), "type")
-        constants = _typed_names(domain.constants, "constant")
+        types = typed_names((*domain.types, *domain.implied_types()), "type")
+        constants = typed_names(domain.constants, "constant")
         return cls(
             types={name: declared.types[0] for name, declared in types.items()},
             constants={name: declared.types[0] for name, declared in constants.items()},
@@ -371,7 +371,12 @@ def _twice(kind: str, name: str, first: Declared, second: Declared) -> SchemaErr
     return SchemaError(said, place=second[1])
 
 
-def _typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
+def typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
+    """The names that one file declares, each with its one type; `object` beside another type says nothing.
+
+    Raises:
+        SchemaError: a name has two types; both places are named.
+    """
     found: dict[str, TypedName] = {}
     for name, types, place in names:
         if len(types) > 1:
@@ -384,6 +389,22 @@ def _typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
             before = f"{name} - {first.types[0]}", first.place
             raise _twice(kind, name, before, (f"{name} - {declared.types[0]}", place))
     return found
+
+
+def agreed_names(files: Iterable[Iterable[TypedName]], kind: str) -> tuple[TypedName, ...]:
+    """The names that several files declare; among these, `object` is a type like any other.
+
+    Raises:
+        SchemaError: two files, or one, give a name different types; both places are named.
+    """
+    found: dict[str, TypedName] = {}
+    for names in files:
+        for name, declared in typed_names(names, kind).items():
+            first = found.setdefault(name, declared)
+            if first.types != declared.types:
+                before = f"{name} - {first.types[0]}", first.place
+                raise _twice(kind, name, before, (f"{name} - {declared.types[0]}", declared.place))
+    return tuple(found.values())
 
 
 def _signatures(declarations: Iterable[DeclarationText], kind: str) -> dict[str, Signature]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 FOUND, UNSOLVABLE, TIMED_OUT, FAILED = 0, 1, 3, 4
 """Exit statuses; 2 is bad input, for every command."""
+
+PATIENCE, PATIENT_SECONDS = 3.0, 2.0
+"""A cheaper plan is waited for that many times as long as the first took, and for as many seconds at least."""
 
 PLOT_NAME = "plan"
 PIPE_WIDTH = 120
@@ -59,6 +63,8 @@ def plan_command(
     from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
     from planning.posing.constructs import why_no_engine
 
+    if plot is not None:
+        _refuse_unwritable(plot)
     domain, read, world = _read(files)
     notes = [*domain.notes, *read.notes]
     try:
@@ -157,7 +163,7 @@ def _solved(
         names = [engine] if engine else [one.name for one in chosen(problem)]
         with _progress(f"planning with {' and '.join(names)}, {len(problem.actions)} ground actions"):
             try:
-                outcome = await planner.solve(problem, patience.left)
+                outcome = await _cheapest(planner, problem, patience.left)
             finally:
                 await planner.close()
         return problem, replace(outcome, seconds=seconds) if isinstance(outcome, TimedOut) else outcome
@@ -176,6 +182,26 @@ def _why(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, second
         return list(asyncio.run(aside(lambda: why_unsolvable(domain, world, read.goal, patience), patience)))
     except OutOfPatienceError:
         return [f"what is missing was not found out within {seconds:g} s"]
+
+
+async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, seconds: float) -> PlanningOutcome:
+    """The first outcome; where actions have costs, the cheapest plan that comes in some more of the time."""
+    import asyncio
+    import time
+    from contextlib import aclosing, suppress
+
+    from planning.plan import PlanFound
+
+    started = time.monotonic()
+    async with aclosing(planner.plans(problem, seconds)) as plans:
+        best = await anext(plans)
+        if isinstance(best, PlanFound) and "costs" in problem.features:
+            spent = time.monotonic() - started
+            with suppress(TimeoutError):
+                async with asyncio.timeout(min(seconds - spent, max(PATIENT_SECONDS, PATIENCE * spent))):
+                    async for cheaper in plans:
+                        best = cheaper
+    return best
 
 
 def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRace:
@@ -256,6 +282,18 @@ def _purposes(order: PartialOrder) -> dict[str, Any]:
     return {"purposes": purposes}
 
 
+def _refuse_unwritable(file: Path) -> None:
+    """Before any search, and without making the file: there may be no plan to put there."""
+    from knowledge_base.errors import InputError
+
+    if file.is_dir():
+        raise InputError(f"cannot write the plot to '{file}': it is a folder")
+    if not file.parent.is_dir():
+        raise InputError(f"cannot write the plot to '{file}': there is no folder '{file.parent}'")
+    if not os.access(file if file.exists() else file.parent, os.W_OK):
+        raise InputError(f"cannot write the plot to '{file}': it may not be written")
+
+
 def _write_plot(file: Path, plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> None:
     from dsc.text.plots import plot_to_yaml
     from knowledge_base.errors import InputError
@@ -271,7 +309,7 @@ def _write_plot(file: Path, plan: Plan, domain: PlanningDomain, order: PartialOr
 def _text(answer: Mapping[str, Any]) -> str:
     match answer["outcome"]:
         case "plan":
-            return _plan_text(answer) or "nothing to do: the goal already holds"
+            return _plan_text(answer) if answer["steps"] else "nothing to do: the goal already holds"
         case "none_found" | "no_engine":
             reason: str = answer["reason"]
             return reason
@@ -300,7 +338,7 @@ def _plan_text(answer: Mapping[str, Any]) -> str:
             for purpose in answer.get("purposes", {}).get(step, ()):
                 user = f"step {purpose['for']}" if purpose["for"] else "the goal"
                 lines.append(f"      {purpose['fact']} for {user}")
-    return "\n".join(lines)
+    return "\n".join([*lines, f"cost {answer['cost']:g}, engine {answer['engine']}"])
 
 
 def _time_text(start: float, seconds: float) -> str:

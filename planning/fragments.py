@@ -14,6 +14,7 @@ from knowledge_base.errors import InputError, Place
 from knowledge_base.exchange.action_text import ActionText, united
 from knowledge_base.exchange.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.language.typed_list import TypedName
+from knowledge_base.schema import agreed_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -37,14 +38,15 @@ def merged_text(texts: Sequence[DomainText]) -> DomainText:
     """All that the fragments say, under the name of the first.
 
     Raises:
-        SchemaError: two actions of one name differ. (Of declarations, the schema made from it finds that.)
+        SchemaError: two types, constants or actions of one name differ. (Of other declarations, the schema made from
+            it finds that.)
     """
     first = texts[0]
     return DomainText(
         name=first.name,
         requirements=tuple(dict.fromkeys(r for text in texts for r in text.requirements)),
-        types=tuple(name for text in texts for name in text.types),
-        constants=tuple(name for text in texts for name in text.constants),
+        types=agreed_names((text.types for text in texts), "type"),
+        constants=agreed_names((text.constants for text in texts), "constant"),
         predicates=tuple(declared for text in texts for declared in text.predicates),
         functions=tuple(declared for text in texts for declared in text.functions),
         actions=united(action for text in texts for action in text.actions),

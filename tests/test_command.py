@@ -1,6 +1,7 @@
 """The command as people use it: reports, exit status, and one clear line for what they got wrong."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -103,6 +104,43 @@ def test_nothing_people_get_wrong_gives_a_traceback(dsc, tmp_path):
         assert status == 2, (words, out, err)
         assert said in out + err, (words, out, err)
         assert "Traceback" not in out + err
+
+
+def test_bad_input_is_told_to_programs_as_json(dsc, tmp_path):
+    problem = tmp_path / "p.pddl"
+    problem.write_text("(define (problem p) (:domain clean-up-table)\n (:objects red - cupp) (:goal (tidy red)))")
+    wrong = {"outcome": "bad_input", "message": "there is no type 'cupp'", "file": str(problem), "line": 2, "column": 12,
+             "found": "cupp", "nearest": "cup"}  # fmt: skip
+    for words in (["plan", TABLE / "domain.pddl", problem], ["kb", "show", problem, "--domain", TABLE / "domain.pddl"]):
+        status, out, err = dsc(*words, "--json")
+        assert (status, json.loads(out), err) == (2, wrong, "")
+    status, out, err = dsc("run", "clean-up-tabel", "--json")
+    assert (status, json.loads(out)["file"], json.loads(out)["nearest"], err) == (2, None, "clean-up-table", "")
+
+
+def installed(words, out):
+    """The installed command with its output going there: its exit status and what it complains about."""
+    command = [Path(sys.executable).with_name("dsc"), *map(str, words)]
+    done = subprocess.run(command, stdout=out, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    return done.returncode, done.stderr
+
+
+PRINTING = [["doctor"], ["doctor", "--json"], ["run", "clean-up-table", "--json"], ["plan", "none", "none", "--json"]]
+
+
+@pytest.mark.parametrize("words", PRINTING, ids=" ".join)
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
+def test_what_cannot_be_printed_is_one_line_and_a_status(words):
+    with Path("/dev/full").open("w") as full:
+        assert installed(words, full) == (74, "dsc: cannot write: No space left on device\n")
+
+
+@pytest.mark.parametrize("words", PRINTING[1:], ids=" ".join)
+def test_who_reads_no_more_is_not_complained_about(words):
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as pipe:
+        assert installed(words, pipe) == (141, "")
 
 
 def test_usage_errors_are_exit_status_2(dsc):

@@ -94,8 +94,10 @@ def parse_term(text: str | Node, source: str | None = None) -> Term:
 
 
 def _only(text: str | Node, source: str | None, kind: str) -> Node:
-    if not isinstance(text, str):
+    if isinstance(text, Word | Group):
         return text
+    if not isinstance(text, str):
+        raise ParseError(f"a {kind} is written as text, not as {text!r}", place=Place(source))
     nodes = read(text, source)
     if not nodes:
         raise ParseError(f"the text is empty where a {kind} is expected", place=Place(source, 1, 1))

@@ -22,6 +22,7 @@ _TOKEN = re.compile(
     re.DOTALL,
 )
 _HALF = re.compile("[\udc80-\udcff]")  # what a file's other bytes are read as
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 
 
@@ -68,7 +69,8 @@ def read(text: str, source: str | None = None) -> list[Node]:
         source: the name of the file it comes from, for messages.
 
     Raises:
-        ParseError: a parenthesis or quote without its partner, nesting beyond `MAX_DEPTH`, or half a character.
+        ParseError: a parenthesis or quote without its partner, nesting beyond `MAX_DEPTH`, half a character, or a
+            control character in a word.
     """
     stack = [_Open(Place(source, 1, 1))]
     for kind, word, place in _tokens(text, source):
@@ -106,6 +108,8 @@ def _tokens(text: str, source: str | None) -> Iterator[tuple[str, str, Place]]:
 def _word(kind: str, token: str, place: Place) -> Word:
     if _HALF.search(token):
         raise ParseError("this is not UTF-8 text", place=place)
+    if kind == "word" and _CONTROL.search(token):  # it would be invisible in every message
+        raise ParseError(f"'{token}' has a control character", place=place)
     if kind == "word":
         return Word(token, place)
     plain = _ESCAPE.sub(lambda m: "\n" if m[1] == "n" else m[1], token[1:-1])

@@ -59,7 +59,7 @@ def parse_names(nodes: Sequence[Node]) -> list[TypedName]:
     """
     names = parse_typed_list(nodes, perhaps_none=True)
     for name, _types, place in names:
-        if name[:1] in ("?", ":") or name == "" or name in TRUTH_VALUES or is_number(name):
+        if name[:1] in ("?", ":") or name == "" or name in TRUTH_VALUES or is_number(name) or not name.isprintable():
             raise ParseError(f"'{name}' cannot be a name; a name begins with a letter", place=place)
     return names
 

@@ -58,7 +58,7 @@ def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | None]]
 def _program() -> Path:
     package = find_spec("up_fast_downward")
     if package is None or package.origin is None:
-        raise ModuleNotFoundError("Fast Downward is not installed: pip install 'dynamic-state-charts[fast]'")
+        raise ModuleNotFoundError("Fast Downward is not installed: pip install up-fast-downward")
     return Path(package.origin).parent / "downward" / "builds" / "release" / "bin" / "downward"
 
 

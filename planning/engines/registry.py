@@ -37,9 +37,9 @@ class Engine:
         driver: the module of `planning.engines` that runs it, inside the worker process.
         made_by: what the driver makes it of: `module:class` of a unified-planning engine, or a configuration.
         package: the distribution it comes in.
+        at_least: the oldest version of that.
         licence: the engine's own, which may be another than its package's.
         features: what it can do beyond STRIPS, out of `planning.strips.FEATURES`.
-        extra: the extra of this project that installs it; empty for what is always there.
         program: what has to be on the path besides.
         optimal: whether its plans are the cheapest there are.
         anytime: whether it goes on to look for better plans.
@@ -53,9 +53,9 @@ class Engine:
     driver: str
     made_by: str
     package: str
+    at_least: str
     licence: str
     features: frozenset[str] = frozenset()
-    extra: str = ""
     program: str = ""
     optimal: bool = False
     anytime: bool = False
@@ -76,7 +76,7 @@ class Engine:
         """What to do before it can be used; empty if it can be used now."""
         steps = []
         if self.version is None:
-            steps.append(f"pip install '{DISTRIBUTION}{f'[{self.extra}]' if self.extra else ''}'")
+            steps.append(f"pip install '{self.package}>={self.at_least}'")
         if self.program and shutil.which(self.program) is None:
             steps.append(f"put '{self.program}' on the path")
         return ", ".join(steps)
@@ -90,27 +90,27 @@ class Engine:
 # pyperplan on the smallest problem, too; pyperplan greedily takes seconds from about 1,000 ground actions on.
 ENGINES = (
     Engine(
-        "fast-downward", "fast_downward", "first, then better", "up-fast-downward", "GPL-3.0",
-        features=frozenset({"costs"}), extra="fast", anytime=True,
+        "fast-downward", "fast_downward", "first, then better", "up-fast-downward", "1.0", "GPL-3.0",
+        features=frozenset({"costs"}), anytime=True,
     ),
     Engine(
-        "pyperplan", "up", "up_pyperplan.engine:EngineImpl", "up-pyperplan", "GPL-3.0", most_actions=1500,
+        "pyperplan", "up", "up_pyperplan.engine:EngineImpl", "up-pyperplan", "1.1", "GPL-3.0", most_actions=1500,
     ),
     Engine(
-        "enhsp", "up", "up_enhsp.enhsp_planner:ENHSPEngine", "up-enhsp", "GPL-3.0",
-        features=frozenset({"numeric", "costs"}), extra="numeric", program="java", most_actions=300,
+        "enhsp", "up", "up_enhsp.enhsp_planner:ENHSPEngine", "up-enhsp", "0.1.1", "GPL-3.0",
+        features=frozenset({"numeric", "costs"}), program="java", most_actions=300,
     ),
     Engine(
-        "aries", "up", "up_aries.solver:Aries", "up-aries", "MIT",
-        features=frozenset({"durations"}), extra="durations", proves=False, deterministic=False, most_actions=300,
+        "aries", "up", "up_aries.solver:Aries", "up-aries", "0.5", "MIT",
+        features=frozenset({"durations"}), proves=False, deterministic=False, most_actions=300,
     ),
     Engine(
-        "fast-downward-opt", "fast_downward", "optimal", "up-fast-downward", "GPL-3.0",
-        features=frozenset({"costs"}), extra="fast", optimal=True, races=False,
+        "fast-downward-opt", "fast_downward", "optimal", "up-fast-downward", "1.0", "GPL-3.0",
+        features=frozenset({"costs"}), optimal=True, races=False,
     ),
     Engine(
-        "enhsp-opt", "up", "up_enhsp.enhsp_planner:ENHSPOptEngine", "up-enhsp", "GPL-3.0",
-        features=frozenset({"numeric", "costs"}), extra="numeric", program="java", optimal=True, races=False,
+        "enhsp-opt", "up", "up_enhsp.enhsp_planner:ENHSPOptEngine", "up-enhsp", "0.1.1", "GPL-3.0",
+        features=frozenset({"numeric", "costs"}), program="java", optimal=True, races=False,
     ),
 )  # fmt: skip
 

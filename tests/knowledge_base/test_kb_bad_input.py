@@ -18,7 +18,7 @@ from knowledge_base import (
     fact,
 )
 from knowledge_base.exchange.pddl import read_domain, read_problem
-from knowledge_base.language.parser import parse_effect
+from knowledge_base.language.parser import parse_condition, parse_effect
 
 QUESTIONS = [
     # text, kind of error, line:column, nearest name
@@ -45,6 +45,7 @@ QUESTIONS = [
     ("(< 1 1e999)", ParseError, "1:6", None),
     (f"(< 1 {'9' * 5000})", ParseError, "1:6", None),
     ("(heavy ?)", ParseError, "1:8", None),
+    ("(heavy cup\0)", ParseError, "1:8", None),
     ("(annd (quiet))", UnknownNameError, "1:1", "and"),
     ("\n  (heavi cup1)", UnknownNameError, "2:3", "heavy"),
     ("(heavy cup11)", UnknownNameError, "1:8", "cup1"),
@@ -89,6 +90,19 @@ def test_questions(kb, text: str, kind: type[InputError], where: str, nearest: s
     assert str(caught.value.place) == f"<text>:{where}"
     if nearest is not None:
         assert caught.value.nearest == nearest
+
+
+@pytest.mark.parametrize("wrong", [3, None, b"(quiet)", ["quiet"]])
+def test_what_is_no_text_is_no_condition(wrong) -> None:
+    with pytest.raises(ParseError, match="a condition is written as text, not as"):
+        parse_condition(wrong)
+
+
+@pytest.mark.parametrize("name", ["cup\x1b", '"cup\n"'])
+def test_names_have_no_control_characters(name: str) -> None:
+    with pytest.raises(ParseError) as caught:
+        read_domain(f"(define (domain d) (:constants {name}))")
+    assert str(caught.value).startswith("<text>:1:32: 'cup\\")
 
 
 EFFECTS = [

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 import json
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from knowledge_base.errors import InputError
 from planning.cli import doctor_command, plan_command
 from planning.engines import registry
 from planning.engines.registry import ENGINES
-from planning.plan import EngineFailed
+from planning.plan import EngineFailed, PlanFound
 
 PROBLEM = """(define (problem two-cups) (:domain clean-up-table)
   (:objects table - surface  sink - destination  cup1 cup2 - cup)
@@ -43,9 +44,10 @@ def test_the_steps_are_numbered(run):
     result = run()
     assert result.exit_code == 0
     lines = result.stdout.splitlines()
-    assert len(lines) == 5
+    assert len(lines) == 6
     assert lines[0] == "  1 (pick-up cup1 table)"
-    assert lines[-1] == "  5 (throw-away cup2 sink)"
+    assert lines[-2] == "  5 (throw-away cup2 sink)"
+    assert lines[-1] in {"cost 5, engine fast-downward", "cost 5, engine pyperplan"}
 
 
 def test_json_has_outcome_steps_engine_and_seconds(run):
@@ -88,7 +90,7 @@ def test_an_engine_that_cannot_do_the_problem_names_those_that_can(run, tmp_path
 
 def test_an_engine_that_is_not_installed_says_how_to_get_it(run, monkeypatch):
     monkeypatch.setattr("planning.engines.registry.Engine.version", None)
-    with pytest.raises(InputError, match=r"not installed: pip install 'dynamic-state-charts\[fast\]'"):
+    with pytest.raises(InputError, match=r"not installed: pip install 'up-fast-downward>=1\.0'"):
         run("--engine", "fast-downward")
 
 
@@ -96,7 +98,7 @@ def test_without_any_engine_the_command_says_what_could_be_installed(run, monkey
     monkeypatch.setattr("planning.engines.registry.Engine.version", None)
     result = run()
     assert result.exit_code == 4
-    assert "fast-downward could (pip install 'dynamic-state-charts[fast]')" in result.stderr
+    assert "fast-downward could (pip install 'up-fast-downward>=1.0')" in result.stderr
 
 
 def test_a_domain_may_come_in_fragments(run, tmp_path, domain_file):
@@ -114,7 +116,7 @@ def test_each_step_says_what_it_is_for(run):
     lines = run("--explain").stdout.splitlines()
     assert lines[0] == "  1 (pick-up cup1 table)"
     assert lines[1].split() == ["(holding", "cup1)", "for", "step", "2"]
-    assert lines[-1].split() == ["(tidy", "cup2)", "for", "the", "goal"]
+    assert lines[-2].split() == ["(tidy", "cup2)", "for", "the", "goal"]
 
 
 TWO_LIGHTS = """(define (problem two) (:domain lights) (:objects a b - lamp) (:init (off a) (off b))
@@ -140,8 +142,19 @@ def test_the_plan_can_be_written_as_a_plot(run, tmp_path):
         "(pick-up cup1 table)",
         "(stack cup1 cup2 one none table)",
     ]
-    with pytest.raises(InputError, match="cannot write the plot"):
+
+
+def test_a_place_where_no_plot_can_be_written_is_refused_before_any_search(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("planning.engines.race.PlannerRace", None)
+    with pytest.raises(InputError, match=r"cannot write the plot to .*there is no folder '.*nowhere'"):
         run("--plot", str(tmp_path / "nowhere" / "plan.yaml"))
+    with pytest.raises(InputError, match=r"cannot write the plot to .*it is a folder"):
+        run("--plot", str(tmp_path))
+
+
+def test_without_a_plan_no_plot_is_written(run, tmp_path):
+    assert run("--plot", str(tmp_path / "plan.yaml"), "--seconds", "0").exit_code == 3
+    assert not (tmp_path / "plan.yaml").exists()
 
 
 def test_the_doctor_lists_every_engine_with_what_it_can_do_and_what_it_lacks(monkeypatch):
@@ -195,8 +208,8 @@ def test_no_time_is_out_of_time(run):
 
 def test_a_failed_engine_has_a_status_of_its_own(run, monkeypatch):
     class Broken:
-        async def solve(self, problem, seconds):
-            return EngineFailed("pyperplan", "it fell over")
+        async def plans(self, problem, seconds):
+            yield EngineFailed("pyperplan", "it fell over")
 
         async def close(self):
             pass
@@ -205,6 +218,49 @@ def test_a_failed_engine_has_a_status_of_its_own(run, monkeypatch):
     result = run()
     assert result.exit_code == 4
     assert "it fell over" in result.stderr
+
+
+TOLLS = """(define (domain tolls) (:types place) (:predicates (at ?p - place) (road ?a ?b - place))
+  (:functions (total-cost) (toll ?a ?b - place))
+  (:action drive :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
+    :effect (and (not (at ?a)) (at ?b) (increase (total-cost) (toll ?a ?b)))))"""
+ROUND = """(define (problem round) (:domain tolls) (:objects a b c - place)
+  (:init (at a) (road a c) (road a b) (road b c) (= (toll a c) 10) (= (toll a b) 3) (= (toll b c) 3)) (:goal (at c))
+  )"""
+
+
+class Anytime:
+    """Finds the direct way at once, then the one round the corner, and then goes on searching until it is stopped."""
+
+    stopped = False
+
+    async def plans(self, problem, seconds):
+        named = {str(action.step): number for number, action in enumerate(problem.actions)}
+        ways = (["(drive a c)"], ["(drive a b)", "(drive b c)"])
+        try:
+            for way in ways:
+                numbers = [named[step] for step in way]
+                yield PlanFound(problem.plan(numbers), "anytime", 0.0, 0.0, cost=problem.cost(numbers))
+            await asyncio.get_running_loop().create_future()
+        finally:
+            Anytime.stopped = True
+
+    async def close(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("function", "steps", "cost"),
+    [("total-cost", 2, "cost 6, engine anytime"), ("driven", 1, "cost 1, engine anytime")],
+)
+def test_where_actions_have_costs_a_cheaper_plan_is_waited_for(run, tmp_path, monkeypatch, function, steps, cost):
+    monkeypatch.setattr("planning.engines.race.PlannerRace", Anytime)
+    monkeypatch.setattr("planning.cli.PATIENT_SECONDS", 0.05)
+    monkeypatch.setattr(Anytime, "stopped", False)
+    (tmp_path / "tolls.pddl").write_text(TOLLS.replace("total-cost", function))
+    lines = run(problem=ROUND, domains=[tmp_path / "tolls.pddl"]).stdout.splitlines()
+    assert (len(lines) - 1, lines[-1]) == (steps, cost)
+    assert Anytime.stopped
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+from importlib.metadata import requires
 
 import pytest
 from fake_engines import HANGING, PROBLEM, READY, answering, descendants, gone, lights_out
@@ -15,6 +16,7 @@ from fake_engines import HANGING, PROBLEM, READY, answering, descendants, gone, 
 from knowledge_base.facts import Fact
 from knowledge_base.language.parser import parse_condition
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
+from planning.engines.registry import DISTRIBUTION, ENGINES
 from planning.plan import PlanStep
 from planning.posing.problem import pose
 from planning.strips import GroundAction, Problem
@@ -250,3 +252,8 @@ def test_what_is_said_before_the_end_is_heard_in_order(scripted):
     heard = []
     process.ask(PROBLEM.to_json(), Deadline(60), heard.append)
     assert heard == [{"actions": [1]}, {"actions": [2]}]
+
+
+def test_a_missing_engine_is_installed_by_what_this_project_itself_asks_for():
+    asked = {one.split(";")[0].strip() for one in requires(DISTRIBUTION)}
+    assert {f"{one.package}>={one.at_least}" for one in ENGINES} <= asked

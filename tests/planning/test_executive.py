@@ -422,7 +422,13 @@ def test_the_plots_of_an_action_agree_on_who_reports_its_effects():
 
 
 @pytest.mark.parametrize(
-    ("goal", "said"), [("(onn a)", "did you mean 'on'"), ("(on b)", "no object 'b'"), ("(on ?x)", "not bound")]
+    ("goal", "said"),
+    [
+        ("(onn a)", "did you mean 'on'"),
+        ("(on b)", "no object 'b'"),
+        ("(on ?x)", "not bound"),
+        (3, "written as text, not as 3"),
+    ],
 )
 def test_a_goal_with_a_mistake_is_refused_before_anything_runs(goal, said):
     robot, _ = executive(Answers(), lamps=("a",))

@@ -68,6 +68,9 @@ def test_a_name_in_no_piece_is_told_with_all_files(files):
 
 CONFLICTS = [
     ("(:types cup - place)", "(:types cup - item)", "cup - place", "cup - item"),
+    ("(:types cup)", "(:types cup - item)", "cup - object", "cup - item"),
+    ("(:types cup - item)", "(:types cup)", "cup - item", "cup - object"),
+    ("(:constants home)", "(:constants home - place)", "home - object", "home - place"),
     ("(:constants home - item)", "(:constants home - place)", "home - item", "home - place"),
     ("(:predicates (at ?i - item))", "(:predicates (at ?i ?p - item))", "(at ?i - item)", "(at ?i - item ?p - item)"),
     ("(:functions (f))", "(:functions (f ?x))", "(f)", "(f ?x - object)"),
@@ -98,6 +101,17 @@ def test_a_conflict_names_both_places_and_what_differs(files, first, second, bef
     assert caught.value.place.line == 2
     assert "a.pddl:3:" in said
     assert said.index(before) < said.index(here)
+
+
+def test_what_a_piece_only_uses_another_may_say_more_about():
+    use = "(define (domain use) (:types cup - item) (:predicates (clean ?i - item)))"
+    for pieces in ([use, "(define (domain b) (:types item - thing thing))"], [use, use]):
+        assert PlanningDomain.from_fragments(pieces).schema.is_a("cup", "item")
+
+
+def test_one_piece_may_say_object_and_then_more():
+    wild = "(define (domain wild) (:types cup item - object cup - item))"
+    assert PlanningDomain.from_fragments([wild, wild]).schema.ancestors("cup") == ("cup", "item", "object")
 
 
 def test_a_predicate_of_one_piece_and_a_function_of_another(files):
