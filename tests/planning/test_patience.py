@@ -86,9 +86,9 @@ def test_what_the_work_raises_comes_to_the_one_who_waits():
 class Idle(Component):
     name = "idle"
 
-    @skill(outcomes={"done": {}})
+    @skill(outcomes={"acted": {}})
     async def act(self, call: SkillCall) -> Outcome:
-        return Outcome("done")
+        return Outcome("acted")
 
 
 WORKING = """
