@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sqlite3
 import time as wall
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import get_ident
+from threading import RLock, get_ident
 from types import TracebackType
 from typing import Self
 
@@ -54,6 +55,7 @@ class KnowledgeBase(Observable):
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
+        self._turn = RLock()  # to change something; taken before the lock, which those who ask need too
 
     @classmethod
     def open(
@@ -164,7 +166,7 @@ class KnowledgeBase(Observable):
             StoreError: the file cannot be written; nothing was changed.
         """
         try:
-            with self._lock:
+            with self._turn, self._lock:
                 self._refuse_nesting()
                 first = self._first(key, expect)
                 transaction = Transaction(Overlay(self._state), self._questions, first)
@@ -201,7 +203,7 @@ class KnowledgeBase(Observable):
             ConflictError: the version is not the expected one, or this thread is inside a transaction.
             StoreError: the file cannot be written; nothing was changed.
         """
-        with self._lock:
+        with self._turn, self._lock:
             self._refuse_nesting()
             change = self._first(key, expect)
             if change is None:
@@ -210,6 +212,25 @@ class KnowledgeBase(Observable):
                 change = self._commit(pending.delta, author, key, along)
         self._announcer.deliver()
         return change
+
+    @contextmanager
+    def together(self) -> Iterator[sqlite3.Connection]:
+        """What is committed inside the block is written to the file as one, together with what the block itself writes.
+
+        Each change is a version of its own, and is seen and announced at once, as always; nobody may count on
+        it before the block is left. Other threads that change something wait until then.
+
+        Yields the connection; whoever writes with it neither commits nor rolls back.
+
+        Raises:
+            StoreError: there is no file, or it cannot be written. What is in memory is then ahead of it: every
+                further change is refused, and the file, opened anew, has what was before the block.
+            ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
+        """
+        with self._turn:
+            self._refuse_nesting()
+            with self._history.together() as connection:
+                yield connection
 
     def bind_source(self, function: str, *args: Value, reference: str) -> Source:
         """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
@@ -278,7 +299,7 @@ class KnowledgeBase(Observable):
             HistoryError: that version is not kept any more or not there yet.
             StoreError: the file cannot be written.
         """
-        with self._lock:
+        with self._turn, self._lock:
             version = self._version if keep_since is None else keep_since
             self._require_reached(version)
             self._history.compact(version, self._present)
