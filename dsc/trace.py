@@ -39,18 +39,29 @@ class Record:
         head = {"seq": self.seq, "t": round(self.t, 6), "type": self.type, "cause": self.cause}
         return json.dumps({**head, **self.data}, ensure_ascii=False)
 
+    @staticmethod
+    def from_line(line: str) -> Record:
+        """The inverse of `to_line`, as far as the time is written."""
+        data = json.loads(line)
+        return Record(data.pop("seq"), data.pop("t"), data.pop("type"), data.pop("cause"), data)
+
 
 Listener = Callable[[Record], None]
 """Is told every record as it happens; must not block."""
 
 
 class Trace:
-    """Numbers records and hands them to listeners; keeps none itself."""
+    """Numbers records and hands them to listeners; keeps none itself.
 
-    def __init__(self, now: Callable[[], float]) -> None:
+    Args:
+        now: tells the seconds of run time.
+        last: number of the last record there is already, of a run that is taken up again.
+    """
+
+    def __init__(self, now: Callable[[], float], last: int = 0) -> None:
         self._now = now
         self._listeners: list[Listener] = []
-        self._seq = 0
+        self._seq = last
         self.cause: int | None = None
 
     @property

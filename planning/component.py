@@ -6,13 +6,13 @@ import asyncio
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from dsc.sequencer.sequencer import CHART
+from dsc.sequencer.reactor import CHART
 from dsc.skills import Component, Outcome, SkillCall, skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition
 from planning.explain import why_unsolvable
-from planning.plan import Plan, PlanFound, ProvenUnsolvable, TimedOut
+from planning.plan import Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.plot import plot_from_plan
 from planning.problem import pose
 from planning.validation import validate
@@ -86,6 +86,21 @@ class PlanningComponent(Component):
         self._running: dict[str, _Running] = {}
         self._plans = 0
 
+    def remember(self) -> Any:
+        """The plans that are on their way, and how many there were."""
+        running = {
+            name: {"goal": str(one.goal), "steps": [[step.action, *step.args] for step in one.plan.steps]}
+            for name, one in self._running.items()
+        }
+        return {"plans": self._plans, "running": running}
+
+    def recall(self, memory: Any) -> None:
+        """The inverse of `remember`; how far each plan is, its parameter says."""
+        self._plans = memory["plans"]
+        for name, kept in memory["running"].items():
+            plan = Plan(tuple(PlanStep(action, tuple(args)) for action, *args in kept["steps"]))
+            self._running[name] = _Running(plan, parse_condition(kept["goal"]))
+
     async def configure(self, parameter: str, value: Any) -> None:
         """The plan named `parameter` begins step number `value`; what earlier steps did is judged at this moment."""
         await super().configure(parameter, value)
@@ -99,7 +114,8 @@ class PlanningComponent(Component):
             "plan_found": {"plot": "plot", "name": "symbol", "steps": "number"},
             "goal_holds": {},
             "no_plan": {"reason": "text", "kind": "symbol"},
-        }
+        },
+        after_crash="repeat",
     )
     async def plan(self, call: SkillCall, goal: str, holder: str, seconds: float) -> Outcome:
         """Find a plan for the goal and make a plot of it.
@@ -115,7 +131,7 @@ class PlanningComponent(Component):
         except InputError as error:
             return self._none("failed", str(error))
 
-    @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}})
+    @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}}, after_crash="repeat")
     async def judge(self, call: SkillCall, goal: str) -> Outcome:  # noqa: ARG002
         """Say whether the goal holds, and if not, which part of it is missing."""
         try:
@@ -124,7 +140,7 @@ class PlanningComponent(Component):
             return Outcome("goal_open", {"reason": str(error)})
         return Outcome("goal_holds") if why.truth else Outcome("goal_open", {"reason": str(why.deciding)})
 
-    @skill(outcomes={"plan_invalid": {"reason": "text", "author": "symbol"}})
+    @skill(outcomes={"plan_invalid": {"reason": "text", "author": "symbol"}}, after_crash="repeat")
     async def monitor(self, call: SkillCall, plan: str) -> Outcome:
         """Watch the plan of that name being carried out; ends when the rest of it no longer leads to the goal.
 
@@ -140,7 +156,8 @@ class PlanningComponent(Component):
                 self._judge_plan(running, change.author)
 
         unsubscribe = self._knowledge.subscribe(judge_change)
-        self._judge_plan(running, "earlier")  # the world went on between the search and now
+        if not call.resumed:  # else a step is under way, which is judged when it has ended
+            self._judge_plan(running, "earlier")  # the world went on between the search and now
         try:
             return await running.broken
         finally:

@@ -33,6 +33,11 @@ class PlanningAction:
     effect: Effect
     place: Place | None = field(default=None, compare=False, repr=False)
 
+    def __str__(self) -> str:
+        """What it takes, needs and does, in PDDL."""
+        parameters = " ".join(map(str, self.parameters))
+        return f"({self.name} ({parameters}) {self.precondition} {self.effect})"
+
 
 @dataclass(frozen=True, slots=True)
 class PlanningDomain:

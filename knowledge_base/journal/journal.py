@@ -59,7 +59,7 @@ class Journal(Archive):
             raise _no_schema(path)
         self._place = Place(str(path))
         self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
-        self._grouped = False  # whether appends are parts of a transaction that is open
+        self._grouped = self._appended = False  # whether appends are parts of an open transaction; whether any was made
         self._behind: StoreError | None = None  # why the file lacks what the world in memory has
         self._writers = WriterLock(path)
         try:
@@ -100,15 +100,15 @@ class Journal(Archive):
         self._require_abreast()
         try:
             with self._transaction() as connection:
-                self._grouped = True
+                self._grouped, self._appended = True, False
                 try:
                     yield connection
                 finally:
                     self._grouped = False
                 self._require_abreast()  # a part that failed takes all others with it
         except BaseException as error:
-            why = error if isinstance(error, StoreError) else StoreError(str(error), place=self._place)
-            self._behind = self._behind or why
+            if self._appended and self._behind is None:
+                self._behind = error if isinstance(error, StoreError) else StoreError(str(error))
             raise
 
     def first(self, key: str) -> Change | None:
@@ -196,6 +196,7 @@ class Journal(Archive):
             with self._transaction() as connection:
                 yield connection
             return
+        self._appended = True
         try:
             with reported(self._path, "write"):
                 yield self._connection
