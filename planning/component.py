@@ -11,6 +11,7 @@ from dsc.skills import Component, Outcome, SkillCall, skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.printer import to_text
 from planning.explain import why_unsolvable
 from planning.plan import Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.plot import plot_from_plan
@@ -89,7 +90,7 @@ class PlanningComponent(Component):
     def remember(self) -> Any:
         """The plans that are on their way, and how many there were."""
         running = {
-            name: {"goal": str(one.goal), "steps": [[step.action, *step.args] for step in one.plan.steps]}
+            name: {"goal": to_text(one.goal), "steps": [[step.action, *step.args] for step in one.plan.steps]}
             for name, one in self._running.items()
         }
         return {"plans": self._plans, "running": running}

@@ -12,6 +12,7 @@ from knowledge_base.exchange.files import read_text
 from knowledge_base.language.check import check, check_effect, check_parameters
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
 from knowledge_base.language.expression import And, Atom, Constant, Expression, Or, TypedVariable, substitute
+from knowledge_base.language.printer import to_text, variables_text
 from knowledge_base.schema import ROOT_TYPE, Schema
 
 if TYPE_CHECKING:
@@ -35,8 +36,7 @@ class PlanningAction:
 
     def __str__(self) -> str:
         """What it takes, needs and does, in PDDL."""
-        parameters = " ".join(map(str, self.parameters))
-        return f"({self.name} ({parameters}) {self.precondition} {self.effect})"
+        return f"({self.name} ({variables_text(self.parameters)}) {to_text(self.precondition)} {to_text(self.effect)})"
 
 
 @dataclass(frozen=True, slots=True)

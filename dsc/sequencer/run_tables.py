@@ -134,9 +134,18 @@ def archive(path: Path) -> Iterator[RunArchive]:
         StoreError: the file is not there, not a store, or cannot be read.
     """
     with reading(path) as connection:
-        if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'runs'").fetchone():
+        if not _has_tables(connection):
             raise StoreError("no run was ever kept in this store", place=Place(str(path)))
         yield RunArchive(connection, path)
+
+
+def has_run(path: Path) -> bool:
+    """Whether a run was begun in that file; raises `StoreError` if it is there and no store."""
+    if not path.exists():
+        return False
+    with reading(path) as connection:
+        runs = RunArchive(connection, path)
+        return _has_tables(connection) and bool(runs.runs())
 
 
 def unfinished(runs: RunArchive) -> RunRow:
@@ -145,6 +154,10 @@ def unfinished(runs: RunArchive) -> RunRow:
         if run.ended is None:
             return run
     raise StoreError("there is no unfinished run in this store", place=Place(str(runs.path)))
+
+
+def _has_tables(connection: sqlite3.Connection) -> bool:
+    return connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'runs'").fetchone() is not None
 
 
 def _run(row: Any) -> RunRow:
