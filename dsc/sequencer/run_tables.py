@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dsc.engine.steps import Start
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.file import reading
@@ -117,6 +118,11 @@ class RunArchive:
                 number, time, before, version, json.loads(message), tuple(configuration.split()),
                 tuple([Record.from_line(line) for line in records.splitlines()]),
             )  # fmt: skip
+
+    def under_way(self) -> list[tuple[Start, float]]:
+        """The skills of the unfinished run that have not ended, with the second at which they were started."""
+        rows = self.connection.execute("SELECT what, at FROM pending WHERE kind = 'Start' ORDER BY place")
+        return [(Start(**json.loads(what)), since) for what, since in rows]
 
     def form(self, digest: str) -> Any:
         """The plot of that hash, as data; always the same object."""
