@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check conformance soak kill-kb soak-kb bench-startup bench-broken bench-engine pictures clean
+.PHONY: help demo test check conformance soak kill-kb kill-runs soak-kb bench-startup bench-broken bench-engine pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -43,6 +43,9 @@ soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every re
 
 kill-kb: $(VENV)/.test   ## kill -9 a process that writes a store, for each durability: is all that it acknowledged there? (KILLS=N)
 	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/test_kb_kill.py
+
+kill-runs: $(VENV)/.test   ## kill -9 runs of the clean-up table and resume them: do they end like runs never killed? (KILLS=N)
+	KILLS=$(or $(KILLS),50) $(BIN)/python -m pytest tests/domains/test_kill_runs.py
 
 soak-kb: $(VENV)/.test   ## four threads and an event loop change, ask and watch one knowledge base at once (SECONDS=N)
 	$(BIN)/python tests/knowledge_base/kb_soak.py $(or $(SECONDS),30)
