@@ -56,14 +56,15 @@ class SkillCall:
         action_id: names this execution; stable across restarts, never used for another one.
         clock: the only time a skill may use.
         report: hands over an intermediate event while the skill goes on (e.g. progress, a perception).
-        resumed: the action was under way before a restart. Its clock begins again when it was started, and what
-            it reported then is not heard twice: a skill that acts once for an id may simply go the same way.
+
+    When a run is resumed after a crash, a call may come again with the same id. Its clock then begins when the
+    action was started, and what was reported before is not heard twice: a skill that acts once for an id simply
+    goes the same way.
     """
 
     action_id: str
     clock: Clock
     report: Callable[[Outcome], None]
-    resumed: bool = False
 
 
 class Status(Enum):
@@ -188,11 +189,16 @@ class Component:
         return Status.UNKNOWN
 
     def remember(self) -> Any:
-        """Plain data to be kept with each final answer, for `recall` after a restart; `None` keeps nothing."""
+        """Plain data to be kept, for `recall` after a restart; asked with each macrostep that is committed."""
         return None
 
     def recall(self, memory: Any) -> None:
         """Be as when `memory` was kept; called before anything else after a restart."""
+
+    @property
+    def remembers(self) -> bool:
+        """Whether there is anything to remember: most components are not asked again and again."""
+        return type(self).remember is not Component.remember
 
 
 @cache

@@ -35,16 +35,29 @@ _CUT_SHORT = {"reproducible": False}
 
 MAX_ATTEMPTS = 3
 """How often to plan anew because the world changed while the planner worked."""
+MOST_REMEMBERED = 16
+"""Of the plans that are of no use any more, and of the names that were given, as many are remembered: somebody may
+still have to hear of them after a restart."""
 
 
 @dataclass(slots=True)
 class _Running:
-    """A plan on its way: the step that is at work, and who waits to hear that the rest is of no use."""
+    """A plan on its way.
+
+    Attributes:
+        plan, goal: what is to be done, and for what.
+        step: the one that is at work.
+        watched: whether it has been judged since it was found.
+        verdict: why the rest is of no use, and whose change made it so.
+        broken: who waits to hear that.
+    """
 
     plan: Plan
     goal: Expression
     step: int = 1
-    broken: asyncio.Future[Outcome] | None = None
+    watched: bool = False
+    verdict: tuple[str, str] | None = None
+    broken: asyncio.Future[None] | None = None
 
 
 class PlanningComponent(Component):
@@ -86,21 +99,28 @@ class PlanningComponent(Component):
         self._working_for = working_for
         self._running: dict[str, _Running] = {}
         self._plans = 0
+        self._names: dict[str, str] = {}  # of plans, by the action that found them: after a restart it finds it again
 
     def remember(self) -> Any:
-        """The plans that are on their way, and how many there were."""
+        """The plans that are on their way, and what they are named."""
         running = {
-            name: {"goal": to_text(one.goal), "steps": [[step.action, *step.args] for step in one.plan.steps]}
+            name: {
+                "goal": to_text(one.goal),
+                "steps": [[step.action, *step.args] for step in one.plan.steps],
+                "watched": one.watched,
+                "verdict": one.verdict,
+            }
             for name, one in self._running.items()
         }
-        return {"plans": self._plans, "running": running}
+        return {"plans": self._plans, "names": self._names, "running": running}
 
     def recall(self, memory: Any) -> None:
         """The inverse of `remember`; how far each plan is, its parameter says."""
-        self._plans = memory["plans"]
+        self._plans, self._names = memory["plans"], memory["names"]
         for name, kept in memory["running"].items():
             plan = Plan(tuple(PlanStep(action, tuple(args)) for action, *args in kept["steps"]))
-            self._running[name] = _Running(plan, parse_condition(kept["goal"]))
+            verdict = tuple(kept["verdict"]) if kept["verdict"] else None
+            self._running[name] = _Running(plan, parse_condition(kept["goal"]), 1, kept["watched"], verdict)
 
     async def configure(self, parameter: str, value: Any) -> None:
         """The plan named `parameter` begins step number `value`; what earlier steps did is judged at this moment."""
@@ -151,19 +171,25 @@ class PlanningComponent(Component):
         if running is None:
             raise UnknownNameError(f"there is no plan '{plan}'", found=plan, valid=self._running)
         running.broken = asyncio.get_running_loop().create_future()
+        if running.verdict is not None:
+            return _invalid(*running.verdict)
 
         def judge_change(change: Change) -> None:
             if change.author != CHART and change.author not in self._working_for(call.action_id):
                 self._judge_plan(running, change.author)
 
         unsubscribe = self._knowledge.subscribe(judge_change)
-        if not call.resumed:  # else a step is under way, which is judged when it has ended
+        if not running.watched:  # after a restart a step may be half done, which is judged when it has ended
+            running.watched = True
             self._judge_plan(running, "earlier")  # the world went on between the search and now
         try:
-            return await running.broken
+            await running.broken
+        except asyncio.CancelledError:
+            self._running.pop(plan, None)
+            raise
         finally:
             unsubscribe()
-            self._running.pop(plan, None)
+        return _invalid(*running.verdict or ("", ""))
 
     async def _search(self, call: SkillCall, goal: Expression, holder: str, seconds: float) -> Outcome:
         for _ in range(MAX_ATTEMPTS):
@@ -184,15 +210,14 @@ class PlanningComponent(Component):
                 await call.clock.sleep(answer.simulated_seconds)
             verdict = validate(answer.plan, self._domain, self._knowledge, goal)
             if verdict.valid:
-                return self._found(answer, goal, holder)
+                return self._found(call.action_id, answer, goal, holder)
             if version == self._knowledge.version:
                 return self._none("failed", f"the plan found does not lead to the goal: {verdict.why}")
         return self._none("failed", f"the world changes faster than plans are made: {verdict.why}")
 
-    def _found(self, answer: PlanFound, goal: Expression, holder: str) -> Outcome:
-        self._plans += 1
+    def _found(self, action_id: str, answer: PlanFound, goal: Expression, holder: str) -> Outcome:
         rules = self._library.plot(holder).rules if holder in self._library else ()
-        name = f"plan_{self._plans}"
+        name = self._name(action_id)
         plot = plot_from_plan(answer.plan, self._domain, self._library, rules, name)
         self._running[name] = _Running(answer.plan, goal)
         steps = [str(step) for step in answer.plan.steps]
@@ -200,15 +225,30 @@ class PlanningComponent(Component):
         self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine, **limit)
         return Outcome("plan_found", {"plot": plot.to_form(), "name": name, "steps": len(steps)})
 
+    def _name(self, action_id: str) -> str:
+        """A name for the plan that this action has found; old ones are forgotten."""
+        if action_id not in self._names:
+            self._plans += 1
+            self._names[action_id] = f"plan_{self._plans}"
+            judged = [plan for plan, one in self._running.items() if one.verdict is not None]
+            for plan in judged[:-MOST_REMEMBERED]:
+                del self._running[plan]
+            for action in list(self._names)[:-MOST_REMEMBERED]:
+                del self._names[action]
+        return self._names[action_id]
+
     def _none(self, kind: str, reason: str) -> Outcome:
         self._trace.record("plan.none", kind=kind, reason=reason, **(_CUT_SHORT if kind == "timed_out" else {}))
         return Outcome("no_plan", {"reason": reason, "kind": kind})
 
     def _judge_plan(self, running: _Running, author: str) -> None:
-        why = None if running.broken is None or running.broken.done() else self._why_broken(running)
-        if why is not None and running.broken is not None:
+        if running.broken is None or running.verdict is not None:
+            return
+        why = self._why_broken(running)
+        if why is not None:
             self._trace.record("plan.broken", reason=why, author=author, step=running.step)
-            running.broken.set_result(Outcome("plan_invalid", {"reason": why, "author": author}))
+            running.verdict = why, author
+            running.broken.set_result(None)
 
     def _why_broken(self, running: _Running) -> str | None:
         """Why what is left of the plan no longer leads to the goal; the step at work may be half done."""
@@ -217,3 +257,7 @@ class PlanningComponent(Component):
         if whole.valid or validate(Plan(left[1:]), self._domain, self._knowledge, running.goal).valid:
             return None
         return whole.why
+
+
+def _invalid(reason: str, author: str) -> Outcome:
+    return Outcome("plan_invalid", {"reason": reason, "author": author})

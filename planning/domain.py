@@ -36,7 +36,7 @@ class PlanningAction:
 
     def __str__(self) -> str:
         """What it takes, needs and does, in PDDL."""
-        return f"({self.name} ({variables_text(self.parameters)}) {to_text(self.precondition)} {to_text(self.effect)})"
+        return f"({self.name} {variables_text(self.parameters)} {to_text(self.precondition)} {to_text(self.effect)})"
 
 
 @dataclass(frozen=True, slots=True)

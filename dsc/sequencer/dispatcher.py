@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,6 +108,12 @@ class Dispatcher:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
 
+    def memories(self) -> Iterator[tuple[str, Any]]:
+        """What components have to remember, by their names."""
+        for component in self._components.values():
+            if component.remembers:
+                yield component.name, component.remember()
+
     def settle(self, start: Start) -> None:
         """The final answer of a skill has been taken; until then its component counts as busy."""
         self._running.pop(start.action_id, None)
@@ -182,9 +188,8 @@ class Dispatcher:
             elif start.action_id in self._running:
                 self._post(SkillMessage(start, _declared(component, start, outcome), final=False))
 
-        if earlier is None:
-            return SkillCall(start.action_id, self._clock, report)
-        return SkillCall(start.action_id, PastClock(self._clock, earlier.began), report, resumed=earlier.underway)
+        clock = PastClock(self._clock, earlier.began) if earlier else self._clock
+        return SkillCall(start.action_id, clock, report)
 
     async def _outcome(self, component: Component, start: Start, earlier: Earlier | None) -> Outcome:
         call = self._call(component, start, earlier)

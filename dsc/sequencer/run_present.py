@@ -46,6 +46,7 @@ class Present:
         self._root: FrameState | None = None
         self._frames: dict[int, FrameState] = {}
         self._machine = ""
+        self._memory: dict[str, str] = {}
 
     def clear(self, connection: sqlite3.Connection) -> None:
         """A new run begins."""
@@ -75,8 +76,11 @@ class Present:
             self._machine = text
 
     def memory(self, connection: sqlite3.Connection, component: str, memory: Any) -> None:
-        """Write what a component has to remember."""
-        connection.execute("INSERT OR REPLACE INTO memory VALUES (?, ?)", (component, text_of(memory)))
+        """Write what a component has to remember, if it is not what it was."""
+        text = text_of(memory)
+        if self._memory.get(component) != text:
+            connection.execute("INSERT OR REPLACE INTO memory VALUES (?, ?)", (component, text))
+            self._memory[component] = text
 
     def taken(self, connection: sqlite3.Connection, message: Message) -> None:
         """What came is awaited no longer."""

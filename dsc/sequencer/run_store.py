@@ -19,9 +19,6 @@ from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
 
-Memory = tuple[str, Any]
-"""A component's name and what it has to remember."""
-
 _STEP = "INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
 _BEGIN = "INSERT INTO runs (plot, arguments, version, header, plots, domain) VALUES (?, ?, ?, ?, ?, ?)"
 _MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE run = ? AND number = ?"
@@ -117,7 +114,6 @@ class RunStore:
         message: Message | None,
         output: Iterable[Output],
         reactor: Reactor,
-        memory: Memory | None = None,
     ) -> None:
         """A macrostep; `message` is `None` for the first, in which the plot was started, and for leaving it.
 
@@ -126,7 +122,6 @@ class RunStore:
             message: what was taken.
             output: what is to be carried out after the commit.
             reactor: after it.
-            memory: of the component that answered.
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
@@ -139,8 +134,10 @@ class RunStore:
         if message is not None:
             self._present.taken(self._connection, message)
         self._present.asked(self._connection, output, self._number, now, reactor)
-        if memory is not None:
-            self._present.memory(self._connection, *memory)
+
+    def memory(self, component: str, memory: Any) -> None:
+        """What a component has to remember."""
+        self._present.memory(self._connection, component, memory)
 
     def end(self, *, finished: bool, problem: str | None) -> None:
         """The run is over."""

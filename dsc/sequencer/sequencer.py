@@ -17,7 +17,7 @@ from dsc.sequencer.dispatcher import Dispatcher, SkillMessage
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.run_forms import Kept, Pending
-from dsc.sequencer.run_store import Memory, RunStore
+from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.taking_up import Earlier
 from dsc.skills import Component
 from dsc.trace import Trace
@@ -205,17 +205,17 @@ class Sequencer:
             await self.dispatcher.configured()
             for one in older:
                 if not isinstance(one.what, SetParameter | SwitchMode):
-                    self._await_again(one, underway=True)
+                    self._await_again(one)
             await asyncio.sleep(0)  # until these have begun
             for one in kept.pending[len(older) :]:
-                self._await_again(one, underway=False)
+                self._await_again(one)
         except InputError as error:
             self._reactor.problem = str(error)
 
-    def _await_again(self, one: Pending, *, underway: bool) -> None:
+    def _await_again(self, one: Pending) -> None:
         match one.what:
             case Start():
-                self.dispatcher.take_up(one.what, Earlier(one.at, one.reports, underway=underway))
+                self.dispatcher.take_up(one.what, Earlier(one.at, one.reports))
             case StartTimer():
                 self.dispatcher.start_timer(one.what, one.at)
             case SendLater():
@@ -249,7 +249,9 @@ class Sequencer:
         else:
             with self._store.writing():
                 output = self._reactor.react(message)
-                self._store.step(self._clock.now(), message, output, self._reactor, self._memory(message))
+                self._store.step(self._clock.now(), message, output, self._reactor)
+                for component, memory in self.dispatcher.memories():
+                    self._store.memory(component, memory)
         if isinstance(message, SkillMessage) and message.final:
             self.dispatcher.settle(message.start)
         self._carry_out(output)
@@ -272,13 +274,6 @@ class Sequencer:
                 self.dispatcher.dispatch(one)
         except InputError as error:
             self._reactor.problem = str(error)
-
-    def _memory(self, message: Message) -> Memory | None:
-        """What a component has to remember is kept together with what it answered."""
-        if not isinstance(message, SkillMessage):
-            return None
-        remembered = self.dispatcher.component(message.start.component).remember()
-        return None if remembered is None else (message.start.component, remembered)
 
     # -- from outside ------------------------------------------------------------------------------------
 

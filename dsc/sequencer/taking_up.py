@@ -17,12 +17,10 @@ class Earlier:
     Attributes:
         began: second of run time at which it was started.
         reports: how many intermediate events of it have been taken.
-        underway: whether it has surely left: it was not asked for by the very last macrostep.
     """
 
     began: float
     reports: int
-    underway: bool
 
 
 class PastClock:
