@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check conformance soak kill-kb kill-runs soak-kb bench-startup bench-broken bench-engine pictures clean
+.PHONY: help demo test check conformance soak kill-kb kill-runs soak-kb bench-startup bench-broken bench-engine bench-run pictures clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -58,6 +58,9 @@ bench-broken: $(VENV)/.run   ## how long the error in a broken plot takes, media
 
 bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this engine, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/engine.py $(if $(WRITE),--write)
+
+bench-run: $(VENV)/.run   ## what a macrostep costs without a store and with one, as ratios to the engine and to a bare commit
+	$(BIN)/python benchmarks/run_store.py
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg
