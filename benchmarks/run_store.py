@@ -1,8 +1,9 @@
 """What a macrostep costs a running chart, without a store and with one, as ratios.
 
-`python benchmarks/run_store.py [--quick] [--folder F]` times, in turn, the engine alone, a hop through an `asyncio.Queue`,
-the sequencer without a store, with one at each durability, and one bare SQLite commit of a row at each. Two charts: an
-event from outside that leads from one state to the other, and a skill's answer that leads to the next skill.
+`python benchmarks/run_store.py [--quick] [--folder F]` times, in turn, the engine alone, a hop through an
+`asyncio.Queue`, the sequencer without a store, with one at each durability, and one bare SQLite commit of a row at
+each. Two charts: an event from outside that leads from one state to the other, and a skill's answer that leads to the
+next skill.
 """
 
 from __future__ import annotations
@@ -56,6 +57,8 @@ ROW = "x" * 400
 
 
 class Robot(Component):
+    """Its work is done at once."""
+
     name = "robot"
 
     @skill(outcomes={"did": {}}, after_crash="repeat")

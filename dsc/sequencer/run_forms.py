@@ -35,6 +35,7 @@ class Pending:
     """Something that is still awaited, or in force.
 
     Attributes:
+        place: of the row.
         what: the output of the machine that asked for it, or what was handed in to come later.
         step: number of the macrostep that asked.
         at: second of run time at which a skill was started, or at which anything else is due.
@@ -42,6 +43,7 @@ class Pending:
         cause: number of the trace record about a skill's start.
     """
 
+    place: int
     what: Awaited
     step: int
     at: float

@@ -28,14 +28,16 @@ from dsc.sequencer.run_forms import (
 )
 from dsc.sequencer.run_tables import RunArchive, RunRow
 
-_INSERT = "INSERT INTO pending (kind, name, activation, step, at, what, reports, cause) VALUES (?, ?, ?, ?, ?, ?, 0, ?)"
-_FIRST_DUE = """DELETE FROM pending WHERE place =
-    (SELECT place FROM pending WHERE kind = ? AND name = ? AND what = ? ORDER BY at LIMIT 1)"""
-_REPORTED = "UPDATE pending SET reports = reports + 1 WHERE kind = 'Start' AND name = ?"
-_MACHINE = "INSERT OR REPLACE INTO machine VALUES (1, ?)"
+_INSERT = "INSERT INTO pending VALUES (?, ?, ?, ?, ?, 0, ?)"
+_FORGET = "DELETE FROM pending WHERE place = ?"
+_REPORTED = "UPDATE pending SET reports = reports + 1 WHERE place = ?"
 _FRAME = "INSERT OR REPLACE INTO frames VALUES (?, ?)"
-_CLEAR = ("DELETE FROM frames", "DELETE FROM machine", "DELETE FROM pending", "DELETE FROM memory")
-_SELECT_PENDING = "SELECT kind, step, at, what, reports, cause FROM pending ORDER BY place"
+_CLEAR = ("DELETE FROM frames", "DELETE FROM pending", "DELETE FROM memory")
+_SELECT_PENDING = "SELECT place, kind, step, at, what, reports, cause FROM pending ORDER BY place"
+_LAST_REACTOR = "SELECT reactor FROM steps ORDER BY place DESC LIMIT 1"
+
+_Key = tuple[str, str]
+"""Kind and name of something pending."""
 
 
 class Present:
@@ -45,7 +47,9 @@ class Present:
         self._short = short
         self._root: FrameState | None = None
         self._frames: dict[int, FrameState] = {}
-        self._machine = ""
+        self._places: dict[_Key, list[int]] = {}  # of what is pending, in the table; the earliest first
+        self._activations: dict[int, set[_Key]] = {}
+        self._last_place = 0
         self._memory: dict[str, str] = {}
 
     def clear(self, connection: sqlite3.Connection) -> None:
@@ -53,17 +57,30 @@ class Present:
         for statement in _CLEAR:
             connection.execute(statement)
 
-    def restored(self, state: MachineState) -> None:
+    def restored(self, kept: Kept) -> None:
         """This is what the tables have."""
-        self._root = state.root
-        self._frames = {frame.serial: frame for frame in state.root.frames()} if state.root else {}
+        root = self._root = kept.state.root
+        self._frames = {frame.serial: frame for frame in root.frames()} if root else {}
+        for one in kept.pending:
+            self._note(one.what, one.place)
 
-    def machine(self, connection: sqlite3.Connection, reactor: Reactor) -> None:
-        """Write the machine's frames that have changed, and what else the reactor remembers."""
+    def frames(self, connection: sqlite3.Connection, root: FrameState | None) -> None:
+        """Write the machine's frames that have changed."""
+        if root is self._root:
+            return
+        before = self._frames
+        self._root = root
+        self._frames = {frame.serial: frame for frame in root.frames()} if root else {}
+        for serial in before.keys() - self._frames.keys():
+            connection.execute("DELETE FROM frames WHERE serial = ?", (serial,))
+        for serial, frame in self._frames.items():
+            if before.get(serial) is not frame:
+                connection.execute(_FRAME, (serial, frame_text(frame, self._short)))
+
+    def reactor(self, reactor: Reactor) -> str:
+        """What else the reactor remembers."""
         state = reactor.machine.state
-        if state.root is not self._root:
-            self._write_frames(connection, state.root)
-        text = text_of({
+        return text_of({
             "root": state.root.serial if state.root else None,
             "serials": state.serials,
             "finished": state.finished,
@@ -71,9 +88,6 @@ class Present:
             "in_vain": sorted(reactor.in_vain),
             "problem": reactor.problem,
         })  # fmt: skip
-        if text != self._machine:
-            connection.execute(_MACHINE, (text,))
-            self._machine = text
 
     def memory(self, connection: sqlite3.Connection, component: str, memory: Any) -> None:
         """Write what a component has to remember, if it is not what it was."""
@@ -85,16 +99,14 @@ class Present:
     def taken(self, connection: sqlite3.Connection, message: Message) -> None:
         """What came is awaited no longer."""
         match message:
-            case SkillMessage(start=start, final=True):
-                _forget(connection, "Start", start.action_id)
+            case SkillMessage(start=start, final=False):
+                connection.executemany(_REPORTED, [(place,) for place in self._places.get(_key(start), ())])
             case SkillMessage(start=start):
-                connection.execute(_REPORTED, (start.action_id,))
+                self._forget(connection, _key(start))
             case TimerMessage(timer=timer):
-                _forget(connection, "StartTimer", _name(timer))
-            case LateMessage():
-                _forget(connection, "LateMessage", _name(message))
-            case SendLater():
-                connection.execute(_FIRST_DUE, ("SendLater", _name(message), awaited_text(message, self._short)))
+                self._forget(connection, _key(timer))
+            case LateMessage() | SendLater():
+                self._forget(connection, _key(message), 1)
 
     def asked(
         self, connection: sqlite3.Connection, output: Iterable[Output], step: int, now: float, reactor: Reactor
@@ -103,36 +115,40 @@ class Present:
         for one in output:
             match one:
                 case Start():
-                    self.put(connection, one, step, now, one.activation, reactor.caused_by.get(one.action_id, 0))
-                case StartTimer():
-                    self.put(connection, one, step, now + one.seconds, one.activation)
-                case SendLater():
+                    self.put(connection, one, step, now, reactor.caused_by.get(one.action_id, 0))
+                case StartTimer() | SendLater():
                     self.put(connection, one, step, now + one.seconds)
                 case SetParameter() | SwitchMode():
-                    _forget(connection, type(one).__name__, _name(one))
+                    self._forget(connection, _key(one))
                     self.put(connection, one, step, now)
                 case Cancel():
-                    connection.execute("DELETE FROM pending WHERE activation = ?", (one.activation,))
+                    for key in self._activations.pop(one.activation, ()):
+                        self._forget(connection, key)
                 case Revoke():
-                    _forget(connection, "SendLater", f"{one.frame} {one.id}")
+                    revoked = f"{one.frame} {one.id!r} "
+                    for key in [key for key in self._places if key[0] == "SendLater" and key[1].startswith(revoked)]:
+                        self._forget(connection, key)
 
-    def put(
-        self, connection: sqlite3.Connection, what: Awaited, step: int, at: float,
-        activation: int | None = None, cause: int = 0,
-    ) -> None:  # fmt: skip
+    def put(self, connection: sqlite3.Connection, what: Awaited, step: int, at: float, cause: int = 0) -> None:
         """Write one thing that is awaited, or in force."""
-        row = (type(what).__name__, _name(what), activation, step, at, awaited_text(what, self._short), cause)
+        self._note(what, self._last_place + 1)
+        row = (self._last_place, type(what).__name__, step, at, awaited_text(what, self._short), cause)
         connection.execute(_INSERT, row)
 
-    def _write_frames(self, connection: sqlite3.Connection, root: FrameState | None) -> None:
-        before = self._frames
-        self._root = root
-        self._frames = {frame.serial: frame for frame in root.frames()} if root else {}
-        for serial in before.keys() - self._frames.keys():
-            connection.execute("DELETE FROM frames WHERE serial = ?", (serial,))
-        for serial, frame in self._frames.items():
-            if before.get(serial) is not frame:
-                connection.execute(_FRAME, (serial, frame_text(frame, self._short)))
+    def _note(self, what: Awaited, place: int) -> None:
+        key = _key(what)
+        self._last_place = place
+        self._places.setdefault(key, []).append(place)
+        if isinstance(what, Start | StartTimer):
+            self._activations.setdefault(what.activation, set()).add(key)
+
+    def _forget(self, connection: sqlite3.Connection, key: _Key, most: int | None = None) -> None:
+        """Delete what is pending under that key, or only the earliest so many."""
+        places = self._places.pop(key, [])
+        if most is not None and places[most:]:
+            self._places[key] = places[most:]
+        for place in places[:most]:
+            connection.execute(_FORGET, (place,))
 
 
 def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
@@ -143,7 +159,7 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
     """
     connection, find = runs.connection, runs.form
     steps = list(runs.steps(run.number))
-    machine = json.loads(connection.execute("SELECT machine FROM machine").fetchone()[0])
+    machine = json.loads(connection.execute(_LAST_REACTOR).fetchone()[0])
     frames = dict(connection.execute("SELECT serial, frame FROM frames"))
     root = None if machine["root"] is None else frame_form(machine["root"], frames, find)
     state = {"root": root, "serials": machine["serials"], "finished": machine["finished"]}
@@ -156,29 +172,27 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         in_vain=frozenset((activation, index) for activation, index in machine["in_vain"]),
         problem=machine["problem"],
         pending=tuple([
-            Pending(awaited_of(kind, what, find), step, at, reports, cause)
-            for kind, step, at, what, reports, cause in connection.execute(_SELECT_PENDING)
+            Pending(place, awaited_of(kind, what, find), step, at, reports, cause)
+            for place, kind, step, at, what, reports, cause in connection.execute(_SELECT_PENDING)
         ]),
         memory={name: json.loads(memory) for name, memory in connection.execute("SELECT * FROM memory")},
         records=tuple(record for step in steps for record in step.records),
     )  # fmt: skip
 
 
-def _forget(connection: sqlite3.Connection, kind: str, name: str) -> None:
-    connection.execute("DELETE FROM pending WHERE kind = ? AND name = ?", (kind, name))
-
-
-def _name(what: Awaited) -> str:
-    """By which it is found again; only what the chart sends later may have the name of another."""
+def _key(what: Awaited) -> _Key:
+    """By which it is found again; only what the chart sends later, again and again, may have the key of another."""
     match what:
         case Start():
-            return what.action_id
+            name = what.action_id
         case StartTimer():
-            return f"{what.activation} {what.event} {what.index}"
+            name = f"{what.activation} {what.event} {what.index}"
         case SendLater():
-            return f"{what.event.frame} {what.id}"
+            name = f"{what.event.frame} {what.id!r} {what.event.name} {what.seconds}"
         case LateMessage():
-            return str(what.number)
+            name = str(what.number)
         case SetParameter():
-            return f"{what.component} {what.parameter}"
-    return what.component
+            name = f"{what.component} {what.parameter}"
+        case SwitchMode():
+            name = what.component
+    return type(what).__name__, name

@@ -19,9 +19,9 @@ from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
 
-_STEP = "INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+_STEP = "INSERT INTO steps VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
 _BEGIN = "INSERT INTO runs (plot, arguments, version, header, plots, domain) VALUES (?, ?, ?, ?, ?, ?)"
-_MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE run = ? AND number = ?"
+_MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE place = (SELECT max(place) FROM steps)"
 
 
 class RunStore:
@@ -128,9 +128,9 @@ class RunStore:
         configuration = " ".join(reactor.machine.state.configuration())
         self._connection.execute(_STEP, (
             self._run, self._number, now, self._before, self._knowledge.version, text_of(form), configuration,
-            self._new_records(),
+            self._present.reactor(reactor), self._new_records(),
         ))  # fmt: skip
-        self._present.machine(self._connection, reactor)
+        self._present.frames(self._connection, reactor.machine.state.root)
         if message is not None:
             self._present.taken(self._connection, message)
         self._present.asked(self._connection, output, self._number, now, reactor)
@@ -142,7 +142,7 @@ class RunStore:
     def end(self, *, finished: bool, problem: str | None) -> None:
         """The run is over."""
         ended = text_of({"finished": finished, "problem": problem})
-        self._connection.execute(_MORE_RECORDS, (self._new_records(), self._run, self._number))
+        self._connection.execute(_MORE_RECORDS, (self._new_records(),))
         self._connection.execute("UPDATE runs SET ended = ? WHERE run = ?", (ended, self._run))
 
     def take_up(self, library: Library) -> Kept:
@@ -158,7 +158,7 @@ class RunStore:
             kept = read(runs, run, library)
         self.begun = True
         self._run, self._number = run.number, kept.number
-        self._present.restored(kept.state)
+        self._present.restored(kept)
         return kept
 
     def _new_records(self) -> str:

@@ -1,8 +1,9 @@
 """The tables of runs in the file of a knowledge store, and how they are read.
 
 `runs` and `steps` are the past: who ran what with which plots, and every macrostep with the message taken and the
-records of the trace. `frames`, `machine`, `pending` and `memory` are the present of the one run that may be unfinished.
-`forms` are plots by hash; `fence` says who may write.
+records of the trace. `frames`, `pending` and `memory` are the present of the one run that may be unfinished, with what
+its last step says of the reactor. `forms` are plots by hash; `fence` says who may write. A commit writes whole pages:
+few tables, and no index but their keys, make it cheap.
 """
 
 from __future__ import annotations
@@ -23,16 +24,12 @@ from knowledge_base.journal.file import reading
 TABLES = (
     """CREATE TABLE IF NOT EXISTS runs (run INTEGER PRIMARY KEY, plot TEXT NOT NULL, arguments TEXT NOT NULL,
         version INTEGER NOT NULL, header TEXT NOT NULL, plots TEXT NOT NULL, domain TEXT NOT NULL, ended TEXT)""",
-    """CREATE TABLE IF NOT EXISTS steps (run INTEGER NOT NULL, number INTEGER NOT NULL, time REAL NOT NULL,
-        before INTEGER NOT NULL, version INTEGER NOT NULL, message TEXT NOT NULL, configuration TEXT NOT NULL,
-        records TEXT NOT NULL, PRIMARY KEY (run, number)) WITHOUT ROWID""",
+    """CREATE TABLE IF NOT EXISTS steps (place INTEGER PRIMARY KEY, run INTEGER NOT NULL, number INTEGER NOT NULL,
+        time REAL NOT NULL, before INTEGER NOT NULL, version INTEGER NOT NULL, message TEXT NOT NULL,
+        configuration TEXT NOT NULL, reactor TEXT NOT NULL, records TEXT NOT NULL)""",
     "CREATE TABLE IF NOT EXISTS frames (serial INTEGER PRIMARY KEY, frame TEXT NOT NULL)",
-    "CREATE TABLE IF NOT EXISTS machine (one INTEGER PRIMARY KEY CHECK (one = 1), machine TEXT NOT NULL)",
-    """CREATE TABLE IF NOT EXISTS pending (place INTEGER PRIMARY KEY, kind TEXT NOT NULL, name TEXT NOT NULL,
-        activation INTEGER, step INTEGER NOT NULL, at REAL NOT NULL, what TEXT NOT NULL, reports INTEGER NOT NULL,
-        cause INTEGER NOT NULL)""",
-    "CREATE INDEX IF NOT EXISTS pending_names ON pending (kind, name)",
-    "CREATE INDEX IF NOT EXISTS pending_activations ON pending (activation)",
+    """CREATE TABLE IF NOT EXISTS pending (place INTEGER PRIMARY KEY, kind TEXT NOT NULL, step INTEGER NOT NULL,
+        at REAL NOT NULL, what TEXT NOT NULL, reports INTEGER NOT NULL, cause INTEGER NOT NULL)""",
     "CREATE TABLE IF NOT EXISTS memory (component TEXT PRIMARY KEY, memory TEXT NOT NULL)",
     "CREATE TABLE IF NOT EXISTS forms (hash TEXT PRIMARY KEY, form TEXT NOT NULL) WITHOUT ROWID",
     "CREATE TABLE IF NOT EXISTS fence (epoch INTEGER NOT NULL)",
@@ -111,7 +108,7 @@ class RunArchive:
         """The macrosteps of a run, in order."""
         rows = self.connection.execute(
             "SELECT number, time, before, version, message, configuration, records FROM steps "
-            "WHERE run = ? ORDER BY number", (run,),
+            "WHERE run = ? ORDER BY place", (run,),
         )  # fmt: skip
         for number, time, before, version, message, configuration, records in rows:
             yield StepRow(
