@@ -13,6 +13,7 @@ from typing import IO, Any
 
 FORMAT = "dsc-trace"
 VERSION = 1
+_encode = json.JSONEncoder(ensure_ascii=False).encode  # `json.dumps` would make an encoder for each record
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ class Record:
     def to_line(self) -> str:
         """One line of JSON, keys in a fixed order."""
         head = {"seq": self.seq, "t": round(self.t, 6), "type": self.type, "cause": self.cause}
-        return json.dumps({**head, **self.data}, ensure_ascii=False)
+        return _encode({**head, **self.data})
 
     @staticmethod
     def from_line(line: str) -> Record:

@@ -28,6 +28,7 @@ Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMo
 
 _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
+_encode = json.JSONEncoder(separators=(",", ":")).encode  # `json.dumps` would make one each time
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +125,7 @@ def _full(value: Any, form: Callable[[str], Any]) -> Any:
 
 def text_of(form: Any) -> str:
     """JSON without spaces; numbers that JSON lacks (`Infinity`) are written as Python reads them."""
-    return json.dumps(form, separators=(",", ":"))
+    return _encode(form)
 
 
 # -- messages ------------------------------------------------------------------------------------------------
