@@ -9,8 +9,8 @@ import sqlite3
 import pytest
 from dsc_charts import plot
 from dsc_crashes import Crashes, Run
+from dsc_kept_charts import CHARTS, handed_in
 from dsc_runs import SCHEMA
-from test_run_store import CHARTS, handed_in
 from typer.testing import CliRunner
 
 from dsc.dynamic.library import Library
