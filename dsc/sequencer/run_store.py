@@ -125,7 +125,7 @@ class RunStore:
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
-        configuration = " ".join(reactor.machine.state.configuration())
+        configuration = text_of(reactor.machine.state.configuration())
         self._connection.execute(_STEP, (
             self._run, self._number, now, self._before, self._knowledge.version, text_of(form), configuration,
             self._present.reactor(reactor), self._new_records(),

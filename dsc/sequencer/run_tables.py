@@ -112,8 +112,8 @@ class RunArchive:
         )  # fmt: skip
         for number, time, before, version, message, configuration, records in rows:
             yield StepRow(
-                number, time, before, version, json.loads(message), tuple(configuration.split()),
-                tuple([Record.from_line(line) for line in records.splitlines()]),
+                number, time, before, version, json.loads(message), tuple(json.loads(configuration)),
+                tuple([Record.from_line(line) for line in records.split("\n") if line]),
             )  # fmt: skip
 
     def under_way(self) -> list[tuple[Start, float]]:

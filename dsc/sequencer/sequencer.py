@@ -172,6 +172,11 @@ class Sequencer:
                 for wait in self._before_events:
                     await wait()
                 self._take(message)
+        except asyncio.CancelledError:  # somebody wants it to end; a crash would not come here
+            reactor.problem = reactor.problem or "it was cancelled"
+            self._leave()
+            self._keep_end()
+            raise
         finally:
             for _, _, handle in self._coming.values():
                 handle.cancel()
@@ -184,10 +189,13 @@ class Sequencer:
             reactor.problem = "; ".join(untaken)
         end = RunEnd(self.machine.state.finished, tuple(reactor.emitted), reactor.problem)
         self.trace.record("end", finished=end.finished, problem=end.problem)
-        if self._store is not None:
-            with self._store.writing():
-                self._store.end(finished=end.finished, problem=end.problem)
+        self._keep_end()
         return end
+
+    def _keep_end(self) -> None:
+        if self._store is not None and self._store.begun and not self._store.lost:
+            with self._store.writing():
+                self._store.end(finished=self.machine.state.finished, problem=self._reactor.problem)
 
     async def _take_up(self, kept: Kept) -> None:
         """Await again what was awaited when the run was broken off.

@@ -81,7 +81,7 @@ def test_a_chart_that_does_not_start_what_answered_diverges(tmp_path):
 def test_a_record_that_was_tampered_with_is_noticed(tmp_path):
     run = Run(tmp_path, [GUARDED])
     with sqlite3.connect(run.path) as file:
-        file.execute("UPDATE steps SET configuration = 'e' WHERE number = 2")
+        file.execute("UPDATE steps SET configuration = ? WHERE number = 2", ('["e"]',))
     file.close()
     assert replay(run.path).divergence.step == 2
 
@@ -120,7 +120,7 @@ def test_a_run_with_a_problem_shows_it(tmp_path):
 def test_a_divergence_has_its_own_exit_status(tmp_path):
     run = Run(tmp_path, [GUARDED])
     with sqlite3.connect(run.path) as file:
-        file.execute("UPDATE steps SET configuration = 'e' WHERE number = 2")
+        file.execute("UPDATE steps SET configuration = ? WHERE number = 2", ('["e"]',))
     file.close()
     replayed = command("replay", run.path)
     assert replayed.exit_code == 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 from dsc_crashes import Crashes, Robot, Run, copied
 from dsc_kept_charts import CHARTS, handed_in
@@ -140,6 +142,32 @@ def test_a_run_ends_with_an_error_when_it_cannot_be_kept_and_nothing_is_started(
     assert robot.told == []
     assert len(robot.done) == 1
     assert Run(tmp_path, [TWICE], done=robot.done, resume=True).end == RunEnd(finished=True)
+
+
+def test_a_run_that_is_cancelled_has_ended_with_its_components_at_rest(tmp_path):
+    chart = "{plot: p, states: {a: {entry: [{trigger: robot.work}], exit: [{switch: robot, to: neutral}], on: {did: e}}, e: {final: true}}}"
+    robot = Robot()
+
+    def cancel(_):
+        asyncio.get_running_loop().call_later(1, asyncio.current_task().cancel)
+
+    with pytest.raises(asyncio.CancelledError):
+        run_with(tmp_path, chart, robot, prepare=cancel)
+    assert robot.told == [("mode", "neutral")]
+    with archive(tmp_path / "run.kb") as runs:
+        assert runs.run().ended == {"finished": False, "problem": "it was cancelled"}
+
+
+def test_texts_with_any_kind_of_line_break_are_kept_in_their_records(tmp_path):
+    class Poet(Robot):
+        @skill(outcomes={"did": {"n": None}}, after_crash="repeat")
+        async def work(self, call, seconds=0, observes=""):
+            return Outcome("did", {"n": "one\u2028two\x85three\nfour\u2029five"})
+
+    run = Run(tmp_path, [TWICE], robot=Poet())
+    with archive(run.path) as runs:
+        records = [record for step in runs.steps(1) for record in step.records]
+    assert [record.to_line() for record in records] == [record.to_line() for record in run.records]
 
 
 def test_a_run_that_has_ended_is_not_resumed(tmp_path):
