@@ -188,6 +188,13 @@ class Component:
         """
         return Status.UNKNOWN
 
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:
+        """Stop an action, if it still goes on, that was cancelled just before the run was broken off.
+
+        Whether the cancellation has reached the robot is not known. Override it where actions go on when this
+        process dies; those that are part of it have ended with it.
+        """
+
     def remember(self) -> Any:
         """Plain data to be kept, for `recall` after a restart; asked with each macrostep that is committed."""
         return None

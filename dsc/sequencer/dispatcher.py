@@ -17,7 +17,7 @@ from dsc.events import EVERY, SKILL_ERROR, TIMED_OUT
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
 from dsc.skills import Component, Outcome, SkillCall
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 
 DEFAULT_WITHIN = 300.0
 """Seconds a skill may take if the trigger does not say: every wait has a bound."""
@@ -121,6 +121,16 @@ class Dispatcher:
     def take_up(self, start: Start, earlier: Earlier) -> None:
         """Go on with a skill that was under way before a restart; raises `UnknownNameError`."""
         self._start(start, earlier)
+
+    async def abandon(self, start: Start) -> None:
+        """Let a component stop what was cancelled just before a restart; raises `InputError` if it cannot."""
+        component = self.component(start.component)
+        try:
+            async with asyncio.timeout(CLOSING):
+                await component.abandon(start.action_id, start.skill, _encoded(start.arguments))
+        except Exception as error:  # whatever a component does wrong must not end the program
+            why = f"{type(error).__name__}: {error}"
+            raise InputError(f"{start.component}.{start.skill} may still go on: {why}") from error
 
     def start_timer(self, timer: StartTimer, due: float) -> None:
         """Post a `TimerMessage` at that second of run time, if the activation is not cancelled before."""

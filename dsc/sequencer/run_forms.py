@@ -42,6 +42,7 @@ class Pending:
         at: second of run time at which a skill was started, or at which anything else is due.
         reports: how many intermediate events of a skill were taken.
         cause: number of the trace record about a skill's start.
+        cancelled: whether it is a skill that the last macrostep has cancelled.
     """
 
     place: int
@@ -50,6 +51,7 @@ class Pending:
     at: float
     reports: int = 0
     cause: int = 0
+    cancelled: bool = False
 
 
 @dataclass(frozen=True, slots=True)

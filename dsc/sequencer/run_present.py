@@ -28,12 +28,13 @@ from dsc.sequencer.run_forms import (
 )
 from dsc.sequencer.run_tables import RunArchive, RunRow
 
-_INSERT = "INSERT INTO pending VALUES (?, ?, ?, ?, ?, 0, ?)"
+_INSERT = "INSERT INTO pending VALUES (?, ?, ?, ?, ?, 0, ?, 0)"
+_CANCELLED = "UPDATE pending SET cancelled = 1 WHERE place = ?"
 _FORGET = "DELETE FROM pending WHERE place = ?"
 _REPORTED = "UPDATE pending SET reports = reports + 1 WHERE place = ?"
 _FRAME = "INSERT OR REPLACE INTO frames VALUES (?, ?)"
 _CLEAR = ("DELETE FROM frames", "DELETE FROM pending", "DELETE FROM memory")
-_SELECT_PENDING = "SELECT place, kind, step, at, what, reports, cause FROM pending ORDER BY place"
+_SELECT_PENDING = "SELECT place, kind, step, at, what, reports, cause, cancelled FROM pending ORDER BY place"
 _LAST_REACTOR = "SELECT reactor FROM steps ORDER BY place DESC LIMIT 1"
 
 _Key = tuple[str, str]
@@ -49,6 +50,7 @@ class Present:
         self._frames: dict[int, FrameState] = {}
         self._places: dict[_Key, list[int]] = {}  # of what is pending, in the table; the earliest first
         self._activations: dict[int, set[_Key]] = {}
+        self._cancelled: list[int] = []  # places of actions that the last macrostep cancelled
         self._last_place = 0
         self._memory: dict[str, str] = {}
 
@@ -63,6 +65,8 @@ class Present:
         self._frames = {frame.serial: frame for frame in root.frames()} if root else {}
         for one in kept.pending:
             self._note(one.what, one.place)
+            if one.cancelled:
+                self._cancelled += self._places.pop(_key(one.what))
 
     def frames(self, connection: sqlite3.Connection, root: FrameState | None) -> None:
         """Write the machine's frames that have changed."""
@@ -112,6 +116,9 @@ class Present:
         self, connection: sqlite3.Connection, output: Iterable[Output], step: int, now: float, reactor: Reactor
     ) -> None:
         """What is awaited from now on, or no longer, and what is in force."""
+        for place in self._cancelled:  # that has left by now
+            connection.execute(_FORGET, (place,))
+        self._cancelled.clear()
         for one in output:
             match one:
                 case Start():
@@ -123,7 +130,7 @@ class Present:
                     self.put(connection, one, step, now)
                 case Cancel():
                     for key in self._activations.pop(one.activation, ()):
-                        self._forget(connection, key)
+                        self._cancel(connection, key)
                 case Revoke():
                     revoked = f"{one.frame} {one.id!r} "
                     for key in [key for key in self._places if key[0] == "SendLater" and key[1].startswith(revoked)]:
@@ -141,6 +148,15 @@ class Present:
         self._places.setdefault(key, []).append(place)
         if isinstance(what, Start | StartTimer):
             self._activations.setdefault(what.activation, set()).add(key)
+
+    def _cancel(self, connection: sqlite3.Connection, key: _Key) -> None:
+        """A timer is gone; an action that has not ended may have to be cancelled once more after a restart."""
+        if key[0] != Start.__name__:
+            self._forget(connection, key)
+            return
+        for place in self._places.pop(key, ()):
+            connection.execute(_CANCELLED, (place,))
+            self._cancelled.append(place)
 
     def _forget(self, connection: sqlite3.Connection, key: _Key, most: int | None = None) -> None:
         """Delete what is pending under that key, or only the earliest so many."""
@@ -172,8 +188,8 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         in_vain=frozenset((activation, index) for activation, index in machine["in_vain"]),
         problem=machine["problem"],
         pending=tuple([
-            Pending(place, awaited_of(kind, what, find), step, at, reports, cause)
-            for place, kind, step, at, what, reports, cause in connection.execute(_SELECT_PENDING)
+            Pending(place, awaited_of(kind, what, find), step, at, reports, cause, bool(cancelled))
+            for place, kind, step, at, what, reports, cause, cancelled in connection.execute(_SELECT_PENDING)
         ]),
         memory={name: json.loads(memory) for name, memory in connection.execute("SELECT * FROM memory")},
         records=tuple(record for step in steps for record in step.records),

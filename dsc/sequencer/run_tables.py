@@ -29,7 +29,8 @@ TABLES = (
         configuration TEXT NOT NULL, reactor TEXT NOT NULL, records TEXT NOT NULL)""",
     "CREATE TABLE IF NOT EXISTS frames (serial INTEGER PRIMARY KEY, frame TEXT NOT NULL)",
     """CREATE TABLE IF NOT EXISTS pending (place INTEGER PRIMARY KEY, kind TEXT NOT NULL, step INTEGER NOT NULL,
-        at REAL NOT NULL, what TEXT NOT NULL, reports INTEGER NOT NULL, cause INTEGER NOT NULL)""",
+        at REAL NOT NULL, what TEXT NOT NULL, reports INTEGER NOT NULL, cause INTEGER NOT NULL,
+        cancelled INTEGER NOT NULL)""",
     "CREATE TABLE IF NOT EXISTS memory (component TEXT PRIMARY KEY, memory TEXT NOT NULL)",
     "CREATE TABLE IF NOT EXISTS forms (hash TEXT PRIMARY KEY, form TEXT NOT NULL) WITHOUT ROWID",
     "CREATE TABLE IF NOT EXISTS fence (epoch INTEGER NOT NULL)",
@@ -118,7 +119,9 @@ class RunArchive:
 
     def under_way(self) -> list[tuple[Start, float]]:
         """The skills of the unfinished run that have not ended, with the second at which they were started."""
-        rows = self.connection.execute("SELECT what, at FROM pending WHERE kind = 'Start' ORDER BY place")
+        rows = self.connection.execute(
+            "SELECT what, at FROM pending WHERE kind = 'Start' AND NOT cancelled ORDER BY place"
+        )
         return [(Start(**json.loads(what)), since) for what, since in rows]
 
     def form(self, digest: str) -> Any:

@@ -205,8 +205,12 @@ class Sequencer:
         self._reactor.restore(kept)
         for name, memory in kept.memory.items():
             self.dispatcher.component(name).recall(memory)
-        older = [one for one in kept.pending if one.step < kept.number]
+        awaited = [one for one in kept.pending if not one.cancelled]
+        older = [one for one in awaited if one.step < kept.number]
         try:
+            for one in kept.pending:
+                if one.cancelled and isinstance(one.what, Start):
+                    await self.dispatcher.abandon(one.what)
             for one in older:
                 if isinstance(one.what, SetParameter | SwitchMode):
                     self.dispatcher.dispatch(one.what)
@@ -215,7 +219,7 @@ class Sequencer:
                 if not isinstance(one.what, SetParameter | SwitchMode):
                     self._await_again(one)
             await asyncio.sleep(0)  # until these have begun
-            for one in kept.pending[len(older) :]:
+            for one in awaited[len(older) :]:
                 self._await_again(one)
         except InputError as error:
             self._reactor.problem = str(error)

@@ -297,3 +297,56 @@ def test_an_action_of_which_nobody_knows_is_not_done_again_and_the_chart_hears_o
 def test_an_end_that_the_skill_does_not_declare_is_an_error_as_ever(tmp_path):
     (_, known, _), _ = asked(tmp_path, "repeat", Ended(Outcome("vanished")))
     assert "(told)" in known
+
+
+CANCELLING = """
+    plot: p
+    states:
+      a: {entry: [{trigger: robot.fetch}], after: {seconds: 1, to: b}, on: {fetched: e}}
+      b: {entry: [{trigger: robot.work, with: {seconds: 3}}], on: {did: c}}
+      c: {entry: [{trigger: robot.work, with: {seconds: 3}}], on: {did: e}}
+      e: {final: true}
+"""
+
+
+class Stubborn(Robot):
+    def __init__(self, fails=False):
+        super().__init__()
+        self.abandoned = []
+        self.fails = fails
+
+    @skill(outcomes={"fetched": {}}, after_crash="same_id")
+    async def fetch(self, call):
+        await call.clock.sleep(50)
+        return Outcome("fetched")
+
+    async def abandon(self, action_id, skill_name, arguments):
+        if self.fails:
+            raise RuntimeError("no contact")
+        self.abandoned.append((action_id, skill_name, arguments))
+
+
+def cancelled(tmp_path):
+    """Copies from after the macrostep that starts `fetch`, from after that which cancels it, and from after the next."""
+    copies = []
+    (tmp_path / "alive").mkdir()
+    run_with(
+        tmp_path / "alive", CANCELLING, Stubborn(),
+        prepare=lambda run: run.listen(lambda _: copies.append(copied(tmp_path / "alive", tmp_path / f"c{len(copies)}"))),
+    )
+    return copies[1:]
+
+
+def test_an_action_that_was_cancelled_at_the_last_moment_is_stopped_and_not_done_again(tmp_path):
+    ends, stopped = [], []
+    for copy in cancelled(tmp_path):
+        robot = Stubborn()
+        ends.append(run_with(copy, CANCELLING, robot, resume=True))
+        stopped.append(robot.abandoned)
+    assert [(end.finished, at) for end, _, at in ends] == [(True, 7)] * 3
+    assert stopped == [[], [("a2.0", "fetch", {})], []]
+
+
+def test_a_component_that_cannot_stop_it_ends_the_run_with_that(tmp_path):
+    end, _, _ = run_with(cancelled(tmp_path)[1], CANCELLING, Stubborn(fails=True), resume=True)
+    assert end == RunEnd(finished=False, problem="robot.fetch may still go on: RuntimeError: no contact")
