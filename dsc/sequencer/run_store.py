@@ -35,6 +35,7 @@ class RunStore:
 
     Attributes:
         begun: whether a run is kept here.
+        last_late: the highest number of a `LateMessage` that is still to come.
         lost: whether something could not be kept: what is in memory is ahead of the file.
 
     Raises:
@@ -50,6 +51,7 @@ class RunStore:
     ) -> None:
         self.path = path
         self.begun = self.lost = False
+        self.last_late = 0
         self._knowledge = knowledge
         self._header = header or {}
         self._domain = domain or {}
@@ -159,6 +161,8 @@ class RunStore:
         self.begun = True
         self._run, self._number = run.number, kept.number
         self._present.restored(kept)
+        late = [one.what.number for one in kept.pending if isinstance(one.what, LateMessage)]
+        self.last_late = max(late, default=0)
         return kept
 
     def _new_records(self) -> str:

@@ -78,7 +78,7 @@ class Sequencer:
         self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait)
         self._open_ended = open_ended
         self._coming: dict[int, tuple[LateMessage, float, asyncio.TimerHandle]] = {}
-        self._last_late = 0
+        self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
     @property
@@ -155,7 +155,11 @@ class Sequencer:
 
         Raises:
             StoreError: the store cannot be written.
+            UnknownNameError: a component that the run needs is not deployed; nothing has happened.
         """
+        started = [one.what.component for one in kept.pending if isinstance(one.what, Start)]
+        for needed in (*kept.memory, *started):
+            self.dispatcher.component(needed)
         return await self._until_end(lambda: self._take_up(kept))
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
@@ -233,7 +237,6 @@ class Sequencer:
             case SendLater():
                 self.dispatcher.send_later(one.what, one.at)
             case LateMessage():
-                self._last_late = max(self._last_late, one.what.number)
                 self._await_late(one.what, one.at)
             case _:
                 self.dispatcher.dispatch(one.what)

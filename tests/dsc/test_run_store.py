@@ -11,6 +11,7 @@ from dsc_runs import SCHEMA, Ran
 
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
+from dsc.events import Event
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.run_tables import archive, has_run
 from dsc.sequencer.sequencer import RunEnd
@@ -41,6 +42,32 @@ def test_what_was_handed_in_to_come_later_comes_when_it_should(tmp_path):
     assert crashes.whole.at == 9
     for what, run in crashes.resumed():
         assert run.outcome() == crashes.whole.outcome(), what
+
+
+def test_more_may_be_handed_in_when_it_is_resumed(tmp_path):
+    chart = """
+        plot: p
+        receives: {go: {n: number}}
+        variables: {sum: {type: number, initial: 0}}
+        states:
+          a: {after: {seconds: 20, to: e}, on: {go: [{to: e, when: (= ?event.n 3)}, {assign: {sum: (+ ?sum ?event.n)}}]}}
+          e: {final: true}
+    """
+    crashes = Crashes(tmp_path, chart, prepare=handed_in)
+    assert crashes.whole.at == 20
+    run = Run(crashes.copies[1][2], [chart], resume=True, prepare=lambda run: run.post(Event("go", {"n": 3}), after=8))
+    assert [step.time for step in run.steps] == [0, 3, 6, 8]
+    assert run.end.finished
+
+
+def test_without_a_component_that_it_needs_it_is_not_resumed(tmp_path):
+    crashes = Crashes(tmp_path, TWICE)
+    _, done, folder = crashes.copies[1]
+    nobody = Robot()
+    nobody.name = "nobody"
+    with pytest.raises(UnknownNameError, match="there is no component 'robot'"):
+        run_with(folder, TWICE, nobody, resume=True)
+    assert Run(folder, [TWICE], done=done, resume=True).end == crashes.whole.end
 
 
 # -- what is promised --------------------------------------------------------------------------------------
