@@ -16,9 +16,10 @@ from __future__ import annotations
 import inspect
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
@@ -56,11 +57,35 @@ class SkillCall:
         action_id: names this execution; stable across restarts, never used for another one.
         clock: the only time a skill may use.
         report: hands over an intermediate event while the skill goes on (e.g. progress, a perception).
+
+    When a run is resumed after a crash, a call may come again with the same id. Its clock then begins when the
+    action was started, and what was reported before is not heard twice: a skill that acts once for an id simply
+    goes the same way.
     """
 
     action_id: str
     clock: Clock
     report: Callable[[Outcome], None]
+
+
+class Status(Enum):
+    """What a component says about an action that may have been under way when the run was broken off."""
+
+    RUNNING = "running"
+    UNKNOWN = "unknown"
+    NOT_BEGUN = "not begun"
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The action came to its end, and how."""
+
+    outcome: Outcome
+
+
+AfterCrash = Literal["repeat", "same_id", "sense"]
+"""What may be done about an action of which nothing is known: do it again, since twice is as once; do it with the
+same id, since the component does each id once; neither, since somebody has to look what happened first."""
 
 
 SkillBody = Callable[..., Awaitable[Outcome]]
@@ -76,6 +101,7 @@ class SkillSignature:
         parameters: names with types (`None`: anything).
         defaults: values of the parameters that may be left out.
         outcomes: events it may end with or report, with their attributes and types.
+        after_crash: see `AfterCrash`.
     """
 
     component: str
@@ -83,29 +109,34 @@ class SkillSignature:
     parameters: Mapping[str, str | None]
     defaults: Mapping[str, Any]
     outcomes: Mapping[str, Mapping[str, str | None]]
+    after_crash: AfterCrash = "sense"
 
 
 @dataclass(frozen=True, slots=True)
 class _Declared:
     types: Mapping[str, str]
     outcomes: Mapping[str, Mapping[str, str | None]]
+    after_crash: AfterCrash
 
 
 _DECLARED = "__dsc_skill__"
 
 
 def skill(
-    outcomes: Mapping[str, Mapping[str, str | None]], types: Mapping[str, str] | None = None
+    outcomes: Mapping[str, Mapping[str, str | None]],
+    types: Mapping[str, str] | None = None,
+    after_crash: AfterCrash = "sense",
 ) -> Callable[[_Body], _Body]:
     """Declare a component's coroutine method as a skill.
 
     Args:
         outcomes: every event it may end with or report, with the event's attributes and their types.
         types: types of its parameters by name; a parameter left out takes any value.
+        after_crash: what may be done when a run is resumed and the component does not know what became of it.
     """
 
     def declare(body: _Body) -> _Body:
-        setattr(body, _DECLARED, _Declared(dict(types or {}), {k: dict(v) for k, v in outcomes.items()}))
+        setattr(body, _DECLARED, _Declared(dict(types or {}), {k: dict(v) for k, v in outcomes.items()}, after_crash))
         return body
 
     return declare
@@ -159,6 +190,33 @@ class Component:
         """The *state* port: enter a mode (`neutral` is at rest); override to react."""
         self.mode = mode
 
+    async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
+        """What became of an action that this process did not start; override to ask the robot.
+
+        `RUNNING` and `NOT_BEGUN` let the skill be executed with that id; it then awaits the action's end, or
+        does it. What may be done about an `UNKNOWN` one, the skill's `after_crash` says.
+        """
+        return Status.UNKNOWN
+
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:
+        """Stop an action, if it still goes on, that was cancelled just before the run was broken off.
+
+        Whether the cancellation has reached the robot is not known. Override it where actions go on when this
+        process dies; those that are part of it have ended with it.
+        """
+
+    def remember(self) -> Any:
+        """Plain data to be kept, for `recall` after a restart; asked with each macrostep that is committed."""
+        return None
+
+    def recall(self, memory: Any) -> None:
+        """Be as when `memory` was kept; called before anything else after a restart."""
+
+    @property
+    def remembers(self) -> bool:
+        """Whether there is anything to remember: most components are not asked again and again."""
+        return type(self).remember is not Component.remember
+
 
 @cache
 def signatures(kind: type[Component], name: str) -> Mapping[str, SkillSignature]:
@@ -195,4 +253,5 @@ def _signature(component: str, name: str, body: SkillBody, declared: _Declared) 
         parameters={p.name: declared.types.get(p.name) for p in own},
         defaults={p.name: p.default for p in own if p.default is not inspect.Parameter.empty},
         outcomes=declared.outcomes,
+        after_crash=declared.after_crash,
     )

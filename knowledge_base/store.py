@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sqlite3
 import time as wall
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import get_ident
+from threading import RLock, get_ident
 from types import TracebackType
 from typing import Self
 
@@ -52,6 +53,7 @@ class KnowledgeBase(Observable):
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
+        self._turn = RLock()  # to change something or ask for the past; taken before the lock, which all who ask need
 
     @classmethod
     def open(
@@ -162,7 +164,7 @@ class KnowledgeBase(Observable):
             StoreError: the file cannot be written; nothing was changed.
         """
         try:
-            with self._lock:
+            with self._turn, self._lock:
                 self._refuse_nesting()
                 first = self._first(key, expect)
                 transaction = Transaction(Overlay(self._state), self._questions, first)
@@ -199,7 +201,7 @@ class KnowledgeBase(Observable):
             ConflictError: the version is not the expected one, or this thread is inside a transaction.
             StoreError: the file cannot be written; nothing was changed.
         """
-        with self._lock:
+        with self._turn, self._lock:
             self._refuse_nesting()
             change = self._first(key, expect)
             if change is None:
@@ -208,6 +210,25 @@ class KnowledgeBase(Observable):
                 change = self._commit(pending.delta, author, key, along)
         self._announcer.deliver()
         return change
+
+    @contextmanager
+    def together(self) -> Iterator[sqlite3.Connection]:
+        """What is committed inside the block is written to the file as one, together with what the block itself writes.
+
+        Each change is a version of its own, and is seen and announced at once, as always; nobody may count on
+        it before the block is left. Other threads that change something, or ask for the past, wait until then.
+
+        Yields the connection; whoever writes with it neither commits nor rolls back.
+
+        Raises:
+            StoreError: there is no file, or it cannot be written. What is in memory is then ahead of it: every
+                further change is refused, and the file, opened anew, has what was before the block.
+            ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
+        """
+        with self._turn:
+            self._refuse_nesting()
+            with self._history.together() as connection:
+                yield connection
 
     def bind_source(self, function: str, *args: Value, reference: str) -> Source:
         """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
@@ -249,10 +270,11 @@ class KnowledgeBase(Observable):
         """
         if (version is None) == (time is None):
             raise InputError("at(...) takes a version or a time")
-        if version is None:
-            version = min(self._history.version_at(time or 0.0), self._version)
-        self._require_reached(version)
-        return View(self._history.state(version, self._present), version)
+        with self._turn:
+            if version is None:
+                version = min(self._history.version_at(time or 0.0), self._version)
+            self._require_reached(version)
+            return View(self._history.state(version, self._present), version)
 
     @property
     def oldest(self) -> int:
@@ -265,9 +287,10 @@ class KnowledgeBase(Observable):
         Raises:
             HistoryError: some of them are not kept any more, or are not there yet.
         """
-        newest = self._version
-        self._require_reached(max(since, until or 0))
-        return self._history.changes(since, newest if until is None else until)
+        with self._turn:
+            newest = self._version
+            self._require_reached(max(since, until or 0))
+            return self._history.changes(since, newest if until is None else until)
 
     def compact(self, keep_since: int | None = None) -> None:
         """Forget what only versions before `keep_since` need (default: the present one); keys are remembered.
@@ -276,7 +299,7 @@ class KnowledgeBase(Observable):
             HistoryError: that version is not kept any more or not there yet.
             StoreError: the file cannot be written.
         """
-        with self._lock:
+        with self._turn, self._lock:
             version = self._version if keep_since is None else keep_since
             self._require_reached(version)
             self._history.compact(version, self._present)
