@@ -1,5 +1,6 @@
 """Plans that do not go on, kept in a store: wherever such a run is broken off, it is mended in the very same way."""
 
+import asyncio
 import copy
 import shutil
 from dataclasses import replace
@@ -108,33 +109,66 @@ CASES = {
 }
 
 
+class Kept:
+    """A run in a store, with a copy of store and robot from each boundary."""
+
+    def __init__(self, tmp_path, goal, how, also=lambda sequencer: None):
+        self.goal, self.more = goal, {name: how[name] for name in ("ways", "foresight") if name in how}
+        self.copies, self.records = [], []
+        self.robot = LastingRobot(how.get("script"), how.get("concurrent", False))
+        (alive := tmp_path / "alive").mkdir()
+        self.path = alive / "run.kb"
+
+        def crash(_=None):
+            to = tmp_path / f"copy{len(self.copies)}"
+            shutil.copytree(alive, to, ignore=shutil.ignore_patterns("*-lock", "*-shm"))
+            self.copies.append((to / "run.kb", self.robot.again()))
+
+        def prepare(sequencer):
+            nodes = {**dict.fromkeys(ROOMS, "room"), "cup": "thing"}
+            ways = [fact("way", *one.split()) for one in how.get("ways_between", ROUND)]
+            known = (fact("at", "a"), fact("in", "cup", "a"), *ways)
+            sequencer.knowledge.apply(Delta(nodes=nodes, added=known), "test")
+            if "then" in how:
+                sequencer.change(how["then"], "somebody", after=0.5)
+            sequencer.listen(crash)
+            also(sequencer)
+
+        self.robot.crash = crash
+        with executive(self.robot, self.path, goal, **self.more) as program:
+            program.listen(self.records.append)
+            assert program.run("errand", prepare=prepare).finished
+
+    def check(self, path, robot):
+        """Resumed, a copy comes to the same end by the same steps."""
+        with executive(robot, path, self.goal, **self.more) as program:
+            assert program.resume().finished
+        assert robot.done == self.robot.done
+        assert told(path) == told(self.path)
+
+
 @pytest.mark.parametrize(("goal", "how", "kind"), CASES.values(), ids=CASES)
 def test_wherever_it_is_broken_off_it_goes_on_as_it_would_have(tmp_path, goal, how, kind):
-    then, more = how.get("then"), {name: how[name] for name in ("ways", "foresight") if name in how}
-    copies, records = [], []
-    (alive := tmp_path / "alive").mkdir()
-    robot = LastingRobot(how.get("script"), how.get("concurrent", False))
+    kept = Kept(tmp_path, goal, how)
+    assert f"plan.{kind}" in {record.type for record in kept.records}
+    for path, robot in kept.copies[1:]:
+        kept.check(path, robot)
 
-    def crash(_=None):
-        shutil.copytree(alive, to := tmp_path / f"copy{len(copies)}", ignore=shutil.ignore_patterns("*-lock", "*-shm"))
-        copies.append((to / "run.kb", robot.again()))
 
-    def prepare(sequencer):
-        nodes = {**dict.fromkeys(ROOMS, "room"), "cup": "thing"}
-        known = (fact("at", "a"), fact("in", "cup", "a"), *(fact("way", *one.split()) for one in how.get("ways_between", ROUND)))
-        sequencer.knowledge.apply(Delta(nodes=nodes, added=known), "test")
-        if then is not None:
-            sequencer.change(then, "somebody", after=0.5)
-        sequencer.listen(crash)
+def test_what_the_planner_has_answered_is_not_lost_when_something_else_was_heard_before_it(tmp_path):
+    spoon = Delta(nodes={"spoon": "thing"})
 
-    robot.crash = crash
-    with executive(robot, alive / "run.kb", goal, **more) as program:
-        program.listen(records.append)
-        assert program.run("errand", prepare=prepare).finished
-    assert f"plan.{kind}" in {record.type for record in records}
-    whole = told(alive / "run.kb")
-    for path, found in copies[1:]:
-        with executive(found, path, goal, **more) as program:
-            assert program.resume().finished
-        assert found.done == robot.done
-        assert told(path) == whole
+    def also(sequencer):
+        loop = asyncio.get_running_loop()
+        heard = lambda change: change.author == "somebody" and loop.call_soon(sequencer.change, spoon, "another")  # noqa: E731
+        sequencer.knowledge.subscribe(heard)
+
+    kept = Kept(tmp_path, CASES["hit"][0], CASES["hit"][1], also)
+    checked = 0
+    for path, robot in kept.copies[1:]:
+        with archive(path) as runs:
+            (memory,) = runs.connection.execute("SELECT memory FROM memory WHERE component = 'planner'").fetchone() or ("",)
+        if '"plan_invalid"' in memory:
+            kept.check(path, robot)
+            checked += 1
+    assert checked
