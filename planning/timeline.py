@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from knowledge_base.facts import Fact
+from knowledge_base.facts import Content, Fact
 from planning.plan import Timing
 
 State = TypeVar("State")
-Changes = Mapping[Fact, float]
+Changes = Mapping[Fact, Content]
 """What becomes of facts (true and false) and of numbers."""
 Lacks = Callable[[State], str | None]
 """The first thing that does not hold, as text."""
@@ -113,7 +113,7 @@ def _flaw(
     return None
 
 
-def _differ(value: float, other: float) -> bool:
+def _differ(value: Content, other: Content) -> bool:
     """Two facts are the same or not; two changes of one number are never one change."""
     return value != other if isinstance(value, bool) else True
 
@@ -121,7 +121,7 @@ def _differ(value: float, other: float) -> bool:
 def _together(
     happening: Sequence[tuple[int, Event[State]]], state: State, after: Callable[[State, Changes], State]
 ) -> State:
-    changes: dict[Fact, float] = {}
+    changes: dict[Fact, Content] = {}
     for _, event in happening:
         changes.update(event.changes(state))
     return after(state, changes)

@@ -10,6 +10,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.language.evaluation import World, apply_effect, evaluate_term, explain, holds
 from knowledge_base.language.expression import Expression
+from knowledge_base.language.terms import as_number
 from knowledge_base.overlay import Overlay
 from planning.plan import Plan
 from planning.posing.derived import derivation
@@ -103,7 +104,10 @@ def _act(step: PlanStep, timing: Timing, domain: PlanningDomain, world: World) -
     timed, duration = action.timed, action.duration
     if timed is None or duration is None:
         return Act(timing, _event(action.precondition, action.effect, bindings))
-    least, most = (float(evaluate_term(one, world, bindings)) for one in (duration.least, duration.most))
+    least, most = (
+        as_number(evaluate_term(one, world, bindings), "a duration", one.place)
+        for one in (duration.least, duration.most)
+    )
     if not least - FINEST <= timing.duration <= most + FINEST:
         raise InputError(f"{step} takes {timing.duration:g} s, which is not between {least:g} and {most:g}")
     start, end = (

@@ -8,6 +8,7 @@ from collections.abc import Set as AbstractSet
 from typing import Any
 
 from knowledge_base.errors import InputError
+from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation import World, holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.overlay import Overlay
@@ -15,6 +16,7 @@ from planning.domain import PlanningDomain
 from planning.execution.needs import Needs
 from planning.plan import PlanStep
 from planning.posing.costs import TOTAL_COST
+from planning.quantities import worth
 
 _MOST_AT_WORK = 3
 """Of so many steps at work, each is looked at as not begun and as done; of more, only all of them."""
@@ -76,7 +78,8 @@ def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> 
     ahead = Overlay(world)
     for step in steps:
         ahead.apply(domain.effects(step, ahead))
-    return ahead.value(TOTAL_COST.function, ()) - world.value(TOTAL_COST.function, ())
+    total = Fact(TOTAL_COST.function)
+    return worth(ahead, total) - worth(world, total)
 
 
 class Course:

@@ -15,6 +15,7 @@ from knowledge_base.facts import Fact
 from knowledge_base.language.effect import AllOf
 from knowledge_base.language.evaluation import evaluate_term
 from knowledge_base.language.expression import And, Expression
+from knowledge_base.language.terms import as_number
 from planning.errors import UnsupportedActionError
 from planning.plan import PlanStep
 from planning.posing.conditions import Every, Grounder, Leaf, Literal, Residual, alternatives
@@ -161,7 +162,10 @@ class _Grounding:
             return
         if any(map(self.grounder.changes, (duration.least, duration.most))):
             raise _NotOfFactsError
-        least, most = (float(evaluate_term(one, self.world, bindings)) for one in (duration.least, duration.most))
+        least, most = (
+            as_number(evaluate_term(one, self.world, bindings), "a duration", one.place)
+            for one in (duration.least, duration.most)
+        )
         lasting = list(
             itertools.islice(alternatives(self.grounder.precondition(timed.over_all, bindings)), _MOST_ALTERNATIVES + 1)
         )
