@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from threading import RLock
 
 from knowledge_base.exchange.json import to_json
+from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.exchange.problem_writer import problem_to_text
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.inputs import require_params
@@ -115,20 +116,23 @@ class View:
         with self._lock:
             return to_json(self._state, self._version)
 
-    def to_pddl(self, domain: str, name: str = "world", goal: str | Expression | None = None) -> str:
+    def to_pddl(
+        self, domain: str, name: str = "world", goal: str | Expression | None = None, metric: Metric | None = None
+    ) -> str:
         """All of it as a PDDL problem for the domain of that name, which is not written.
 
         Args:
             domain: what the domain is called.
             name: what the problem is called.
             goal: what is wanted, if anything.
+            metric: what the best plan is, if that is said.
 
         Raises:
             InputError: as for `ask`, for the goal; and a name or number that PDDL cannot spell.
         """
         with self._lock:
             wanted = TRUE if goal is None else self._questions.condition(goal, {}, self._state)
-            return problem_to_text(self._state, name, domain, wanted)
+            return problem_to_text(self._state, name, domain, wanted, metric)
 
     def nodes(self) -> dict[str, str]:
         """All things with their types, in order of insertion."""
