@@ -280,7 +280,7 @@ def test_the_past_of_a_store_is_forgotten_when_that_is_wanted(store) -> None:
         run_quietly(store, weight)
     said = json.loads(run("compact", store, "--keep", "150", "--json"))
     assert (said["oldest"], said["version"]) == (150, 200)
-    assert [change["version"] for change in json.loads(run("history", store, "--json"))][0] == 151
+    assert next(change["version"] for change in json.loads(run("history", store, "--json"))) == 151
     with pytest.raises(InputError, match="version 149"):
         run("at", store, "149", "(clean mug)")
     assert run("compact", store).startswith("versions 200 to 200 are kept: ")
