@@ -9,10 +9,12 @@ from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import answerable, outcomes_of
+from dsc.dynamic.steps import Step, concerns
 from dsc.errors import Finding
 from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, TIMERS
 from dsc.model.actions import Trigger
 from dsc.model.plot import ActionPlot, Path
+from dsc.model.rules import RESPONSES
 from dsc.model.states import (
     AnyState,
     FinalState,
@@ -22,7 +24,6 @@ from dsc.model.states import (
 from dsc.validation.attributes import Skills
 from dsc.validation.completion import check_completion
 from dsc.validation.nesting import Nesting
-from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
 
@@ -73,17 +74,16 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
-    leading = [(number, rule) for number, rule in enumerate(plot.rules) if rule.do.then not in RESPONSES]
-    every = (scope.states for scope in plot.scopes()) if leading else ()
-    scopes = [(siblings, [(name, answerable(s, library)) for name, s in siblings.items()]) for siblings in every]
-    for number, rule in leading:
-        for siblings, ends in scopes:
-            for name, outcomes in ends:
-                answers = rule.on in outcomes and (not rule.of or name in rule.of)
-                if answers and rule.do.then not in siblings:
+    leading = [(n, rule) for n, rule in enumerate(plot.rules) if rule.then not in RESPONSES[rule.place]]
+    for scope in plot.scopes() if leading else ():
+        steps = [(name, state) for name, state in scope.states.items() if isinstance(state, Step)]
+        for number, rule in leading:
+            for name, state in steps:
+                answers = rule.on is None or rule.on in answerable(state, library)
+                if answers and concerns(rule, name, state, library) and rule.then not in scope.states:
                     error = SchemaError(
-                        f"the rule's way from '{name}' to '{rule.do.then}' crosses a border",
-                        place=plot.place(("rules", number, "do", "then")), found=rule.do.then, valid=siblings,
+                        f"the rule's way from '{name}' to '{rule.then}' crosses a border",
+                        place=plot.place(("rules", number, "do", "then")), found=rule.then, valid=scope.states,
                     )  # fmt: skip
                     yield Finding(error, "no border crossing", "say with `of` for which states the rule is")
 
@@ -163,7 +163,7 @@ class _Traffic:
 def _traffic(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> _Traffic:
     anywhere = {*(RESERVED - TIMERS), *plot.receives}
     inside: defaultdict[Path, set[str]] = defaultdict(set)
-    heard: set[str] = set()
+    heard: set[str] = {handler.on for handler in plot.handlers}
     for _, state, path in nesting.states:
         for _, _, transition in nesting.leaving(path):
             anywhere.update(transition.emitted)

@@ -455,6 +455,17 @@ WRONG = [
         + "variables: {w: place}\nrules:\n  - on: nobody\n    do: {then: continue}\n",
         9, "?event.where", "",
     ),
+    # -- rules that insert, handlers
+    ("rule response", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    do: {then: retry}\n", 11, "cannot 'retry' before a step", ""),
+    ("rule", ITEM + "  abc:\n" + GRASP + WIRED + E + "rules:\n  - after: [pick-upp]\n    do: {use: wait}\n", 10, "mean 'pick-up'", ""),
+    ("arguments are taken", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - after: a\n    do: {use: wait, pass: {speed: 2}}\n", 11, "whose response is 'continue'", "retry"),
+    ("known parameter", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    do: {pass: {sped: 2}}\n", 11, "mean 'speed'", ""),
+    ("condition", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    when: (on ?step.itm table)\n    do: {use: wait}\n", 11, "mean '?step.item'", ""),
+    ("known component", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    do: {command: [{switch: amr, to: rest}]}\n", 11, "mean 'arm'", ""),
+    ("rule event", ITEM + "  a:\n" + GRASP + "    on: {done: b, failed: e, lost: e}\n  b: {use: wait, on: {done: e}}\n" + E + "rules:\n  - on: lost\n    of: b\n    do: {then: e}\n", 11, "'b' cannot end with 'lost'", ""),
+    ("known event", S + "  a: {on: {done: e}}\n" + E + "handlers:\n  - on: low\n    do: {use: wait}\n", 6, "nothing here fires the event 'low'", "listen"),
+    ("handler", S + "  a: {on: {done: e, x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    interrupt: true\n    do: {tell: (free)}\n", 7, "interrupts nothing", "use"),
+    ("profile", H + "  a: {on: {x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    do: {use: wait}\n", 7, "handlers are for plots of profile dsc", "transitions"),
     # -- rules are transitions too
     (
         "no border crossing",
