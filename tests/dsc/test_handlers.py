@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-
 import pytest
 from dsc_charts import Run, plot
-
 
 from dsc import Component, Outcome, Sequencer, event, skill, validate_plot
 from dsc.dynamic.library import Library
