@@ -138,7 +138,7 @@ class Detours:
             branches = self._responses.carried_out(rule, key, onward, made)
             if branches[-1].guard is not None:
                 branches.append(following)
-            states[connector] = ChoiceState(choice=tuple(branches), about=f"rule: {rule.label}")
+            states[connector] = ChoiceState(choice=tuple(branches))
             states.update(made)
             following = Transition(target=connector)
         return following

@@ -26,6 +26,8 @@ from knowledge_base.language.expression import (
     substitute,
 )
 
+MOST = 32
+"""Candidates that are compared with each other; of states with more, nothing is said."""
 Conditions = Mapping[str, Expression]
 """Candidates in their order, with their conditions over what all of them are handed."""
 
@@ -36,8 +38,10 @@ def review_candidates(plot: ActionPlot, library: Library, nesting: Nesting) -> I
     for name, state, path in nesting.states:
         if not isinstance(state, DynamicState):
             continue
-        planned |= state.goal is not None
+        planned = planned or state.goal is not None
         conditions = {one: _condition(library.plot(one), state.arguments) for one in state.dynamic}
+        if len(conditions) > MOST:
+            continue
         for message in (*_never_chosen(conditions), *_overlapping(conditions)):
             error = SchemaError(f"state '{name}': {message}", place=plot.place((*path, "dynamic")))
             yield Finding(error, "candidates", "make their conditions exclude each other", "warning")
@@ -56,7 +60,7 @@ def _for_steps(library: Library) -> Iterator[Finding]:
     for action in dict.fromkeys(plot.implements for plot in library if plot.implements):
         plots = library.implementing(action)
         conditions = {plot.name: _condition(plot, plot.parameters) for plot in plots}
-        if _leave_a_gap(conditions):
+        if len(plots) <= MOST and _leave_a_gap(conditions):
             message = f"the plots for '{action}' leave a gap, where none of them fits: {', '.join(conditions)}"
             error = SchemaError(message, place=plots[-1].place(("when",)))
             yield Finding(error, "candidates", "widen one of them, or add one without `when`", "warning")

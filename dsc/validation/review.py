@@ -24,6 +24,9 @@ from knowledge_base.errors import SchemaError
 from knowledge_base.language.contradiction import contradictory
 from knowledge_base.language.expression import TRUE, Expression, Not
 
+MOST = 32
+"""Conditions looked at together; what comes after more than that is only looked at alone."""
+
 
 def review_plot(plot: ActionPlot, library: Library) -> list[Finding]:
     """Warnings about a plot that `validate_plot` finds nothing wrong with, at most `MAX_FINDINGS`."""
@@ -86,7 +89,8 @@ def _never(condition: Expression | None, earlier: Sequence[Expression | None]) -
     """Why something never happens that needs this condition and comes after others with theirs."""
     if condition is not None and contradictory(condition):
         return "its condition cannot hold"
-    if earlier and contradictory(condition or TRUE, *(Not(one or TRUE) for one in earlier)):
+    others = [Not(one or TRUE) for one in earlier]
+    if None in earlier or (0 < len(others) <= MOST and contradictory(condition or TRUE, *others)):
         return "whenever its condition holds, one before it does"
     return None
 

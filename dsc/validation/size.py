@@ -20,15 +20,23 @@ MAX_ANSWERS = 1_000
 
 def check_size(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """A finding if carrying out the plot's rules would take too long."""
-    if not plot.rules:
+    if not plot.rules and not plot.handlers:
         return
     answered = Counter(event for _, state, _ in nesting.states for event in answerable(state, library))
     steps = sum(isinstance(state, Step) for _, state, _ in nesting.states)
-    each = [_answers(rule, answered[rule.on] if rule.on is not None else steps, nesting) for rule in plot.rules]
-    if sum(each) > MAX_ANSWERS:
-        message = f"the rules would make {sum(each)} transitions; at most {MAX_ANSWERS} are made"
-        error = SchemaError(message, place=plot.place(("rules",)))
+    made = sum(_answers(rule, answered[rule.on] if rule.on is not None else steps, nesting) for rule in plot.rules)
+    made += sum(bool(rule.before) for rule in plot.rules) * _passing(nesting)  # each has a way of its own
+    made += sum(handler.interrupt for handler in plot.handlers) * len(nesting.states)
+    if made > MAX_ANSWERS:
+        what = "rules and handlers" if plot.rules and plot.handlers else "rules" if plot.rules else "handlers"
+        message = f"the {what} would make {made} transitions; at most {MAX_ANSWERS} are made"
+        error = SchemaError(message, place=plot.place(("rules",) if plot.rules else ("handlers",)))
         yield Finding(error, "bounded rules", "say with `of` for which states a rule is")
+
+
+def _passing(nesting: Nesting) -> int:
+    """How many transitions pass arguments."""
+    return sum(bool(way.passed) for _, _, path in nesting.states for _, _, way in nesting.leaving(path))
 
 
 def _answers(rule: Rule, at_most: int, nesting: Nesting) -> int:

@@ -30,6 +30,9 @@ from knowledge_base.language.printer import to_text
 MOST_CASES = 512
 """Ways in which a part of a condition can hold that are looked at; with more, the answer is "perhaps"."""
 
+MOST_TOGETHER = 64
+"""Things that have to hold or not in one such way; with more, the answer is "perhaps", too."""
+
 _OPPOSITE = {"=": "!=", "!=": "=", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 _MIRRORED = {"=": "=", "!=": "!=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
 
@@ -102,7 +105,7 @@ def _ordered(operator: str, left: Term, right: Term) -> Comparison:
 
 
 class _TooManyError(Exception):
-    """There are more than `MOST_CASES`."""
+    """There are more than `MOST_CASES`, or longer ones than `MOST_TOGETHER`."""
 
 
 def _cases(e: Expression) -> list[_Case]:
@@ -112,7 +115,8 @@ def _cases(e: Expression) -> list[_Case]:
             cases: list[_Case] = [()]
             for part in parts:
                 others = _cases(part)
-                if len(cases) * len(others) > MOST_CASES:
+                longest = max(map(len, cases), default=0) + max(map(len, others), default=0)
+                if len(cases) * len(others) > MOST_CASES or longest > MOST_TOGETHER:
                     raise _TooManyError
                 both = ((*case, *other) for case in cases for other in others)
                 cases = [case for case in both if _possible(case)]

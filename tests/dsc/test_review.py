@@ -174,6 +174,25 @@ def test_plots_for_the_steps_of_plans_that_leave_a_gap():
     assert "the plots for 'count' leave a gap, where none of them fits: few, many" in warning
 
 
+# -- large ones --------------------------------------------------------------------------------------------
+
+
+def test_of_what_is_too_large_to_decide_nothing_is_said():
+    ways = ", ".join(f"{{to: e, when: (= ?x {n})}}" for n in range(2_000))
+    assert warnings_of(f"plot: p\nvariables: {{x: number}}\nstates: {{a: {{on: {{x: [{ways}]}}}}, e: {{final: true}}}}\n") == []
+    many = " ".join(f"(p {n})" for n in range(10_000))
+    assert about_rules(f"{{on: lost, when: (and {many}), do: {{then: e}}}}", "{on: lost, when: (p 1), do: {then: e}}") == []
+    assert about_candidates(*(candidate(f"c{n}", f"(= (f) {n})") for n in range(500))) == []
+
+
+def test_rules_and_handlers_that_would_make_too_many_transitions_are_refused():
+    states = "".join(f"  s{n}: {{on: {{go: s{n + 1}}}}}\n" for n in range(600)) + "  s600: {final: true}\n"
+    text = f"plot: p\nreceives: {{go: , x: }}\nstates:\n{states}handlers:\n" + "  - {on: x, interrupt: true, do: {use: step}}\n" * 2
+    made = parse_plot(text, "p.yaml")
+    (finding,) = validate_plot(made, Library([made, STEP]))
+    assert "the handlers would make 1202 transitions; at most 1000" in str(finding)
+
+
 # -- no false alarm ----------------------------------------------------------------------------------------
 
 
