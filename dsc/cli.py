@@ -170,11 +170,14 @@ def diff(
 
 
 @app.command()
-def schema() -> None:
+def schema(
+    profile: Annotated[bool, typer.Option("--profile", help="That of profiles instead.")] = False,
+) -> None:
     """Print the JSON Schema of plot files, for editors."""
+    from dsc.text.profiles import profile_schema
     from dsc.text.schema import json_schema
 
-    _print_json(json_schema())
+    _print_json(profile_schema() if profile else json_schema())
 
 
 def _findings(file: Path, domain: Path | None, neighbours: Neighbours) -> list[Finding]:
