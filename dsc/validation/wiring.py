@@ -13,6 +13,7 @@ from dsc.dynamic.steps import Step, concerns
 from dsc.errors import Finding
 from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, TIMERS
 from dsc.model.actions import Trigger
+from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import RESPONSES
 from dsc.model.states import (
@@ -23,6 +24,7 @@ from dsc.model.states import (
 )
 from dsc.validation.attributes import Skills
 from dsc.validation.completion import check_completion
+from dsc.validation.connectors import circle_of
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
@@ -38,6 +40,7 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Ne
     traffic = _traffic(plot, library, skills, nesting)
     yield from _declared_events(plot)
     yield from _rule_targets(plot, library)
+    yield from _left_out_in_a_circle(plot, expanded)
     for name, state, path in nesting.states:
         if isinstance(state, FinalState):
             yield from _final(plot, state, path)
@@ -86,6 +89,17 @@ def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
                         place=plot.place(("rules", number, "do", "then")), found=rule.then, valid=scope.states,
                     )  # fmt: skip
                     yield Finding(error, "no border crossing", "say with `of` for which states the rule is")
+
+
+def _left_out_in_a_circle(plot: ActionPlot, expanded: ActionPlot) -> Iterator[Finding]:
+    """Rules that leave out steps leave one in, in every circle of steps."""
+    if not any(rule.before for rule in plot.rules):
+        return
+    connectors = ((name, state) for name, state, _ in expanded.walk() if isinstance(state, Connector))
+    ways = {name: [way.target or "" for _, way in state.transitions()] for name, state in connectors}
+    if circle_of(ways):
+        error = SchemaError("these rules may leave out all steps of a circle, for ever", place=plot.place(("rules",)))
+        yield Finding(error, "connectors lead on", "let `then` lead to a state where a run can rest")
 
 
 def _handled(states: Iterable[AnyState]) -> dict[str, bool]:

@@ -468,6 +468,8 @@ WRONG = [
     ("known event", S + "  a: {on: {done: e}}\n" + E + "handlers:\n  - on: low\n    do: {use: wait}\n", 6, "nothing here fires the event 'low'", "listen"),
     ("handler", S + "  a: {on: {done: e, x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    interrupt: true\n    do: {tell: (free)}\n", 7, "interrupts nothing", "use"),
     ("profile", H + "  a: {on: {x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    do: {use: wait}\n", 7, "handlers are for plots of profile dsc", "transitions"),
+    ("connectors lead on", S + "  a: {use: wait, on: {done: b}, after: {seconds: 9, to: e}}\n  b: {use: wait, on: {done: a}}\n" + E
+     + "rules:\n  - {before: [a, b], when: (free), do: {then: continue}}\n", 6, "all steps of a circle", "`then`"),
     # -- parameters of components
     ("component parameter", S + "  a:\n    entry:\n      set: lift.pace\n      to: 3\n    on: {done: e}\n" + E, 6, "from 0 to 2; found 3", ""),
     ("component parameter", S + "  a:\n    entry:\n      set: lift.port\n      to: x\n    on: {done: e}\n" + E, 5, "not changed by plots", "changed_by"),
