@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from itertools import islice
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation import World, holds
-from knowledge_base.language.expression import And, Expression
+from knowledge_base.language.expression import And, Atom, Constant, Expression
 from planning.domain import PlanningDomain
 from planning.execution.needs import Needs
 from planning.patience import Patience
@@ -71,14 +72,13 @@ def mending(
     numbers = range(1, len(before) + 1)
     firsts = [first for first in range(min(_MOST_LEFT_OUT + 1, len(before))) if not excluded & set(before[first:])]
     ends = [(tuple(before[first:]), needs.before(tuple(numbers[first:]))) for first in firsts]
-    near = [
-        (unmet + len(end), end, needed)
-        for end, needed in ends
-        if needed is not None and (unmet := sum(not _true(one, closed) for one in needed)) <= _MOST_UNMET
-    ]
+    gaps = [(end, needed, _unmet(needed, closed)) for end, needed in ends if needed is not None]
+    near = [(end, needed, gap) for end, needed, gap in gaps if len(gap) <= _MOST_UNMET]
     if not near:
         return None
-    _, end, needed = min(near, key=lambda one: one[0])
+    end, needed, gap = min(near, key=lambda one: len(one[0]) + len(one[2]))
+    if not all(map(derived.may_change, gap)):
+        return None
     try:
         problem = pose(domain, world, And(tuple(needed)), patience=patience)
     except InputError:  # what the end needs cannot be asked for
@@ -86,7 +86,16 @@ def mending(
     return None if problem.unreachable else Mending(end, problem)
 
 
+def _unmet(needed: Iterable[Expression], world: World) -> list[Expression]:
+    """What does not hold of what is needed, as soon as it is too much no more of it."""
+    return list(islice((one for one in needed if not _true(one, world)), _MOST_UNMET + 1))
+
+
 def _true(condition: Expression, world: World) -> bool:
+    if isinstance(condition, Atom) and condition.predicate in world.schema.predicates:
+        args = [term.value for term in condition.args if isinstance(term, Constant)]
+        if len(args) == len(condition.args) and condition.predicate not in world.schema.computed:
+            return world.holds(condition.predicate, tuple(args))  # most are such: asked once, not worth preparing
     try:
         return holds(condition, world)
     except InputError:

@@ -177,15 +177,15 @@ class Search:
         snapshot: WorldState,
     ) -> Found | NotFound:
         """One plan for the world as it was."""
-        mended = await self._mended(goal, seconds, before, snapshot) if before else None
+        budget = Patience(seconds)
+        mended = await self._mended(goal, seconds / 2, before, snapshot) if before else None
         if isinstance(mended, Found):
             return mended
-        patience = Patience(seconds)
         try:
-            problem = await self._posed(goal, snapshot, patience)
+            problem = await self._posed(goal, snapshot, Patience(budget.left))
         except OutOfPatienceError as error:
             return NotFound("timed_out", f"no plan within {seconds:g} s (while {error.doing})")
-        answer, better = await self._answer(problem, patience.left, rejected)
+        answer, better = await self._answer(problem, budget.left, rejected)
         if isinstance(answer, PlanFound):
             reproducible = answer.reproducible and mended is None
             return Found(replace(answer, reproducible=reproducible), better=better)
@@ -194,7 +194,7 @@ class Search:
         if rejected:
             reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
-        missing = await self._why_not(goal, snapshot, Patience(seconds))
+        missing = await self._why_not(goal, snapshot, Patience(budget.left))
         return NotFound("unsolvable", "; ".join(missing) or answer.reason)
 
     async def _posed(self, goal: Expression, snapshot: WorldState, patience: Patience) -> Problem:
@@ -232,7 +232,7 @@ class Search:
             return TimedOut("mending", seconds)
         if how is None:
             return None
-        seconds = min(seconds / 4, MENDING_SECONDS)
+        seconds = min(patience.left / 4, MENDING_SECONDS)
         answer, _ = await self._solve(without(how.problem, excluded), seconds, going_on=False)
         if not isinstance(answer, PlanFound):
             return answer if isinstance(answer, TimedOut) else None
