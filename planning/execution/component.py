@@ -283,6 +283,7 @@ class PlanningComponent(Component):
         rules = self._library.plot(carried.holder).rules if carried.holder in self._library else ()
         plan, domain = Plan(carried.course.steps), carried.course.domain
         plot = plot_from_plan(plan, domain, self._library, rules, carried.name, carried.order, self._shared)
+        self._library.expect(plot)
         form = plot.to_form()
         if instead_of is not None:
             _put_last(instead_of, _state(plot, form, "step_1")["dynamic"])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
-from knowledge_base.language.expression import Expression
+from knowledge_base.language.effect import Assign
+from knowledge_base.language.expression import Atom, Constant, Expression
 from planning.domain import PlanningDomain
-from planning.execution.regression import UnregressableError, conjuncts, leaves, regressed
+from planning.execution.regression import Leaf, UnregressableError, conjuncts, leaves, regressed
 from planning.plan import PlanStep
 from planning.posing.relevance import changed, names_of
 
@@ -30,6 +31,7 @@ class Needs:
         self._preconditions = [conjuncts(one.typed) for one in ground]
         self._changes = [leaves(one.effect) for one in ground]
         self._changed = [changed(one.effect) for one in ground]
+        self._plain = [_plain(changes) for changes in self._changes]
         self._names: dict[int, frozenset[str]] = {}  # by identity: all conditions live as long as what was found
         self._found: dict[tuple[int, ...], dict[Expression, int] | None] = {
             (): dict.fromkeys(conjuncts(goal), self._goal)
@@ -52,7 +54,7 @@ class Needs:
             return None
         own, changes = dict.fromkeys(self._preconditions[step - 1], step), self._changes[step - 1]
         # Of what later steps need, a step has to do with little: the rest is taken over as it is.
-        touched = [one for one in after if not self._changed[step - 1].isdisjoint(self._asked(one))]
+        touched = [one for one in after if self._touches(step, one)]
         rest = dict(after)
         for condition in touched:
             del rest[condition]
@@ -65,9 +67,27 @@ class Needs:
             return None
         return needed
 
+    def _touches(self, step: int, condition: Expression) -> bool:
+        """Whether the step may have to do with the condition; `False` is certain."""
+        if self._changed[step - 1].isdisjoint(self._asked(condition)):
+            return False
+        plain = self._plain[step - 1]
+        return plain is None or not isinstance(condition, Atom) or not _is_ground(condition) or condition in plain
+
     def _asked(self, condition: Expression) -> frozenset[str]:
         """The predicates and functions that the condition asks about."""
         found = self._names.get(id(condition))
         if found is None:
             found = self._names[id(condition)] = frozenset(names_of(condition))
         return found
+
+
+def _plain(changes: Iterable[Leaf]) -> frozenset[Atom] | None:
+    """The ground facts that are changed in any case, if there are no other changes."""
+    atoms = [None if one.variables or isinstance(one.change, Assign) else one.change.atom for one in changes]
+    plain = frozenset(atom for atom in atoms if atom is not None and _is_ground(atom))
+    return plain if len(plain) == len(atoms) else None
+
+
+def _is_ground(atom: Atom) -> bool:
+    return all(isinstance(term, Constant) for term in atom.args)
