@@ -137,10 +137,11 @@ class PlannerProcess:
         """Whether this engine can be asked for a plan with durations."""
         return problem.timed is not None and can_time(self.engine)
 
-    def _forms(self, problem: Problem) -> list[Problem]:
-        """The forms of a problem in which it is tried, one after the other."""
-        forms = (problem.timed if self._timed(problem) else None, problem, problem.whole)
-        return [one for one in forms if one is not None and not one.unreachable]
+    def _forms(self, problem: Problem) -> list[Callable[[], Problem]]:
+        """The forms of a problem in which it is tried, one after the other, each made when its turn comes."""
+        forms = [problem.timed] if self._timed(problem) else []
+        made = [_made(one) for one in (*forms, problem) if one is not None and not one.unreachable]
+        return made if problem.unsliced is None else [*made, problem.unsliced]
 
     async def _tried(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
         """The plans of the first form that has one; each but the last gets half of the time that is left."""
@@ -148,7 +149,7 @@ class PlannerProcess:
         cut_short = False
         for form in first:
             started = time.monotonic()
-            async with aclosing(self._attempt(form, seconds / 2)) as outcomes:
+            async with aclosing(self._attempt(form(), seconds / 2)) as outcomes:
                 async for outcome in outcomes:
                     if not isinstance(outcome, PlanFound | EngineFailed):
                         cut_short |= isinstance(outcome, TimedOut)
@@ -157,7 +158,7 @@ class PlannerProcess:
                 else:
                     return
             seconds -= min(time.monotonic() - started, seconds / 2)  # a new start is not planning time
-        async with aclosing(self._attempt(last, seconds)) as outcomes:
+        async with aclosing(self._attempt(last(), seconds)) as outcomes:
             async for outcome in outcomes:
                 yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
 
@@ -219,6 +220,10 @@ class PlannerProcess:
             return EngineFailed(self.engine, f"its plan is no solution: {plan}")
         cost = plan.seconds if durations else problem.cost(chosen)
         return PlanFound(plan, self.engine, seconds, problem.simulated_seconds, cost=cost)
+
+
+def _made(problem: Problem) -> Callable[[], Problem]:
+    return lambda: problem
 
 
 def _numbers(chosen: Any) -> list[int]:

@@ -13,66 +13,66 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from planning.posing.ways import Way, Ways
 from planning.quantities import Bound, fluents
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from planning.plan import PlanStep
-    from planning.posing.numbering import Numbering
     from planning.posing.reduction import Task
-
-_Key = tuple[str, tuple[str, ...]] | None
-
-
-def spared(task: Task) -> Ways | None:
-    """The ways that are left without the objects that others can stand in for; `None` if there are no such objects."""
-    settled = frozenset(_settled(task))
-    return task.ways.known(settled, lambda: _spared(task, settled))
+    from planning.posing.ways import Way
 
 
-def _spared(task: Task, settled: frozenset[Value]) -> Ways | None:
-    ways = task.ways.all
-    mentions = _mentions(task, settled)
+def spared(task: Task) -> list[int]:
+    """The positions of the ways that are of no use, because each mentions an object that another can stand in for."""
+    left = task.left or {}
+    settled = frozenset(_settled(task, left))
+    mentions = _mentions(task, left, settled)
     if not mentions:
-        return None
-    by_step: dict[_Key, list[Way]] = {}
-    for way in ways:
-        by_step.setdefault(_key(way.step), []).append(way)
-    named = dict.fromkeys([arg for way in ways if way.step for arg in way.step.args])
-    stand_ins = [name for name in named if name not in mentions]
+        return []
+    naming = task.ways.naming
+    stand_ins = [name for name in naming if name not in mentions and any(i in left for i in naming[name])]
+    # Who could stand in the last time is asked first.
+    before: dict[str, str] = task.ways.known("stand-ins", dict)
     gone: set[int] = set()
     for name, listed in mentions.items():
-        if any(_Exchange(name, other, task.numbering, by_step).covers(ways[i] for i in listed) for other in stand_ins):
+        others = sorted(stand_ins, key=lambda other: other != before.get(name))  # noqa: B023  used at once
+        exchanges = (_Exchange(name, other, task, left) for other in others)
+        exchange = next((one for one in exchanges if one.covers(left[i] for i in listed)), None)
+        if exchange is not None:
+            before[name] = exchange.other
             gone.update(listed)
-    return Ways([way for i, way in enumerate(ways) if i not in gone]) if gone else None
+    return sorted(gone)
 
 
-def _mentions(task: Task, settled: frozenset[Value]) -> Mapping[str, Iterable[int]]:
+def _mentions(task: Task, left: Mapping[int, Way], settled: frozenset[Value]) -> Mapping[str, Sequence[int]]:
     """Object that need not stay -> positions of the ways that mention it, in their step or in literals."""
-    ways = task.ways.all
-    about: dict[int, list[str]] = {}
-    for one in set[int]().union(*[part for way in ways for part in (way.needs, way.adds, way.deletes)]):
-        about[one] = [str(thing) for thing in _things(task.numbering.named(one)) if thing not in settled]
-    telling = {one for one, names in about.items() if names}
     found: dict[str, dict[int, None]] = {}
-    for i, way in enumerate(ways):
-        for name in way.step.args if way.step else ():
-            if name not in settled:
-                found.setdefault(name, {})[i] = None
-        for part in (way.needs, way.adds, way.deletes):
-            if not telling.isdisjoint(part):
-                for name in [name for one in part for name in about[one]]:
+    for name, positions in task.ways.naming.items():
+        if name not in settled and (mine := [i for i in positions if i in left]):
+            found[name] = dict.fromkeys(mine)
+    about = task.ways.known("about", lambda: _about(task))
+    for name in about.keys() - settled:
+        for one in about[name]:
+            for i in task.ways.touching.get(one, ()):
+                if i in left and any(one in part for part in (left[i].needs, left[i].adds, left[i].deletes)):
                     found.setdefault(name, {})[i] = None
-    return found
+    return {name: sorted(positions) for name, positions in sorted(found.items())}
 
 
-def _settled(task: Task) -> Iterator[Value]:
+def _about(task: Task) -> Mapping[str, Sequence[int]]:
+    """Object -> what of all that the ways need, add or delete is about it."""
+    about: dict[str, list[int]] = {}
+    for one in task.ways.touching:
+        for thing in {str(thing) for thing in _things(task.numbering.named(one))}:
+            about.setdefault(thing, []).append(one)
+    return about
+
+
+def _settled(task: Task, left: Mapping[int, Way]) -> Iterator[Value]:
     """The objects that must stay."""
     for number in (*task.init, *task.goal):
         yield from _things(task.numbering.named(number))
-    for way in task.ways.all if task.numbering.fluents else ():
+    for way in left.values() if task.numbering.fluents else ():
         for one in way.assignments:
             for fluent in (one.fluent, *fluents(one.amount)):
                 yield from fluent.args
@@ -89,10 +89,12 @@ def _things(one: Fact | Bound) -> Iterator[Value]:
 class _Exchange:
     """`other` in the place of `name`."""
 
-    def __init__(self, name: str, other: str, numbering: Numbering, by_step: Mapping[_Key, Sequence[Way]]) -> None:
-        self._name, self._other = name, other
-        self._images = numbering.images(name, other)
-        self._by_step = by_step
+    def __init__(self, name: str, other: str, task: Task, left: Mapping[int, Way]) -> None:
+        self.other = other
+        self._name = name
+        self._images = task.numbering.images(name, other)
+        self._of_step = task.ways.of_step
+        self._left = left
 
     def covers(self, ways: Iterable[Way]) -> bool:
         """Whether for each of the ways, all that mention `name`, there is one about `other` that is as good."""
@@ -109,14 +111,12 @@ class _Exchange:
             and (deletes == real.deletes or set(deletes).issuperset(real.deletes))
             and set(real.assignments) == set(way.assignments)
             and (real.cost or 0) <= (way.cost or 0)
-            for real in self._by_step.get(self._key(way), ())
+            for real in self._reals(way)
         ) or set(adds) <= set(needs)
 
-    def _key(self, way: Way) -> _Key:
-        if way.step is None:
-            return None
-        return way.step.action, tuple([self._other if arg == self._name else arg for arg in way.step.args])
-
-
-def _key(step: PlanStep | None) -> _Key:
-    return None if step is None else (step.action, step.args)  # hashed much faster than the step
+    def _reals(self, way: Way) -> Iterator[Way]:
+        there = None
+        if way.step is not None:
+            args = tuple([self.other if arg == self._name else arg for arg in way.step.args])
+            there = way.step.action, args
+        return (self._left[i] for i in self._of_step.get(there, ()) if i in self._left)
