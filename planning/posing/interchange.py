@@ -10,6 +10,7 @@ without a plan says nothing, and the problem is tried as a whole.
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
@@ -31,15 +32,14 @@ def spared(task: Task) -> list[int]:
         return []
     naming = task.ways.naming
     stand_ins = [name for name in naming if name not in mentions and any(i in left for i in naming[name])]
-    # Who could stand in the last time is asked first.
-    before: dict[str, str] = task.ways.known("stand-ins", dict)
+    before: dict[str, _Exchange] = task.ways.known("exchanges", dict)
     gone: set[int] = set()
     for name, listed in mentions.items():
-        others = sorted(stand_ins, key=lambda other: other != before.get(name))  # noqa: B023  used at once
-        exchanges = (_Exchange(name, other, task, left) for other in others)
-        exchange = next((one for one in exchanges if one.covers(left[i] for i in listed)), None)
+        known = [before[name]] if name in before and before[name].other in stand_ins else []  # as a rule once more
+        exchanges = chain(known, (_Exchange(name, other, task) for other in stand_ins))
+        exchange = next((one for one in exchanges if one.covers(listed, left)), None)
         if exchange is not None:
-            before[name] = exchange.other
+            before[name] = exchange
             gone.update(listed)
     return sorted(gone)
 
@@ -52,11 +52,18 @@ def _mentions(task: Task, left: Mapping[int, Way], settled: frozenset[Value]) ->
             found[name] = dict.fromkeys(mine)
     about = task.ways.known("about", lambda: _about(task))
     for name in about.keys() - settled:
+        mine = found.get(name, {})
         for one in about[name]:
             for i in task.ways.touching.get(one, ()):
-                if i in left and any(one in part for part in (left[i].needs, left[i].adds, left[i].deletes)):
-                    found.setdefault(name, {})[i] = None
+                if i not in mine and i in left and _touches(left[i], one):
+                    mine[i] = None
+        if mine:
+            found[name] = mine
     return {name: sorted(positions) for name, positions in sorted(found.items())}
+
+
+def _touches(way: Way, one: int) -> bool:
+    return one in way.needs or one in way.adds or one in way.deletes
 
 
 def _about(task: Task) -> Mapping[str, Sequence[int]]:
@@ -87,36 +94,46 @@ def _things(one: Fact | Bound) -> Iterator[Value]:
 
 
 class _Exchange:
-    """`other` in the place of `name`."""
+    """`other` in the place of `name`; remembers what covered each way, which as a rule does so again."""
 
-    def __init__(self, name: str, other: str, task: Task, left: Mapping[int, Way]) -> None:
+    def __init__(self, name: str, other: str, task: Task) -> None:
         self.other = other
         self._name = name
         self._images = task.numbering.images(name, other)
         self._of_step = task.ways.of_step
-        self._left = left
+        self._proofs: dict[int, tuple[Way, int, Way]] = {}
 
-    def covers(self, ways: Iterable[Way]) -> bool:
+    def covers(self, positions: Iterable[int], left: Mapping[int, Way]) -> bool:
         """Whether for each of the ways, all that mention `name`, there is one about `other` that is as good."""
-        return all(map(self._covers, ways))
+        return all(self._proven(i, left) or self._covers(i, left) for i in positions)
 
-    def _covers(self, way: Way) -> bool:
-        images = self._images
+    def _proven(self, i: int, left: Mapping[int, Way]) -> bool:
+        proof = self._proofs.get(i)
+        return proof is not None and proof[0] is left[i] and left.get(proof[1]) is proof[2]
+
+    def _covers(self, i: int, left: Mapping[int, Way]) -> bool:
+        way, images = left[i], self._images
         needs = tuple([images[one] for one in way.needs])
         adds = tuple([images[one] for one in way.adds])
         deletes = tuple([images[one] for one in way.deletes])
-        return any(
-            (needs == real.needs or set(needs).issuperset(real.needs))
-            and (adds == real.adds or set(adds) <= {*real.adds, *real.needs})
-            and (deletes == real.deletes or set(deletes).issuperset(real.deletes))
-            and set(real.assignments) == set(way.assignments)
-            and (real.cost or 0) <= (way.cost or 0)
-            for real in self._reals(way)
-        ) or set(adds) <= set(needs)
+        for j, real in self._reals(way, left):
+            if (
+                (needs == real.needs or set(needs).issuperset(real.needs))
+                and (adds == real.adds or set(adds) <= {*real.adds, *real.needs})
+                and (deletes == real.deletes or set(deletes).issuperset(real.deletes))
+                and set(real.assignments) == set(way.assignments)
+                and (real.cost or 0) <= (way.cost or 0)
+            ):
+                self._proofs[i] = (way, j, real)
+                return True
+        if set(adds) <= set(needs):  # it is of no use
+            self._proofs[i] = (way, i, way)
+            return True
+        return False
 
-    def _reals(self, way: Way) -> Iterator[Way]:
+    def _reals(self, way: Way, left: Mapping[int, Way]) -> Iterator[tuple[int, Way]]:
         there = None
         if way.step is not None:
             args = tuple([self.other if arg == self._name else arg for arg in way.step.args])
             there = way.step.action, args
-        return (self._left[i] for i in self._of_step.get(there, ()) if i in self._left)
+        return ((j, left[j]) for j in self._of_step.get(there, ()) if j in left)
