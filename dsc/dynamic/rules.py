@@ -62,6 +62,8 @@ class _Expansion:
     counters: dict[str, Variable] = field(default_factory=dict)
     names: set[str] = field(default_factory=set)
     beside: dict[str, Mapping[str, AnyState]] = field(default_factory=dict)
+    endings: dict[tuple[str, str], Transition] = field(default_factory=dict)
+    ends: dict[tuple[int, str], str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.names = {name for name, _, _ in self.plot.walk()}
@@ -103,8 +105,17 @@ class _Expansion:
 
     def _ending(self, name: str, outcome: str, reason: str) -> Transition:
         """To the final state beside a step that ends the generated plot with the outcome."""
-        ends = (each for each, one in self.beside[name].items() if isinstance(one, FinalState) and one.emit == outcome)
-        return Transition.model_validate({"to": next(ends, outcome), "assign": {"reason": reason}})
+        end = self._end(self.beside[name], outcome)
+        if (end, reason) not in self.endings:  # the same for many steps
+            self.endings[end, reason] = Transition.model_validate({"to": end, "assign": {"reason": reason}})
+        return self.endings[end, reason]
+
+    def _end(self, scope: Mapping[str, AnyState], outcome: str) -> str:
+        """The final state of a scope that emits the outcome; looked for once."""
+        if (id(scope), outcome) not in self.ends:
+            found = (each for each, one in scope.items() if isinstance(one, FinalState) and one.emit == outcome)
+            self.ends[id(scope), outcome] = next(found, outcome)
+        return self.ends[id(scope), outcome]
 
     def _answer(
         self, rule: Rule, key: str, name: str, state: State, recoveries: dict[str, AnyState]

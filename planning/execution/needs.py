@@ -54,7 +54,9 @@ class Needs:
             return None
         own, changes = dict.fromkeys(self._preconditions[step - 1], step), self._changes[step - 1]
         # Of what later steps need, a step has to do with little: the rest is taken over as it is.
-        touched = [one for one in after if self._touches(step, one)]
+        names, changed_here = self._names, self._changed[step - 1]
+        about = [one for one in after if not changed_here.isdisjoint(names.get(id(one)) or self._asked(one))]
+        touched = [one for one in about if self._touches(step, one)]
         rest = dict(after)
         for condition in touched:
             del rest[condition]
@@ -68,17 +70,13 @@ class Needs:
         return needed
 
     def _touches(self, step: int, condition: Expression) -> bool:
-        """Whether the step may have to do with the condition; `False` is certain."""
-        if self._changed[step - 1].isdisjoint(self._asked(condition)):
-            return False
+        """Whether the step may have to do with a condition about what it changes; `False` is certain."""
         plain = self._plain[step - 1]
         return plain is None or not isinstance(condition, Atom) or not _is_ground(condition) or condition in plain
 
     def _asked(self, condition: Expression) -> frozenset[str]:
         """The predicates and functions that the condition asks about."""
-        found = self._names.get(id(condition))
-        if found is None:
-            found = self._names[id(condition)] = frozenset(names_of(condition))
+        found = self._names[id(condition)] = frozenset(names_of(condition))
         return found
 
 

@@ -186,13 +186,14 @@ class _Tracing:
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
         """Step number `number` comes next."""
         action, bindings = domain.action(step), domain.bindings(step)
-        effect = substitute_effect(action.effect, bindings)
+        ground = domain.ground(step)
+        effect = ground.effect
         if action.timed is None:
             doing = changes(effect, self.world)
         else:
             start, end = (substitute_effect(e, bindings) for e in (action.timed.start_effect, action.timed.end_effect))
             doing = changes(end, self.world, after=start)
-        needed = conjuncts(substitute(action.precondition, bindings), self.world)
+        needed = conjuncts(ground.condition, self.world)
         asked = (one for one in doing.conditions if holds(one, self.world, {}))  # else its own start brings it about
         for condition in dict.fromkeys((*needed, *asked)):
             self.need(number, condition, str(step))
