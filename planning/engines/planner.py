@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import math
 import threading
 import time
@@ -15,6 +16,7 @@ from contextlib import AbstractContextManager, aclosing, nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
+from knowledge_base.language.memory import IdentityCache
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import can_time, cannot, in_concert, nobody
 from planning.patience import aside
@@ -175,7 +177,7 @@ class PlannerProcess:
             return
         started = time.monotonic()
         try:
-            async with aclosing(_answers(process, problem.to_json(), seconds)) as answers:
+            async with aclosing(_answers(process, written(problem), seconds)) as answers:
                 async for answer in answers:
                     outcome = self._judged(answer, problem, time.monotonic() - started)
                     if best is None or (isinstance(outcome, PlanFound) and outcome.cost < best.cost):
@@ -219,7 +221,20 @@ class PlannerProcess:
         if isinstance(plan, str):
             return EngineFailed(self.engine, f"its plan is no solution: {plan}")
         cost = plan.seconds if durations else problem.cost(chosen)
-        return PlanFound(plan, self.engine, seconds, problem.simulated_seconds, cost=cost)
+        translated = answer.get("translated", 0.0)
+        return PlanFound(
+            plan, self.engine, seconds, problem.simulated_seconds, cost=cost,
+            translated=translated if isinstance(translated, float) else 0.0,
+        )  # fmt: skip
+
+
+_written: IdentityCache[Problem, bytes] = IdentityCache(size=2)
+
+
+def written(problem: Problem) -> bytes:
+    """The problem as a worker reads it; all engines of a race get the same."""
+    known = _written.find(problem, None)
+    return known or _written.keep(problem, None, json.dumps(problem.to_json()).encode() + b"\n")
 
 
 def _made(problem: Problem) -> Callable[[], Problem]:
@@ -241,7 +256,7 @@ def _times(timed: Any) -> list[tuple[int, float, float]]:
 
 
 async def _answers(
-    process: EngineProcess, request: dict[str, Any], seconds: float
+    process: EngineProcess, request: bytes, seconds: float
 ) -> AsyncGenerator[dict[str, Any], None]:
     """What the process answers, as it comes; closing this ends the search.
 

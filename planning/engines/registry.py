@@ -94,7 +94,7 @@ ENGINES = (
         features=frozenset({"costs"}), anytime=True,
     ),
     Engine(
-        "pyperplan", "up", "up_pyperplan.engine:EngineImpl", "up-pyperplan", "1.1", "GPL-3.0", most_actions=1500,
+        "pyperplan", "pyperplan", "greedy, h_FF", "pyperplan", "2.1", "GPL-3.0", most_actions=1500,
     ),
     Engine(
         "enhsp", "up", "up_enhsp.enhsp_planner:ENHSPEngine", "up-enhsp", "0.1.1", "GPL-3.0",

@@ -22,7 +22,7 @@ from functools import cached_property
 from knowledge_base.errors import InputError
 from knowledge_base.language.effect import substitute_effect
 from knowledge_base.language.evaluation import World, apply_effect, holds
-from knowledge_base.language.expression import Expression, substitute
+from knowledge_base.language.expression import Expression
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
 from planning.domain import PlanningDomain

@@ -130,7 +130,8 @@ class Derivation:
 
     def may_change(self, e: Expression) -> bool:
         """Whether some action may make the expanded condition true or false; `False` is certain."""
-        fixed = self._schema.predicates.keys() - self._schema.computed.keys() - self._unsupported.keys() - self._changing
+        changing = self._changing.union(self._schema.computed, self._unsupported)
+        fixed = self._schema.predicates.keys() - changing
         return not all(name in fixed or self._schema.is_type(name, 1) for name in names_of(e))
 
     @property

@@ -48,8 +48,8 @@ def _mentions(task: Task, left: Mapping[int, Way], settled: frozenset[Value]) ->
     """Object that need not stay -> positions of the ways that mention it, in their step or in literals."""
     found: dict[str, dict[int, None]] = {}
     for name, positions in task.ways.naming.items():
-        if name not in settled and (mine := [i for i in positions if i in left]):
-            found[name] = dict.fromkeys(mine)
+        if name not in settled and (here := [i for i in positions if i in left]):
+            found[name] = dict.fromkeys(here)
     about = task.ways.known("about", lambda: _about(task))
     for name in about.keys() - settled:
         mine = found.get(name, {})
