@@ -177,7 +177,8 @@ def whole_row(items: int) -> dict[str, Any]:
 def optimal_row(items: int) -> dict[str, Any]:
     """Trips next to the fewest there can be, which an optimal engine finds when trips alone cost."""
     problem = pose(set_table.domain(), set_table.world(items), set_table.GOAL)
-    priced = replace(problem, unsliced=None, actions=tuple(replace(a, cost=_trip_cost(a.step)) for a in problem.actions))
+    actions = tuple(replace(a, cost=_trip_cost(a.step)) for a in problem.actions)
+    priced = replace(problem, unsliced=None, actions=actions)
     fewest = asyncio.run(_solved("fast-downward-opt", priced))
     if not isinstance(fewest, PlanFound):
         return {"items": items, "trips": "", "fewest": f"not within {SECONDS:g} s", "": ""}

@@ -224,9 +224,13 @@ class Problem:
     def to_json(self) -> dict[str, Any]:
         """As JSON data, reversible except for `whole` and `timed`; facts are listed once and referred to by number."""
         number: dict[Fact, int] = {}
+        known: dict[int, int] = {}  # by identity, which is looked up faster; all facts are ours, so they stay
 
-        def refer(facts: Iterable[Fact]) -> list[int]:
-            return [number.setdefault(one, len(number)) for one in facts]
+        def refer(facts: Collection[Fact]) -> list[int]:
+            for one in facts:
+                if id(one) not in known:
+                    known[id(one)] = number.setdefault(one, len(number))
+            return [known[id(one)] for one in facts]
 
         rest = {
             "domain": self.domain,

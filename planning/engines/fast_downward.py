@@ -18,12 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from knowledge_base.facts import Fact
     from planning.engines.registry import Engine
-    from planning.engines.worker import Answers, Search
-    from planning.strips import Problem
+    from planning.engines.worker import Answers, Request, Search
 
 # Lazy greedy search with h_FF alone: on the clean-up table preferred operators and landmarks are no faster up to 50
 # items and make up to twice as many trips. What follows only ever looks for a better plan.
@@ -50,8 +46,8 @@ def searching(engine: Engine) -> Search:
     """
     program, options = str(_program()), _SEARCHES[engine.made_by]
 
-    def search(problem: Problem) -> Answers:
-        return _plans(program, options, sas(problem))
+    def search(request: Request) -> Answers:
+        return _plans(program, options, sas(request))
 
     return search
 
@@ -103,24 +99,19 @@ def _read(file: Path) -> list[int]:
     return [int(line.strip("() ").removeprefix("a")) for line in lines if line.startswith("(")]
 
 
-def sas(problem: Problem) -> str:
+def sas(request: Request) -> str:
     """The problem in the translator's output format; actions are called `a0`, `a1`, ... as they are numbered."""
-    number: dict[Fact, int] = {}
-
-    def refer(facts: Iterable[Fact]) -> list[int]:
-        return [number.setdefault(one, len(number)) for one in facts]
-
-    init, goal = set(refer(problem.init)), refer(problem.goal)
-    actions = [(refer(one.precondition), refer(one.adds), refer(one.deletes)) for one in problem.actions]
-    costs = _whole([Fraction(action.cost).limit_denominator(_FINEST_COST) for action in problem.actions])
-    lines = ["begin_version", "3", "end_version", "begin_metric", "1", "end_metric", str(len(number))]
-    for n in range(len(number)):
+    number, init, goal, actions = len(request["facts"]), set(request["init"]), request["goal"], request["actions"]
+    prices = {cost: Fraction(cost).limit_denominator(_FINEST_COST) for cost in {action[4] for action in actions}}
+    unit = lcm(*(price.denominator for price in prices.values()))
+    lines = ["begin_version", "3", "end_version", "begin_metric", "1", "end_metric", str(number)]
+    for n in range(number):
         lines += ["begin_variable", f"var{n}", "-1", "2", f"NegatedAtom f{n}()", f"Atom f{n}()", "end_variable"]
-    lines += ["0", "begin_state", *("1" if n in init else "0" for n in range(len(number))), "end_state"]
+    lines += ["0", "begin_state", *("1" if n in init else "0" for n in range(number)), "end_state"]
     lines += ["begin_goal", str(len(goal)), *(f"{n} 1" for n in goal), "end_goal"]
     lines.append(str(len(actions)))
-    for n, (action, cost) in enumerate(zip(actions, costs, strict=True)):
-        lines += _operator(f"a{n}", *action, cost)
+    for n, (_, needs, adds, deletes, cost, *_) in enumerate(actions):
+        lines += _operator(f"a{n}", needs, adds, deletes, int(prices[cost] * unit))
     return "\n".join([*lines, "0", ""])
 
 
@@ -130,10 +121,3 @@ def _operator(name: str, needs: list[int], adds: list[int], deletes: list[int], 
     return [
         "begin_operator", name, str(len(prevail)), *prevail, str(len(effects)), *effects, str(cost), "end_operator",
     ]  # fmt: skip
-
-
-def _whole(costs: Iterable[Fraction]) -> list[int]:
-    """In the same proportions, as whole numbers."""
-    costs = list(costs)
-    unit = lcm(*(cost.denominator for cost in costs))
-    return [int(cost * unit) for cost in costs]

@@ -13,14 +13,14 @@ from unified_planning.engines import PlanGenerationResultStatus, pddl_planner
 from unified_planning.plans import TimeTriggeredPlan
 
 from planning.engines.translation import ticks, translated
+from planning.strips import Problem
 
 if TYPE_CHECKING:
     from unified_planning.engines.results import PlanGenerationResult
     from unified_planning.model import Problem as UpProblem
 
     from planning.engines.registry import Engine
-    from planning.engines.worker import Answers, Search
-    from planning.strips import Problem
+    from planning.engines.worker import Answers, Request, Search
 
 
 _NO_MEMORY = ("OutOfMemoryError", "insufficient memory")
@@ -36,7 +36,8 @@ def searching(engine: Engine) -> Search:
     module, _, name = engine.made_by.partition(":")
     make = getattr(import_module(module), name)
 
-    def search(problem: Problem) -> Answers:
+    def search(request: Request) -> Answers:
+        problem = Problem.from_json(request)
         return _found(make(), translated(problem, costs="costs" in engine.features & problem.features), problem)
 
     return search

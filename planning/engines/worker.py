@@ -26,12 +26,9 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NoReturn
-
-if TYPE_CHECKING:
-    from planning.strips import Problem
+from typing import Any, NoReturn
 
 _PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 
@@ -41,7 +38,10 @@ Schedule = dict[str, list[tuple[int, float, float]]]
 Answers = Iterator[list[int] | Schedule | None]
 """What an engine finds, which it searches for when asked for the next one."""
 
-Search = Callable[["Problem"], Answers]
+Request = Mapping[str, Any]
+"""A problem as `Problem.to_json` gives it: with numbers for facts, which is all that most engines want to know."""
+
+Search = Callable[[Request], Answers]
 """Puts a problem into the engine's words; the search begins when the first answer is asked for."""
 
 MEGABYTES = 2048
@@ -92,7 +92,7 @@ def _loaded(name: str) -> Search:
     except Exception as error:  # noqa: BLE001  a broken installation is an answer, too
         failure = error
 
-        def failing(problem: Problem) -> Answers:  # noqa: ARG001
+        def failing(request: Request) -> Answers:  # noqa: ARG001
             raise failure
 
         return failing
@@ -192,11 +192,9 @@ def _limit_memory(megabytes: int) -> None:
 
 
 def _answer(line: bytes, search: Search, said: int) -> None:
-    from planning.strips import Problem  # noqa: PLC0415  see _loaded
-
     try:
         began = time.thread_time()
-        answers = search(Problem.from_json(json.loads(line)))
+        answers = search(json.loads(line))
         translated = time.thread_time() - began
         for actions in answers:
             answer = actions if isinstance(actions, dict) else {"actions": actions}

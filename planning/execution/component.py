@@ -134,7 +134,7 @@ class PlanningComponent(Component):
             return Outcome("goal_holds")
         self._telling.asked(goal, self._knowledge.version)
         try:
-            found = await self._search.plan(wanted, seconds, () if before is None else before.course.left_steps)
+            found = await self._search.plan(wanted, seconds, None if before is None else before.course)
             if isinstance(found, NotFound):
                 return self._none(found.kind, found.reason)
             now = self._derivation.at(self._knowledge)

@@ -152,6 +152,10 @@ class Course:
         """
         return self._needs.before(self.left)
 
+    def needed_from(self, first: int) -> Mapping[Expression, int] | None:
+        """As `needed`, as if the first of the steps that are left were done."""
+        return self._needs.before(self.left[first:])
+
     def needed_later(self) -> Mapping[Expression, int] | None:
         """As `needed`, as if everything at work were done."""
         return self._needs.before(self._after(self.at_work))

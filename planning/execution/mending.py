@@ -11,7 +11,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation import World, holds
 from knowledge_base.language.expression import And, Atom, Constant, Expression
 from planning.domain import PlanningDomain
-from planning.execution.needs import Needs
+from planning.execution.course import Course
 from planning.patience import Patience
 from planning.plan import Plan, PlanStep
 from planning.posing.derived import derivation
@@ -44,7 +44,7 @@ class Mending:
 
 
 def mending(
-    before: Sequence[PlanStep],
+    before: Course,
     excluded: AbstractSet[PlanStep],
     domain: PlanningDomain,
     world: World,
@@ -56,7 +56,7 @@ def mending(
     Of the ends of the plan the one that is nearest to being possible is kept; the problem is to reach what it needs.
 
     Args:
-        before: the steps that are left of the plan.
+        before: the plan as far as it came.
         excluded: steps that shall not be taken.
         domain: has the steps' conditions and effects.
         world: the present.
@@ -67,11 +67,11 @@ def mending(
         OutOfPatienceError: it takes too long.
     """
     derived = derivation(domain)
-    closed, wanted = derived.world(world), derived.expand(goal)
-    needs = Needs(before, derived.domain, wanted)  # of all ends, since a shorter one is the end of a longer one
-    numbers = range(1, len(before) + 1)
-    firsts = [first for first in range(min(_MOST_LEFT_OUT + 1, len(before))) if not excluded & set(before[first:])]
-    ends = [(tuple(before[first:]), needs.before(tuple(numbers[first:]))) for first in firsts]
+    closed, steps = derived.world(world), before.left_steps
+    if derived.recursive:  # its conditions are those of another state of the world
+        before = Course(steps, derived.domain, derived.expand(goal))
+    firsts = [first for first in range(min(_MOST_LEFT_OUT + 1, len(steps))) if not excluded & set(steps[first:])]
+    ends = [(steps[first:], before.needed_from(first)) for first in firsts]
     gaps = [(end, needed, _unmet(needed, closed)) for end, needed in ends if needed is not None]
     near = [(end, needed, gap) for end, needed, gap in gaps if len(gap) <= _MOST_UNMET]
     if not near:
