@@ -27,7 +27,7 @@ from planning.posing.grounding import Variant
 from planning.posing.groundwork import Groundwork, numbered, things_of
 from planning.posing.interchange import spared
 from planning.posing.reduction import Task, pruned, reachable
-from planning.posing.relevance import Relevant, relevant
+from planning.posing.relevance import Relevant, names_of, relevant
 from planning.posing.timed import durative, pose_timed
 from planning.posing.unforeseeable import refuse_unforeseeable
 from planning.posing.ways import Ways
@@ -112,6 +112,7 @@ class Poser:
         self._derivation = derivation(domain)
         self._domain = self._derivation.domain
         self._kept: dict[tuple[tuple[str, ...], frozenset[str], Term | None], tuple[Groundwork, Assembly]] = {}
+        self._matters: dict[tuple[frozenset[str], Term | None], Relevant] = {}
         self._lock = threading.Lock()
 
     def pose(
@@ -166,7 +167,7 @@ class Poser:
             UnsupportedGoalError, UnsupportedActionError, OutOfPatienceError: as for `pose`.
         """
         goal = self._derivation.expand(goal)
-        matters = relevant(goal, metric, self._domain.actions.values())
+        matters = self._relevant(goal, metric)
         self._derivation.require_supported(goal, matters.actions)
         refuse_unforeseeable(goal, matters.actions, self._domain)
         patience = patience or Patience()
@@ -184,6 +185,15 @@ class Poser:
         init = (numbering.present(world) - {numbering.of(_ACTING.negated)}) | {numbering.of(_ACTING)}
         task = Task(numbering, init, goal_numbers, ways)
         return Posing(matters, wanted, task, assembly)
+
+    def _relevant(self, goal: Expression, metric: Term | None) -> Relevant:
+        """What matters for the goal; the same for all that ask about the same predicates and functions."""
+        key = frozenset(names_of(goal)), metric
+        if key not in self._matters:
+            if len(self._matters) >= _MOST_KEPT:
+                self._matters.clear()
+            self._matters[key] = relevant(goal, metric, self._domain.actions.values())
+        return self._matters[key]
 
     def _prepared(
         self, matters: Relevant, metric: Term | None, world: World, patience: Patience
