@@ -26,7 +26,8 @@ from typing import Any
 import replanning
 import set_table
 
-from planning.engines.planner import PlannerProcess
+from planning.engines.fast_downward import sas
+from planning.engines.planner import PlannerProcess, written
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, installed
 from planning.generation.plot import plot_from_plan
@@ -149,11 +150,12 @@ def part_row(items: int, rounds: int) -> dict[str, Any]:
     poser = Poser(domain)
     problem = poser.pose(world, goal)
     plan = _plan(problem)
-    order = deordered(plan, domain, world, goal)
+    order, request = deordered(plan, domain, world, goal), written(problem)
     parts: dict[str, Callable[[], object]] = {
         "pose, cold": lambda: Poser(domain).pose(world, goal),
         "pose, warm": lambda: poser.pose(world, goal),
-        "translate": lambda: json.dumps(problem.to_json()),
+        "write": lambda: written(replace(problem)),
+        "translate": lambda: sas(json.loads(request)),
         "validate": lambda: validate(plan, domain, world, goal),
         "de-order": lambda: deordered(plan, domain, world, goal),
         "generate": lambda: plot_from_plan(plan, domain, None, order=order),
