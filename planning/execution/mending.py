@@ -67,12 +67,13 @@ def mending(
         OutOfPatienceError: it takes too long.
     """
     derived = derivation(domain)
-    closed, steps = derived.world(world), before.left_steps
+    closed, left = derived.world(world), before.left  # once: the plan may go on meanwhile
     if derived.recursive:  # its conditions are those of another state of the world
-        before = Course(steps, derived.domain, derived.expand(goal))
-    firsts = [first for first in range(min(_MOST_LEFT_OUT + 1, len(steps))) if not excluded & set(steps[first:])]
-    ends = [(steps[first:], before.needed_from(first)) for first in firsts]
-    gaps = [(end, needed, _unmet(needed, closed)) for end, needed in ends if needed is not None]
+        before = before.renewed(derived.domain, derived.expand(goal))
+    ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))
+    known = ((before.steps_of(end), before.needed_by(end)) for end in ends)
+    allowed = [(end, needed) for end, needed in known if excluded.isdisjoint(end)]
+    gaps = [(end, needed, _unmet(needed, closed)) for end, needed in allowed if needed is not None]
     near = [(end, needed, gap) for end, needed, gap in gaps if len(gap) <= _MOST_UNMET]
     if not near:
         return None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from planning.posing.reduction import Task
     from planning.posing.ways import Way
 
-_MOST_KEPT = 50_000
+_MOST_KEPT = 20_000  # ground actions; a problem of 50 items has 3,000
 
 
 class Assembly:
