@@ -200,7 +200,8 @@ class _Tracing:
         for fluent in doing.reads:
             self._rely(number, fluent)
         self._change(number, doing)
-        self.world.apply(apply_effect(effect, self.world))
+        plain = action.timed is None and not doing.numbers
+        self.world.apply(doing.delta() if plain else apply_effect(effect, self.world))
 
     def need(self, user: int, condition: Expression, whose: str) -> None:
         """A step, or the goal, needs a ground condition now."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def spared(task: Task) -> list[int]:
     """The positions of the ways that are of no use, because each mentions an object that another can stand in for."""
     left = task.left or {}
-    settled = frozenset(_settled(task, left))
+    settled = frozenset(map(str, _settled(task, left)))
     mentions = _mentions(task, left, settled)
     if not mentions:
         return []
@@ -44,7 +44,7 @@ def spared(task: Task) -> list[int]:
     return sorted(gone)
 
 
-def _mentions(task: Task, left: Mapping[int, Way], settled: frozenset[Value]) -> Mapping[str, Sequence[int]]:
+def _mentions(task: Task, left: Mapping[int, Way], settled: frozenset[str]) -> Mapping[str, Sequence[int]]:
     """Object that need not stay -> positions of the ways that mention it, in their step or in literals."""
     found: dict[str, dict[int, None]] = {}
     for name, positions in task.ways.naming.items():
