@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
@@ -67,10 +68,7 @@ class Engine:
     @property
     def version(self) -> str | None:
         """The installed version of its package; `None` if there is none."""
-        try:
-            return version(self.package)
-        except PackageNotFoundError:
-            return None
+        return _version(self.package)
 
     def lacks(self) -> str:
         """What to do before it can be used; empty if it can be used now."""
@@ -84,6 +82,15 @@ class Engine:
     def can_do(self, features: Collection[str]) -> bool:
         """Whether it can plan with these features; `WISHES` are not asked for."""
         return self.features.issuperset(frozenset(features) - WISHES)
+
+
+@cache
+def _version(package: str) -> str | None:
+    """Looked up once: it takes a millisecond, and is asked for each engine whenever a race begins."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
 
 
 # In the order of preference. Fast Downward gets its input ready made (see the driver), so that it is ahead of
