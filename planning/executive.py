@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import gc
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -170,7 +172,8 @@ class Executive:
         sequencer.dispatcher.deploy(planning)
         if prepare is not None:
             prepare(sequencer)
-        return await sequencer.run(plot, arguments)
+        with nullcontext() if clock.simulated else _settled():
+            return await sequencer.run(plot, arguments)
 
     def close(self) -> None:
         """End the planners' processes, if there are any of its own."""
@@ -192,6 +195,16 @@ class Executive:
     def __exit__(self, *_: object) -> None:
         """`close`."""
         self.close()
+
+
+@contextmanager
+def _settled() -> Iterator[None]:
+    """What is there now is left alone by the garbage collector, which would stop the robot to look at all of it."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 @cache

@@ -53,7 +53,9 @@ class StepTracer:
         """A macrostep in which something happened: new plots before it, the rules that answered after it."""
         if not step.moved:
             return None
-        self._plots(step)
+        heard = self._trace.heard  # else nobody wants to know what plots look like, which takes a while to say
+        if heard:
+            self._plots(step)
         seq = self._trace.record(
             "step",
             microsteps=[
@@ -64,7 +66,7 @@ class StepTracer:
                     ],
                     "exited": list(micro.exited),
                     "entered": list(micro.entered),
-                    **_bound(micro),
+                    **(_bound(micro) if heard else {}),
                 }
                 for micro in step.microsteps
             ],

@@ -134,7 +134,7 @@ class PlanningComponent(Component):
             return Outcome("goal_holds")
         self._telling.asked(goal, self._knowledge.version)
         try:
-            found = await self._search.plan(wanted, seconds, () if before is None else before.course.left_steps)
+            found = await self._search.plan(wanted, seconds, None if before is None else before.course)
             if isinstance(found, NotFound):
                 return self._none(found.kind, found.reason)
             now = self._derivation.at(self._knowledge)
@@ -283,6 +283,7 @@ class PlanningComponent(Component):
         rules = self._library.plot(carried.holder).rules if carried.holder in self._library else ()
         plan, domain = Plan(carried.course.steps), carried.course.domain
         plot = plot_from_plan(plan, domain, self._library, rules, carried.name, carried.order, self._shared)
+        self._library.expect(plot)
         form = plot.to_form()
         if instead_of is not None:
             _put_last(instead_of, _state(plot, form, "step_1")["dynamic"])
