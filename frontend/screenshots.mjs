@@ -1,13 +1,12 @@
 // The pictures of the page that the docs show: `make screenshots`. Whole pages where it is about the whole, else a pane.
-import { mkdtempSync, readFileSync } from "node:fs";
+import { mkdtempSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { browse, goTo, loaded, open, record, ROOT, serve, settled } from "./browser.mjs";
 
 const PICTURES = process.env.PICTURES ?? join(ROOT, "docs", "pictures");
-const trace = process.env.TRACE ?? join(mkdtempSync(join(tmpdir(), "dsc-")), "run.jsonl");
-if (!process.env.TRACE) await record(trace, "--seed", "7", "--faults", "0.2");
-const records = readFileSync(trace, "utf8").trim().split("\n").slice(1).map((line) => JSON.parse(line));
+const trace = join(mkdtempSync(join(tmpdir(), "dsc-")), "run.jsonl");
+const records = await record(trace);
 const where = (is, from = 0) => records.find((rec) => rec.seq > from && is(rec)).seq;
 const broken = where((rec) => rec.type === "plan.broken");
 const replanned = where((rec) => rec.type === "step", where((rec) => rec.type === "plan.found", broken));

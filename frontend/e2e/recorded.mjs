@@ -1,6 +1,6 @@
 // A recorded run in the browser: what the page shows is what the records say, at any moment.
 import assert from "node:assert/strict";
-import { mkdtempSync, readFileSync } from "node:fs";
+import { mkdtempSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
@@ -10,8 +10,7 @@ let program, browser, page, complaints, records;
 
 before(async () => {
   const trace = join(mkdtempSync(join(tmpdir(), "dsc-")), "run.jsonl");
-  await record(trace, "--seed", "7", "--faults", "0.2");
-  records = readFileSync(trace, "utf8").trim().split("\n").slice(1).map((line) => JSON.parse(line));
+  records = await record(trace);
   program = await serve("view", trace, "--no-open");
   browser = await browse();
   ({ page, complaints } = await open(browser, program.url));

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { CHECKPOINT_EVERY, History } from "../src/core/history";
-import { nextStep } from "../src/core/plans";
+import { kinOf, nextOf } from "../src/core/plans";
 import type { Rec } from "../src/core/records";
 import { repeated, run } from "./run";
 
@@ -29,11 +29,20 @@ describe("a moment", () => {
     const states = (seq: number) => made.at(seq).plans.map((plan) => plan.steps.map((step) => step.state));
     expect(states(5)).toEqual([["waiting", "waiting"]]);
     expect(states(7)).toEqual([["running", "waiting"]]);
-    expect(nextStep(made.at(7).plans[0]!)).toBe(1);
+    expect(nextOf(made.at(7).plans[0]!, [0, 1])).toBe(1);
     expect(states(9)).toEqual([["done", "running"]]);
     expect(states(13)).toEqual([["done", "stopped"], ["waiting"]]);
     expect(made.at(13).plans.map((plan) => plan.ended)).toEqual([11, null]);
     expect(states(15)).toEqual([["done", "stopped"], ["running"]]);
+  });
+
+  it("has a plan as it is carried out: with its links, and without what was done meanwhile", () => {
+    const links = [[0, "(at a)", 1], [1, "(holding cup)", 2], [2, "(tidy cup)", 3]];
+    const made = history([...run.slice(0, 5), { seq: 6, t: 1, type: "plan.ordered", cause: null, plot: "plan_1", steps: ["(go a)", "(put cup)"], links } as Rec]);
+    const [plan] = made.at(6).plans;
+    expect(plan!.steps.map((step) => step.text)).toEqual(["(go a)", "(put cup)"]);
+    expect(plan!.links).toEqual(links);
+    expect([kinOf(plan!, 0, 1), kinOf(plan!, 1, 0), kinOf(plan!, 0, 0)]).toEqual(["provider", "user", null]);
   });
 
   it("does not blame a rule after which the step was begun again for the end of the plan", () => {

@@ -1,6 +1,6 @@
 /** How things were after a record: a pure function of the records up to it. */
 
-import { newPlan, withEnd, withStep, type Plan } from "./plans";
+import { newPlan, withEnd, withOrder, withStep, type Plan } from "./plans";
 import { splitPath, stepsOf, stepTexts, type PlotForm } from "./plots";
 import {
   written,
@@ -12,6 +12,7 @@ import {
   type Micro,
   type Named,
   type PlanFoundRec,
+  type PlanOrderedRec,
   type Rec,
   type SceneRec,
   type StepRec,
@@ -96,6 +97,7 @@ const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots
   end: (moment, rec: Rec) => void (moment.end = rec.seq),
   "plan.broken": (moment, rec: Rec) => void (moment.trouble = rec.seq),
   "plan.found": planFound,
+  "plan.ordered": planOrdered,
   "plan.skipped": stepsSkipped,
 };
 
@@ -131,14 +133,25 @@ function microstepped(moment: Moment, rec: StepRec, micro: Micro, plots: Plots):
 }
 
 function planFound(moment: Moment, rec: PlanFoundRec): void {
-  moment.plans.push(newPlan(rec.plot, rec.seq, rec.steps, rec.links, rec.engine));
+  moment.plans.push(newPlan(rec.plot, rec.seq, rec.steps, rec.engine));
   moment.trouble = null;
 }
 
-/** A generated plot begins to run: the plan of its name, or one that nobody announced. */
+/** What is going to be carried out: the plan found, or what is left of the one before. */
+function planOrdered(moment: Moment, rec: PlanOrderedRec): void {
+  const number = announced(moment, rec, rec.plot, rec.steps);
+  moment.plans[number] = withOrder(moment.plans[number]!, rec.steps, rec.links);
+}
+
+/** The number of the plan of a name; a new one if nobody spoke of it. */
+function announced(moment: Moment, rec: Rec, name: string, steps: readonly string[]): number {
+  const number = moment.plans.findLastIndex((plan) => plan.name === name && plan.ended === null);
+  return number < 0 ? moment.plans.push(newPlan(name, rec.seq, steps)) - 1 : number;
+}
+
+/** A generated plot begins to run. */
 function planBound(moment: Moment, rec: Rec, at: string, name: string, form: PlotForm): void {
-  let number = moment.plans.findLastIndex((plan) => plan.name === name && plan.ended === null);
-  if (number < 0) number = moment.plans.push(newPlan(name, rec.seq, stepTexts(form))) - 1;
+  const number = announced(moment, rec, name, stepTexts(form));
   const plan = moment.plans[number]!;
   const texts = plan.steps.map((step) => step.text);
   moment.plans[number] = { ...plan, at, names: stepsOf(form, texts) };

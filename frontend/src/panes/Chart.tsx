@@ -1,19 +1,24 @@
 /** The chart: what is active, what was taken lately; open, close, zoom in. */
 
-import { Controls as Zoom, ReactFlow, ReactFlowProvider } from "@xyflow/react";
+import { Controls as Zoom, MiniMap, ReactFlow, ReactFlowProvider } from "@xyflow/react";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import { useCamera } from "../chart/camera";
 import { drawnEdges, drawnNodes, type Acts } from "../chart/drawn";
 import { knownLayout, layoutOf } from "../chart/elk";
 import { signature, type Layout } from "../chart/layout";
 import { StateNode } from "../chart/StateNode";
-import { visible, type View, type Visible } from "../chart/visible";
+import { visible, type ChartNode, type View, type Visible } from "../chart/visible";
 import { WayEdge } from "../chart/WayEdge";
+import type { Moment } from "../core/moment";
+import { joinPath } from "../core/plots";
 import { svg } from "../link/requests";
-import { session, useMoment, useSelection } from "../session";
+import { session, useMoment, useSelection, type Selection } from "../session";
 
 const NODES = { state: StateNode };
 const EDGES = { way: WayEdge };
+/** From so many states on, a small map says where one is. */
+const MAPPED = 60;
+const MAP = { width: 130, height: 96 };
 const PLAIN: View = { focus: "", open: new Map(), all: new Set() };
 
 export function Chart() {
@@ -32,11 +37,11 @@ function ChartPane() {
   const focus = moment.bound.has(view.focus) ? view.focus : "";
   const shown = useMemo(() => visible(moment, session.history.plots, { ...view, focus }), [moment, view, focus]);
   const layout = useLayout(shown);
-  const chosen = selection?.kind === "state" ? selection.path : null;
+  const chosen = pathOf(selection, moment);
   const acts = useActs(setView);
   const nodes = useMemo(() => (layout ? drawnNodes(shown, layout, moment, chosen, acts) : []), [shown, layout, moment, chosen, acts]);
   const edges = useMemo(() => (layout ? drawnEdges(shown, layout, moment, chosen) : []), [shown, layout, moment, chosen]);
-  useCamera(shown, layout, follow);
+  useCamera(shown, layout, moment, follow);
   return (
     <section className="pane chart" aria-label="Chart">
       <h2>
@@ -49,6 +54,7 @@ function ChartPane() {
       </h2>
       <div className="flow">
         <Tips />
+        {shown.nodes.length === 0 && <p className="quiet note">Nothing runs yet: the first step is to come.</p>}
         <ReactFlow
           nodes={nodes} edges={edges} nodeTypes={NODES} edgeTypes={EDGES} minZoom={0.05} maxZoom={2.5}
           nodesDraggable={false} nodesConnectable={false} elementsSelectable={false} edgesFocusable={false} nodesFocusable={false}
@@ -56,10 +62,27 @@ function ChartPane() {
           onMove={(event) => event && setFollow(false)} proOptions={{ hideAttribution: true }}
         >
           <Zoom showInteractive={false} />
+          {nodes.length > MAPPED && (
+            <MiniMap pannable zoomable style={MAP} ariaLabel="The whole chart" nodeClassName={mapped} />
+          )}
         </ReactFlow>
       </div>
     </section>
   );
+}
+
+function mapped({ data }: { data: Record<string, unknown> }): string {
+  const { expanded, active } = data.node as ChartNode;
+  return expanded ? "open" : active ? "active" : "";
+}
+
+/** The state that is selected, or that carries out the step of a plan that is. */
+function pathOf(selection: Selection | null, moment: Moment): string | null {
+  if (selection?.kind === "state") return selection.path;
+  const plan = selection?.kind === "step" ? moment.plans[selection.plan] : undefined;
+  if (selection?.kind !== "step" || !plan || plan.at === null || plan.ended !== null) return null;
+  const name = [...plan.names].find(([, step]) => step === selection.step)?.[0];
+  return name === undefined ? null : joinPath(plan.at, name);
 }
 
 /** The layout of what is visible, or of what was until it is there. */
