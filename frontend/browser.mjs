@@ -9,8 +9,10 @@ import { chromium } from "playwright-core";
 export const ROOT = fileURLToPath(new URL("..", import.meta.url));
 const DSC = process.env.DSC ?? join(ROOT, ".venv", "bin", "dsc");
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
+/** What a stranger's name may be made to mean: this machine. */
+export const OTHER_NAME = "rebound.example";
 const FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-  "--disable-background-networking", "--disable-component-update", "--disable-sync"];
+  "--disable-background-networking", "--disable-component-update", "--disable-sync", `--host-resolver-rules=MAP ${OTHER_NAME} 127.0.0.1`];
 
 /** Start `dsc` with these arguments; answers the address that it prints, and `stop`. */
 export async function serve(...args) {

@@ -45,6 +45,13 @@ describe("a moment", () => {
     expect([kinOf(plan!, 0, 1), kinOf(plan!, 1, 0), kinOf(plan!, 0, 0)]).toEqual(["provider", "user", null]);
   });
 
+  it("knows what broke a plan also if another one was found while it went on", () => {
+    const rest = [run[12]!, { type: "rule", rule: "slipped: wait, retry", state: "clear/execute/step_2" }, run[11]!];
+    const later = rest.map((rec, i) => ({ t: 4, cause: null, ...rec, seq: 12 + i }) as Rec);
+    const made = history([...run.slice(0, 11), ...later]);
+    expect(made.at(14).plans.map((plan) => [plan.name, plan.ended])).toEqual([["plan_1", 11], ["plan_2", null]]);
+  });
+
   it("does not blame a rule after which the step was begun again for the end of the plan", () => {
     const execute = "clear/execute";
     const again = { event: "slipped", taken: [], exited: [`${execute}/step_1`], entered: [`${execute}/step_1`] };

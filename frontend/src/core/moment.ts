@@ -48,8 +48,10 @@ export interface Moment {
   plans: Plan[];
   /** Path of a state -> place in `plans` of the plan that is carried out in it. */
   running: Map<string, number>;
-  /** The record that may turn out to be why the plan ends. */
+  /** The rule that may turn out to be why the plan ends. */
   trouble: number | null;
+  /** The last record that said that a plan does not lead to the goal any more: it may be carried out until there is another. */
+  broken: number | null;
   version: number;
   nodes: Map<string, string>;
   facts: Map<string, Fact>;
@@ -63,7 +65,7 @@ export type Plots = ReadonlyMap<string, PlotForm>;
 export function beginning(): Moment {
   return {
     seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [], decisions: new Map(),
-    working: new Map(), plans: [], running: new Map(), trouble: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
+    working: new Map(), plans: [], running: new Map(), trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
     scene: null, end: null,
   };
 }
@@ -95,7 +97,7 @@ const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots
   scene: (moment, rec: SceneRec) => void (moment.scene = rec),
   rule: (moment, rec: Rec) => void (moment.trouble = rec.seq),
   end: (moment, rec: Rec) => void (moment.end = rec.seq),
-  "plan.broken": (moment, rec: Rec) => void (moment.trouble = rec.seq),
+  "plan.broken": (moment, rec: Rec) => void (moment.broken = rec.seq),
   "plan.found": planFound,
   "plan.ordered": planOrdered,
   "plan.skipped": stepsSkipped,
@@ -134,7 +136,6 @@ function microstepped(moment: Moment, rec: StepRec, micro: Micro, plots: Plots):
 
 function planFound(moment: Moment, rec: PlanFoundRec): void {
   moment.plans.push(newPlan(rec.plot, rec.seq, rec.steps, rec.engine));
-  moment.trouble = null;
 }
 
 /** What is going to be carried out: the plan found, or what is left of the one before. */
@@ -163,7 +164,8 @@ function planLeft(moment: Moment, rec: Rec, path: string): void {
   if (number === undefined) return;
   moment.running.delete(path);
   const plan = moment.plans[number]!;
-  moment.plans[number] = withEnd(plan, moment.trouble !== null && moment.trouble > plan.seq ? moment.trouble : rec.seq, rec.t);
+  const why = [moment.broken, moment.trouble].find((one) => one !== null && one > plan.seq);
+  moment.plans[number] = withEnd(plan, why ?? rec.seq, rec.t);
 }
 
 function planStepLeft(moment: Moment, rec: Rec, path: string, taken: readonly Taken[]): void {
