@@ -1,5 +1,5 @@
 // What screenshots, browser tests and the bench share: a program that serves a page, and Debian's Chromium to look at it.
-import { spawn } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
 import { createInterface } from "node:readline";
 import { join } from "node:path";
@@ -53,6 +53,11 @@ const WANTED = [
   (rec) => rec.type === "decision" && rec.chosen === "pick_up_from_side",
   (rec) => rec.type === "decision" && rec.chosen === "stack",
 ];
+
+/** Let `dsc` do something that ends by itself. */
+export function run(...args) {
+  return execFileSync(DSC, args, { encoding: "utf8" });
+}
 
 export async function browse() {
   if (!existsSync(CHROMIUM)) throw new Error(`no browser at ${CHROMIUM}: apt-get install chromium`);

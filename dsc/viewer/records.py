@@ -116,4 +116,5 @@ def _require_header(line: str, path: Path) -> None:
     except ValueError:
         said = None
     if not isinstance(said, dict) or said.get("format") != FORMAT:
-        raise ParseError(f'a trace begins with {{"format": "{FORMAT}", …}}', place=Place(str(path), 1))
+        begins = f'{{"format": "{FORMAT}", …}}'
+        raise ParseError(f"neither a store nor a trace, which begins with {begins}", place=Place(str(path), 1))

@@ -82,16 +82,22 @@ export class Session {
     history.replaceState(null, "", `#${wanted}`);
   }
 
+  get kind(): Kind {
+    const { marks } = this.history;
+    if (this.shown.header.store === true) return "store";
+    return marks.scene.length || marks.plan.length || marks.decision.length || this.history.last === 0 ? "run" : "chart";
+  }
+
   /** To the next mark, or the one before; returns whether there is one. */
   jump(mark: Mark, way: 1 | -1): boolean {
     const found = this.history.beside(this.shown.moment.seq, mark, way);
     if (found === undefined) return false;
-    this.goTo(found, mark === "step" ? undefined : { kind: "record", seq: found });
+    this.goTo(found, mark === "step" || this.kind === "store" ? undefined : { kind: "record", seq: found });
     return true;
   }
 
   step(way: 1 | -1): void {
-    if (!this.jump("step", way)) this.goTo(way > 0 ? this.history.last : 0);
+    if (!this.jump(this.kind === "store" ? "knowledge" : "step", way)) this.goTo(way > 0 ? this.history.last : 0);
   }
 
   play(playing: boolean): void {
@@ -172,6 +178,13 @@ export function useMoment(): Moment {
 
 export function useSelection(): Selection | null {
   return useSyncExternalStore(session.subscribe, () => session.get().selection);
+}
+
+/** What there is to see: a run, one that neither plans nor draws a world, or a store of knowledge. */
+export type Kind = "run" | "chart" | "store";
+
+export function useKind(): Kind {
+  return useSyncExternalStore(session.subscribe, () => session.kind);
 }
 
 /** Whether the run may be changed from here. */
