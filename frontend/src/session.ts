@@ -150,7 +150,7 @@ export class Session {
     if (this.wanted !== null && last >= this.wanted) this.wanted = null;
     const over = playing && seq >= last;
     const next = seq === moment.seq ? moment : this.history.at(seq);
-    this.set({ moment: next, last, ...(over && { playing: false, following: this.shown.live }) });
+    this.set({ moment: next, last, expected: Math.max(this.shown.expected, last), ...(over && { playing: false, following: this.shown.live }) });
     if (this.shown.playing) this.later();
   }
 
