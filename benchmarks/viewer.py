@@ -156,7 +156,9 @@ def print_opened() -> None:
         print(f"{RECORDS:,} records, {trace.stat().st_size / 1e6:.0f} MB")
         found = node("open", str(trace), str(RECORDS))
     print(f"opened: first moment {found['first'] / 1000:.2f} s, all there {found['all'] / 1000:.2f} s")
-    print(f"scrubbed: {found['jump']:.1f} ms to a moment, {found['slowest']:.1f} ms for 19 of 20")
+    print(f"jumps: {found['jump']:.1f} ms to a moment, {found['slowest']:.1f} ms for 19 of 20")
+    print(f"scrubbed: {found['frame']:.1f} ms from frame to frame, {found['slowestFrame']:.1f} ms for 19 of 20")
+    print(f"played: {found['drawn']:.0f} moments a second drawn")
 
 
 def write_long(path: Path, count: int) -> None:
