@@ -93,7 +93,7 @@ function useLayout(shown: Visible): Layout | null {
   useEffect(() => {
     if (known || shown.nodes.length === 0) return;
     let wanted = true;
-    void layoutOf(shown).then((layout) => wanted && setDone({ key, layout }));
+    void layoutOf(shown).then((layout) => wanted && layout && setDone({ key, layout }));
     return () => void (wanted = false);
     // What is active changes `shown` often; only another picture needs another layout.
     // eslint-disable-next-line react-hooks/exhaustive-deps
