@@ -101,7 +101,7 @@ test-viewer: $(VENV)/.test   ## the page's own tests, then the page in Debian's 
 screenshots: $(VENV)/.test $(NODE_MODULES)   ## the pictures of the page that the docs show (needs Chromium)
 	cd frontend && node screenshots.mjs
 
-bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watching costs a run, a run of 100,000 records opened
+bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watching costs a run, 100,000 records opened and scrubbed
 	$(BIN)/python benchmarks/viewer.py --rounds $(or $(RUNS),5)
 
 clean:   ## forget the environment and caches

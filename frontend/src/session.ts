@@ -31,6 +31,8 @@ export interface Shown {
 export const SPEEDS = [1, 2, 5, 10, 30, 100];
 
 const LOADING_MS = 250;
+/** Somebody stays at a moment who is there so long: it is in the address then. */
+const NOTED_MS = 300;
 
 export class Session {
   readonly history = new History();
@@ -44,6 +46,7 @@ export class Session {
   private drawn = 0;
   private clock = 0;
   private wanted: number | null = null;
+  private noted = 0;
 
   constructor() {
     const asked = Number(location.hash.slice(1));
@@ -79,7 +82,8 @@ export class Session {
     const moment = this.history.at(wanted);
     this.clock = moment.t;
     this.set({ moment, following: this.shown.live && wanted === this.history.last, playing: false, ...(select && { selection: select }) });
-    history.replaceState(null, "", `#${wanted}`);
+    clearTimeout(this.noted); // browsers refuse to be told of each place that somebody scrubs over
+    this.noted = window.setTimeout(() => history.replaceState(null, "", `#${wanted}`), NOTED_MS);
   }
 
   get kind(): Kind {

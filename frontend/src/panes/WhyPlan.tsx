@@ -68,6 +68,7 @@ export function Links({ at, number }: { at: number; number: number }) {
     const select = () => session.select({ kind: "step", plan: at, step: one - 1 });
     return <button className="link" onClick={select}>{`${one} ${plan.steps[one - 1]!.text}`}</button>;
   };
+  const comes = (one: number) => ["waiting", "running"].includes(plan.steps[one - 1]?.state ?? "");
   const provides = plan.links.filter(([provider]) => provider === number + 1);
   const needs = plan.links.filter(([, , user]) => user === number + 1);
   if (plan.links.length === 0) return null;
@@ -78,7 +79,7 @@ export function Links({ at, number }: { at: number; number: number }) {
       <ul className="plain links">{provides.map(([, fact, user], i) => <li key={i}><Shortly fact={fact} /><span>{"for "}{who(user)}</span></li>)}</ul>
       <h3>Relies on</h3>
       {needs.length === 0 && <p className="quiet">nothing that could change</p>}
-      <ul className="plain links">{needs.map(([provider, fact], i) => <li key={i}><Shortly fact={fact} holds={holdsNow(fact, facts)} /><span>{"from "}{who(provider)}</span></li>)}</ul>
+      <ul className="plain links">{needs.map(([provider, fact], i) => <li key={i}><Shortly fact={fact} holds={comes(provider) ? null : holdsNow(fact, facts)} /><span>{"from "}{who(provider)}</span></li>)}</ul>
     </>
   );
 }
