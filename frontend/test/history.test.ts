@@ -66,6 +66,14 @@ describe("a moment", () => {
     expect(plan.steps.map((step) => [step.state, step.tries])).toEqual([["done", 2]]);
   });
 
+  it("has the skills at work: not those that ended, nor those whose state was left", () => {
+    const actions = [["start", "a1"], ["start", "a2"], ["cancel", "a1"]];
+    const recs = actions.map(([action, id], i) => ({ seq: i + 1, t: 0, type: "action", cause: null, action, id, skill: id }) as Rec);
+    const made = history([...recs, { seq: 4, t: 1, type: "event", cause: 2, name: "done" } as Rec]);
+    const working = (seq: number) => [...made.at(seq).working.values()].map((one) => one.id);
+    expect([2, 3, 4].map(working)).toEqual([["a1", "a2"], ["a2"], []]);
+  });
+
   it("has the transitions taken last, the latest first", () => {
     expect(history(run).at(9).trail.map((one) => one.to)).toEqual(["clear/execute/step_2", "clear/execute/step_1", "clear/execute"]);
   });

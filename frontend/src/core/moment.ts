@@ -92,7 +92,7 @@ const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots
   decision: (moment, rec: DecisionRec) => void moment.decisions.set(rec.state, rec.seq),
   world: worldBegins,
   knowledge: knowledgeChanged,
-  action: (moment, rec: ActionRec) => void (rec.action === "start" && moment.working.set(rec.seq, rec)),
+  action: acted,
   event: (moment, rec: EventRec) => void (rec.cause !== null && moment.working.delete(rec.cause)),
   scene: (moment, rec: SceneRec) => void (moment.scene = rec),
   rule: (moment, rec: Rec) => void (moment.trouble = rec.seq),
@@ -102,6 +102,13 @@ const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots
   "plan.ordered": planOrdered,
   "plan.skipped": stepsSkipped,
 };
+
+/** A skill begins, or is cancelled since its state was left. */
+function acted(moment: Moment, rec: ActionRec): void {
+  if (rec.action === "start") moment.working.set(rec.seq, rec);
+  if (rec.action !== "cancel") return;
+  for (const [seq, one] of moment.working) if (one.id === rec.id) moment.working.delete(seq);
+}
 
 function stepped(moment: Moment, rec: StepRec, plots: Plots): void {
   for (const micro of rec.microsteps) microstepped(moment, rec, micro, plots);
