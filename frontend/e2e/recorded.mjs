@@ -1,7 +1,7 @@
 // A recorded run in the browser: what the page shows is what the records say, at any moment.
 import assert from "node:assert/strict";
 import { once } from "node:events";
-import { mkdtempSync } from "node:fs";
+import { mkdtempSync, readFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -101,6 +101,22 @@ test("a click in the chart selects a state; it is collapsed, opened and zoomed i
   await page.getByRole("button", { name: "Chart", exact: true }).click();
   await node("work").waitFor();
   await page.keyboard.press("Escape");
+});
+
+test("the chart of a moment is saved as an SVG, with all that is open in it", async () => {
+  const moment = first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_2")));
+  await goTo(moment.seq);
+  await active("clear/execute/step_2").waitFor();
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "SVG" }).click()]);
+  const picture = readFileSync(await download.path(), "utf8");
+  assert.match(picture, new RegExp(`after record ${moment.seq}`));
+  const drawn = await page.evaluate((text) => {
+    const made = new DOMParser().parseFromString(text, "image/svg+xml");
+    return { wrong: made.querySelector("parsererror")?.textContent, bold: [...made.querySelectorAll("text.bold")].map((one) => one.textContent), taken: made.querySelectorAll('[marker-end="url(#taken)"]').length };
+  }, picture);
+  assert.equal(drawn.wrong, undefined);
+  assert.ok(drawn.bold.some((text) => text.startsWith("◆ 2 ")));
+  assert.ok(drawn.taken > 0);
 });
 
 test("the plan is there before and after a replan, with what broke it and who did", async () => {

@@ -6,13 +6,14 @@ import { useCamera } from "../chart/camera";
 import { drawnEdges, drawnNodes, type Acts } from "../chart/drawn";
 import { knownLayout, layoutOf } from "../chart/elk";
 import { signature, type Layout } from "../chart/layout";
+import { pictureOf } from "../chart/picture";
 import { StateNode } from "../chart/StateNode";
 import { visible, type ChartNode, type View, type Visible } from "../chart/visible";
 import { WayEdge } from "../chart/WayEdge";
 import type { Moment } from "../core/moment";
 import { joinPath } from "../core/plots";
-import { svg } from "../link/requests";
 import { session, useMoment, useSelection, type Selection } from "../session";
+import { seconds } from "./Timeline";
 
 const NODES = { state: StateNode };
 const EDGES = { way: WayEdge };
@@ -49,7 +50,7 @@ function ChartPane() {
         <span className="tools">
           <label><input type="checkbox" checked={follow} onChange={(event) => setFollow(event.target.checked)} /> follow</label>
           <button onClick={() => setView((before) => ({ ...PLAIN, focus: before.focus }))}>reset</button>
-          <button onClick={() => void save(moment.seq, focus)} title="This chart at this moment, as a drawing">SVG</button>
+          <button onClick={() => save(pictureOf(nodes, edges, captionOf(moment, focus)), moment.seq)} title="This chart at this moment, as a drawing">SVG</button>
         </span>
       </h2>
       <div className="flow">
@@ -141,9 +142,14 @@ function Tips() {
   );
 }
 
-async function save(seq: number, path: string): Promise<void> {
+function captionOf(moment: Moment, focus: string): string {
+  const run = String(session.get().header.run ?? "a run");
+  return `${run}${focus && `, ${focus}`}: ${seconds(moment.t)}, after record ${moment.seq}`;
+}
+
+function save(picture: string, seq: number): void {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(await svg(seq, path));
+  link.href = URL.createObjectURL(new Blob([picture], { type: "image/svg+xml" }));
   link.download = `chart-${seq}.svg`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
