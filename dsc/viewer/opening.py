@@ -1,4 +1,4 @@
-"""What `dsc view` is given, as records: a trace, or a store."""
+"""What `dsc view` is given, as records: a trace, or a store. Another kind of file is another branch of `records_of`."""
 
 from __future__ import annotations
 
