@@ -14,13 +14,18 @@ from typing import Any
 from domains.clean_up_table.foresight import Physics
 from domains.clean_up_table.report import Report, summarise
 from domains.clean_up_table.scenario import Scenario
+from domains.clean_up_table.second_robot import PatientCamera, SuctionArm, Tracks
 from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
 from domains.clean_up_table.world import World
 from domains.tally import Tally
 from dsc.model.plot import ActionPlot
+from dsc.model.profile import Profile
+from dsc.profiles import adapted, configure
 from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.skills import Component
 from dsc.text.plots import load_library
 from dsc.trace import Listener, Record
+from knowledge_base.errors import UnknownNameError
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.engines.planner import Planner
@@ -38,11 +43,13 @@ class CleanUpTable:
         world: the simulated truth.
         executive: the robot program over it.
         tally: counts what happens.
+        profile: what the robot was made after; `None` is the usual one.
     """
 
     world: World
     executive: Executive
     tally: Tally = field(default_factory=Tally)
+    profile: Profile | None = None
 
     def run(self, *, simulated: bool = True, prepare: Callable[[Sequencer], None] | None = None) -> Report:
         """Clear the table and report; the report says so if the operator ends the run (Ctrl-C).
@@ -72,6 +79,7 @@ class CleanUpTable:
             "run": "clean-up-table",
             "seed": self.world.faults.seed,
             "faults": self.world.faults.chance,
+            **({} if self.profile is None else {"profile": self.profile.digest}),
             "chart": hashlib.sha256(plots.encode()).hexdigest()[:12],
             "domain": hashlib.sha256((HOME / "domain.pddl").read_bytes()).hexdigest()[:12],
         }
@@ -83,6 +91,7 @@ def deploy(
     faults: float | None = None,
     planner: Planner | None = None,
     listener: Listener | None = None,
+    profile: Profile | None = None,
 ) -> CleanUpTable:
     """Wire everything for one run; close `executive` when done.
 
@@ -92,9 +101,10 @@ def deploy(
         faults: chance of a fault per skill call in [0, 1]; the scenario's own if left out.
         planner: finds plans; pyperplan in a process of its own if left out.
         listener: is told every record of the run.
+        profile: which of `ROBOTS` does it, and what its parameters are worth; the one on wheels if left out.
 
     Raises:
-        InputError: the scenario is wrong.
+        InputError: the scenario or the profile is wrong.
     """
     world = (scenario or Scenario.default()).world(seed, faults)
     domain = PlanningDomain.from_pddl(HOME / "domain.pddl")
@@ -107,13 +117,42 @@ def deploy(
             lying += [str(found["inner"]) for found in knowledge.query("(inside ?inner ?item)", {"item": item})]
         return lying
 
-    components = [Base(world), Arm(world), Camera(world, believed), Voice(world)]
-    executive = Executive(domain, plots(), components, knowledge, planner, foresight=Physics())
-    deployed = CleanUpTable(world, executive)
+    components = robot(profile)(world, believed)
+    configure(components, profile)
+    executive = Executive(domain, adapted(plots(), profile), components, knowledge, planner, foresight=Physics())
+    deployed = CleanUpTable(world, executive, profile=profile)
     executive.listen(deployed.tally)
     if listener is not None:
         executive.listen(listener)
     return deployed
+
+
+Believed = Callable[[str], list[str]]
+"""The items that the robot believes to lie on a surface."""
+
+
+def on_wheels(world: World, believed: Believed) -> list[Component]:
+    """A base on wheels, an arm with a hand."""
+    return [Base(world), Arm(world), Camera(world, believed), Voice(world)]
+
+
+def on_tracks(world: World, believed: Believed) -> list[Component]:
+    """A base on tracks, an arm that holds by suction; see `second_robot`."""
+    return [Tracks(world), SuctionArm(world), PatientCamera(world, believed), Voice(world)]
+
+
+ROBOTS = {"on_wheels": on_wheels, "on_tracks": on_tracks}
+"""The robots that can do it, by the names that profiles have for them."""
+PROFILES = HOME / "profiles"
+
+
+def robot(profile: Profile | None) -> Callable[[World, Believed], list[Component]]:
+    """What makes the components of the robot that a profile names; raises `UnknownNameError`."""
+    name = "on_wheels" if profile is None or profile.robot is None else profile.robot
+    if name not in ROBOTS:
+        place = None if profile is None else profile.place("robot")
+        raise UnknownNameError(f"there is no robot '{name}'", place=place, found=name, valid=ROBOTS)
+    return ROBOTS[name]
 
 
 @cache
