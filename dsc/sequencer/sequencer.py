@@ -269,6 +269,7 @@ class Sequencer:
                 self.trace.cause = self._tracer.event(event, "timer")
             return event
         start, outcome = message.start, message.outcome
+        self._tracer.answered(start)
         name = start.names.get(outcome.event, outcome.event)
         event = Event(name, outcome.attributes, to=start.activation)
         self.trace.cause = self._caused_by.get(start.action_id)

@@ -34,6 +34,7 @@ class StepTracer:
         self._trace = trace
         self._known_plots: set[str] = set()
         self._frames: dict[str, FrameState] = {}
+        self._at_work: dict[int, dict[str, str]] = {}  # activation -> action id -> skill
 
     def world(self, knowledge: KnowledgeBase) -> None:
         """All that is known at the start; what follows are changes of it. Left out while nobody listens."""
@@ -48,6 +49,10 @@ class StepTracer:
         if original not in (None, event.name):
             data["original"] = original
         return self._trace.record("event", **data)
+
+    def answered(self, start: Start) -> None:
+        """A skill has ended by itself: it cannot be cancelled any more."""
+        self._at_work.get(start.activation, {}).pop(start.action_id, None)
 
     def step(self, step: Step) -> int | None:
         """A macrostep in which something happened: new plots before it, the rules that answered after it."""
@@ -105,13 +110,13 @@ class StepTracer:
     def output(self, output: Output) -> int | None:
         """An action that leaves; timers do not."""
         if isinstance(output, Start):
-            return self._trace.record(
-                "action",
-                action="start",
-                id=output.action_id,
-                skill=f"{output.component}.{output.skill}",
-                arguments=dict(output.arguments),
-            )
+            skill = f"{output.component}.{output.skill}"
+            self._at_work.setdefault(output.activation, {})[output.action_id] = skill
+            arguments = dict(output.arguments)
+            return self._trace.record("action", action="start", id=output.action_id, skill=skill, arguments=arguments)
+        if isinstance(output, Cancel):
+            for action_id, skill in self._at_work.pop(output.activation, {}).items():
+                self._trace.record("action", action="cancel", id=action_id, skill=skill)
         if isinstance(output, SetParameter):
             port = f"{output.component}.{output.parameter}"
             return self._trace.record("action", action="set", port=port, value=output.value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from dsc.sequencer.sequencer import CHART
@@ -259,7 +260,7 @@ class PlanningComponent(Component):
         if carried.following_name is not None:
             self._telling.replaced(carried.name, name, carried.following_kept)
         elif len(steps) < len(left):
-            self._telling.skipped(name, [step for step in left if step not in steps], why)
+            self._telling.skipped(carried.name, [step for step in left if step not in steps], why)
         else:
             self._telling.resumed(carried.name, name, steps[0], why, instead_of)
         del self._carried[carried.name]
@@ -293,12 +294,12 @@ class PlanningComponent(Component):
         """Which steps wait for which."""
         if plan.schedule:
             return scheduled(plan)
-        if not self._parallel:
-            return in_sequence(plan)
-        return deordered(plan, self._derivation.original, self._knowledge, goal)
+        order = deordered(plan, self._derivation.original, self._knowledge, goal)
+        return order if self._parallel else replace(order, before=in_sequence(plan).before)
 
     def _carry(self, carried: Carried, form: dict[str, Any]) -> Outcome:
         self._carried[carried.name] = carried
+        self._telling.ordered(carried.name, carried.order)
         return Outcome("plan_found", {"plot": form, "name": carried.name, "steps": len(carried.course.steps)})
 
     def _new_name(self) -> str:
