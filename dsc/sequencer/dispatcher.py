@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -28,9 +28,11 @@ from dsc.engine.steps import (
     StartTimer,
     SwitchMode,
 )
-from dsc.events import EVERY, SKILL_ERROR, TIMED_OUT, Event
+from dsc.events import EVERY, SKILL_ERROR, TIMED_OUT
+from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
 from dsc.skills import Clock, Component, Outcome, SkillCall
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 
 DEFAULT_WITHIN = 300.0
 """Seconds a skill may take if the trigger does not say: every wait has a bound."""
@@ -60,8 +62,8 @@ class Dispatcher:
     def __init__(
         self,
         components: Iterable[Component],
-        clock: Clock,
-        post: Callable[[SkillMessage | TimerMessage | Event], None],
+        clock: LoopClock,
+        post: Callable[[SkillMessage | TimerMessage | SendLater], None],
     ) -> None:
         self._components = {component.name: component for component in components}
         self._roster = Roster(self._components)
@@ -123,9 +125,9 @@ class Dispatcher:
         elif isinstance(output, Cancel):
             self._cancel(output.activation)
         elif isinstance(output, StartTimer):
-            self._start_timer(output)
+            self.start_timer(output, self._clock.now() + output.seconds)
         elif isinstance(output, SendLater):
-            self._send_later(output)
+            self.send_later(output, self._clock.now() + output.seconds)
         elif isinstance(output, Revoke):
             self._revoke(output)
         elif isinstance(output, SetParameter):
@@ -144,6 +146,12 @@ class Dispatcher:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
 
+    def memories(self) -> Iterator[tuple[str, Any]]:
+        """What components have to remember, by their names."""
+        for component in self._components.values():
+            if component.remembers:
+                yield component.name, component.remember()
+
     def settle(self, start: Start) -> None:
         """The final answer of a skill has been taken; until then its component counts as busy."""
         self._running.pop(start.action_id, None)
@@ -157,6 +165,40 @@ class Dispatcher:
         task.add_done_callback(self._ending.discard)
         task.cancel()
         give_up_after(task, GRACE, partial(self._leave_alone, start, task))
+
+    def take_up(self, start: Start, earlier: Earlier) -> None:
+        """Go on with a skill that was under way before a restart; raises `UnknownNameError`."""
+        self._start(start, earlier)
+
+    async def abandon(self, start: Start) -> None:
+        """Let a component stop what was cancelled just before a restart; raises `InputError` if it cannot."""
+        component = self.component(start.component)
+        try:
+            async with asyncio.timeout(CLOSING):
+                await component.abandon(start.action_id, start.skill, _encoded(start.arguments))
+        except Exception as error:  # whatever a component does wrong must not end the program
+            why = f"{type(error).__name__}: {error}"
+            raise InputError(f"{start.component}.{start.skill} may still go on: {why}") from error
+
+    def start_timer(self, timer: StartTimer, due: float) -> None:
+        """Post a `TimerMessage` at that second of run time, if the activation is not cancelled before."""
+        handle = self._clock.call_at(due, lambda: self._timer_due(timer))
+        self._timers[timer.activation, timer.event, timer.index] = handle
+
+    def send_later(self, later: SendLater, due: float) -> None:
+        """Post it at that second of run time, if it is not revoked before."""
+        number = self._last_sent = self._last_sent + 1
+
+        def arrive() -> None:
+            del self._sent[number]
+            self._post(later)
+
+        self._sent[number] = (later, self._clock.call_at(due, arrive))
+
+    async def configured(self) -> None:
+        """Wait until all components have taken, or refused, what they were told."""
+        if self._configuring:
+            await asyncio.wait(self._configuring.values())
 
     async def close(self) -> list[str]:
         """Cancel skills and timers, and wait until they have stopped and components are told what they were sent.
@@ -188,12 +230,14 @@ class Dispatcher:
         component = self.component(output.component)
         self._configure(component, lambda: component.change_mode(output.mode))
 
-    def _start(self, start: Start) -> None:
+    def _start(self, start: Start, earlier: Earlier | None = None) -> None:
         component = self.component(start.component)
-        task = asyncio.get_running_loop().create_task(self._execute(component, start))
+        task = asyncio.get_running_loop().create_task(self._execute(component, start, earlier))
         self._running[start.action_id] = (start, task)
-        if math.isfinite(self._within(start)):
-            give_up_after(task, self._within(start) + GRACE, lambda: self._overdue(start))
+        within = self._within(start)
+        if math.isfinite(within):
+            left = within if earlier is None else earlier.began + within - self._clock.now()
+            give_up_after(task, left + GRACE, lambda: self._overdue(start))
 
     def _overdue(self, start: Start) -> None:
         """It swallowed that its time is over; the chart need not wait for it."""
@@ -206,24 +250,35 @@ class Dispatcher:
         skill = f"{start.component}.{start.skill}"
         self._given_up.append(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
 
-    async def _execute(self, component: Component, start: Start) -> None:
-        outcome = await self._outcome(component, start)
+    async def _execute(self, component: Component, start: Start, earlier: Earlier | None) -> None:
+        outcome = await self._outcome(component, start, earlier)
         if start.action_id in self._answered_for:
             return
         self._post(SkillMessage(start, outcome, final=True))
 
-    async def _outcome(self, component: Component, start: Start) -> Outcome:
+    def _call(self, component: Component, start: Start, earlier: Earlier | None) -> SkillCall:
+        heard = earlier.reports if earlier else 0
+
         def report(outcome: Outcome) -> None:
-            if start.action_id in self._running:
+            nonlocal heard
+            if heard:
+                heard -= 1
+            elif start.action_id in self._running:
                 self._post(SkillMessage(start, _declared(component, start, outcome), final=False))
 
-        within = self._within(start)
-        bound = asyncio.timeout(within if math.isfinite(within) else None)
-        call = SkillCall(start.action_id, self._clock, report, self._clock.now() + within, self._given_up.append)
+        clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
+        return SkillCall(start.action_id, clock, report, clock.now() + self._within(start), self._given_up.append)
+
+    async def _outcome(self, component: Component, start: Start, earlier: Earlier | None) -> Outcome:
+        call = self._call(component, start, earlier)
+        bound = self._clock.timeout_at(call.deadline)
         try:
             async with bound:
                 await self._configured(component)
                 support = await self._roster.ready(component)
+                known = await asked_after(component, start) if earlier else None
+                if known is not None:
+                    return _declared(component, start, known)
                 work = component.execute(start.skill, call, _encoded(start.arguments))
                 outcome = await self._roster.with_support(component, work, support)
             return _declared(component, start, outcome)
@@ -233,7 +288,7 @@ class Dispatcher:
             return broken(start, "CancelledError: it cancelled itself")
         except Exception as error:  # noqa: BLE001  # whatever a skill does wrong must not end the run
             if bound.expired() or isinstance(error, DeadlineError):
-                return late(start, within)
+                return late(start, self._within(start))
             return broken(start, f"{type(error).__name__}: {error}")
 
     async def _configured(self, component: Component) -> None:
@@ -258,19 +313,6 @@ class Dispatcher:
     def _leave_alone(self, start: Start, task: asyncio.Task[None]) -> None:
         self._ending.discard(task)
         self._not_stopped(start)
-
-    def _start_timer(self, timer: StartTimer) -> None:
-        handle = asyncio.get_running_loop().call_later(timer.seconds, self._timer_due, timer)
-        self._timers[timer.activation, timer.event, timer.index] = handle
-
-    def _send_later(self, later: SendLater) -> None:
-        number = self._last_sent = self._last_sent + 1
-
-        def due() -> None:
-            del self._sent[number]
-            self._post(later.event)
-
-        self._sent[number] = (later, asyncio.get_running_loop().call_later(later.seconds, due))
 
     def _revoke(self, revoke: Revoke) -> None:
         for number, (later, handle) in list(self._sent.items()):

@@ -28,11 +28,15 @@ from knowledge_base.store import KnowledgeBase
 
 
 class StepTracer:
-    """Writes what the sequencer does into a trace."""
+    """Writes what the sequencer does into a trace.
+
+    Attributes:
+        known_plots: digests of the plots that it has in full already.
+    """
 
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
-        self._known_plots: set[str] = set()
+        self.known_plots: set[str] = set()
         self._frames: dict[str, FrameState] = {}
 
     def world(self, knowledge: KnowledgeBase) -> None:
@@ -135,8 +139,8 @@ class StepTracer:
     def _plots(self, step: Step) -> None:
         for bound in (bound for micro in step.microsteps for bound in micro.bound):
             digest = bound.plot.digest
-            if digest not in self._known_plots:
-                self._known_plots.add(digest)
+            if digest not in self.known_plots:
+                self.known_plots.add(digest)
                 self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
 
 

@@ -13,7 +13,7 @@ from dsc.engine.steps import Cancel, Output, Revoke, SendLater, Start, StartTime
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN, late
-from dsc.sequencer.sequencer import CHART
+from dsc.sequencer.reactor import CHART
 from dsc.testing.worlds import change_of, world
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta

@@ -1,0 +1,30 @@
+"""What reaches the sequencer, in the order in which it comes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dsc.engine.steps import SendLater
+from dsc.events import Event
+from dsc.sequencer.dispatcher import SkillMessage, TimerMessage
+from knowledge_base.facts import Delta
+
+
+@dataclass(frozen=True, slots=True)
+class KnowledgeMessage:
+    """Somebody who is no skill of this run changes the knowledge."""
+
+    delta: Delta
+    author: str
+
+
+@dataclass(frozen=True, slots=True)
+class LateMessage:
+    """Something that was handed in from outside to come later, and now is there; `number` tells it from others."""
+
+    message: Event | KnowledgeMessage
+    number: int
+
+
+Message = SkillMessage | TimerMessage | KnowledgeMessage | LateMessage | SendLater | Event
+"""A `SendLater` is the chart's own event whose time has come."""
