@@ -24,6 +24,7 @@ from knowledge_base.language.expression import (
     Variable,
     substitute,
 )
+from knowledge_base.language.printer import to_text, variables_text
 from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.schema import ROOT_TYPE, Schema
 from planning.fragments import merged_text, searched, text_of
@@ -59,6 +60,10 @@ class PlanningAction:
     place: Place | None = field(default=None, compare=False, repr=False)
     duration: Duration | None = None
     timed: Timed | None = None
+
+    def __str__(self) -> str:
+        """What it takes, needs and does, in PDDL."""
+        return f"({self.name} {variables_text(self.parameters)} {to_text(self.precondition)} {to_text(self.effect)})"
 
 
 @dataclass(frozen=True, slots=True)

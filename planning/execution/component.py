@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
-from dsc.sequencer.sequencer import CHART
-from dsc.skills import Component, Outcome, SkillCall, skill
+from dsc.sequencer.reactor import CHART
+from dsc.skills import Component, Ended, Outcome, SkillCall, Status, skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition
 from planning.execution.carried import Carried
+from planning.execution.choices import Choices
 from planning.execution.course import Course, shortest_end
 from planning.execution.repair import Attempt, Failure, Rung, situation
 from planning.execution.search import NotFound, Search
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from planning.plan import PlanStep
 
 _PLAN_FOUND = {"plot": "plot", "name": "symbol", "steps": "number"}
+MOST_REMEMBERED = 16
+"""Of the plans that nobody watches, as many are kept for after a restart: a new one may have to take their place."""
 
 
 class PlanningComponent(Component):
@@ -79,44 +82,71 @@ class PlanningComponent(Component):
         self._domain = self._derivation.domain
         self._library = library
         self._knowledge = knowledge
+        self._clock = clock
         self._working_for = working_for
         self._parallel = parallel
         self._shared = {self.name, *shared}
         self._telling = Telling(trace)
         self._search = Search(domain, knowledge, planner, clock, self._telling, foresight)
         self._carried: dict[str, Carried] = {}
-        self._chosen: dict[tuple[str, frozenset[tuple[str, Any]]], str] = {}
+        self._choices = Choices(self._domain, library)
         self._plans = 0
+        self._answers: dict[str, Outcome] = {}  # by action; of some it is not known yet whether they were heard
 
     def note_choices(self, step: Step) -> None:
         """Remember which plots were chosen to carry out planning actions; for the sequencer to call."""
-        for made in step.decisions:
-            decision = made.decision
-            plot = None if decision.chosen is None else self._library.plot(decision.chosen)
-            if plot is not None and plot.implements:
-                self._chosen[plot.implements, frozenset(decision.arguments.items())] = plot.name
+        self._choices.note(step)
+
+    def remember(self) -> Any:
+        """The plans that are on their way, what has been tried, and what was answered and has not been heard."""
+        self._answers = {one: answer for one, answer in self._answers.items() if self._working_for(one)}
+        unwatched = [name for name, one in self._carried.items() if one.begun is None]
+        gone = set(unwatched[:-MOST_REMEMBERED])
+        return {
+            "plans": self._plans,
+            "carried": [one.to_json() for name, one in self._carried.items() if name not in gone],
+            "excluded": self._search.remember(),
+            "chosen": self._choices.remember(),
+            "answers": {one: [answer.event, dict(answer.attributes)] for one, answer in self._answers.items()},
+        }
+
+    def recall(self, memory: Any) -> None:
+        """The inverse of `remember`, in the world as it is now."""
+        now = self._derivation.at(self._knowledge)
+        self._plans = memory["plans"]
+        self._carried = {form["name"]: Carried.from_json(form, now) for form in memory["carried"]}
+        self._search.recall(memory["excluded"])
+        self._choices.recall(memory["chosen"])
+        self._answers = {one: Outcome(event, attributes) for one, (event, attributes) in memory["answers"].items()}
+
+    async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+        """As every component does; an answer is kept until it has been heard, since plans have changed with it."""
+        answer = self._answers[call.action_id] = await super().execute(skill_name, call, arguments)
+        return answer
+
+    async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:
+        """What was answered before a restart; any other action goes on where its plan is."""
+        answer = self._answers.get(action_id)
+        return await super().status(action_id, skill_name, arguments) if answer is None else Ended(answer)
 
     async def configure(self, parameter: str, value: Any) -> None:
         """The plan named `parameter` begins step number `value`; what earlier steps did is judged at this moment."""
         await super().configure(parameter, value)
         carried = self._carried.get(parameter)
-        if carried is None:
-            return
-        if carried.begun is not None:
-            carried.begun(int(value))
-        else:
-            carried.course.begin(int(value))
+        if carried is not None:
+            carried.begin(int(value))
 
     @skill(
         outcomes={
             "plan_found": _PLAN_FOUND,
             "goal_holds": {},
             "no_plan": {"reason": "text", "kind": "symbol"},
-        }
+        },
+        after_crash="repeat",
     )
     async def plan(
         self,
-        call: SkillCall,  # noqa: ARG002
+        call: SkillCall,
         goal: str,
         holder: str,
         seconds: float,
@@ -128,29 +158,12 @@ class PlanningComponent(Component):
         `after` is the name of the plan that it takes the place of, if there is one. `no_plan` has the kind
         `unsolvable`, `timed_out` or `failed`.
         """
-        before = self._carried.pop(after, None)
-        wanted, now = parse_condition(goal), self._derivation.at(self._knowledge)
-        if holds(now.condition(wanted), self._knowledge):
-            return Outcome("goal_holds")
-        self._telling.asked(goal, self._knowledge.version)
         try:
-            found = await self._search.plan(wanted, seconds, () if before is None else before.course.left_steps)
-            if isinstance(found, NotFound):
-                return self._none(found.kind, found.reason)
-            now = self._derivation.at(self._knowledge)
-            order = self._order(found.answer.plan, wanted)
-            course = Course(found.steps, now.domain, now.condition(wanted), order.before)
-            attempt = Attempt() if before is None else before.attempt
-            carried = Carried(self._new_name(), wanted, course, order, attempt, holder, seconds, replans, found.better)
-            form = self._plot(carried)
-        except InputError as error:
-            return self._none("failed", str(error))
-        self._telling.found(found.answer, carried.name)
-        if before is not None:
-            self._telling.replaced(before.name, carried.name, found.kept)
-        return self._carry(carried, form)
+            return await self._planned(call, goal, holder, seconds, replans, self._carried.get(after))
+        finally:  # not before: a search that is broken off has to find it again
+            self._carried.pop(after, None)
 
-    @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}})
+    @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}}, after_crash="repeat")
     async def judge(self, call: SkillCall, goal: str) -> Outcome:  # noqa: ARG002
         """Say whether the goal holds, and if not, which part of it is missing."""
         try:
@@ -165,7 +178,8 @@ class PlanningComponent(Component):
             "goal_holds": {},
             "plan_changed": {"why": "text"},
             "plan_invalid": {"which": "text", "why": "text", "author": "symbol"},
-        }
+        },
+        after_crash="repeat",
     )
     async def monitor(self, call: SkillCall, plan: str) -> Outcome:
         """Watch the plan of that name being carried out; ends when another one shall take its place, or none.
@@ -178,8 +192,8 @@ class PlanningComponent(Component):
             return author == CHART or author in self._working_for(call.action_id)
 
         watching = Watching(
-            self._required(plan), self._derivation, self._knowledge, self._search, self._telling, self._new_name,
-            is_own,
+            self._required(plan), self._derivation, self._knowledge, self._search, self._telling, self._clock,
+            self._new_name, is_own,
         )  # fmt: skip
         return await watching.watch()
 
@@ -189,7 +203,8 @@ class PlanningComponent(Component):
             "goal_holds": {},
             "replan": {},
             "gave_up": {"reason": "text"},
-        }
+        },
+        after_crash="repeat",
     )
     async def repair(self, call: SkillCall, plan: str, why: str) -> Outcome:  # noqa: ARG002
         """Find out how to go on when the plan of that name did not, see `planning.execution.repair.Rung`.
@@ -224,13 +239,38 @@ class PlanningComponent(Component):
             self._search.exclude(failed, why)
         return Outcome("replan")
 
+    async def _planned(
+        self, call: SkillCall, goal: str, holder: str, seconds: float, replans: int, before: Carried | None
+    ) -> Outcome:
+        wanted, now = parse_condition(goal), self._derivation.at(self._knowledge)
+        if holds(now.condition(wanted), self._knowledge):
+            return Outcome("goal_holds")
+        self._telling.asked(goal, self._knowledge.version)
+        try:
+            left = () if before is None else before.course.left_steps
+            found = await self._search.plan(wanted, seconds, left, call.clock.sleep)
+            if isinstance(found, NotFound):
+                return self._none(found.kind, found.reason)
+            now = self._derivation.at(self._knowledge)
+            order = self._order(found.answer.plan, wanted)
+            course = Course(found.steps, now.domain, now.condition(wanted), order.before)
+            attempt = Attempt() if before is None else before.attempt
+            carried = Carried(self._new_name(), wanted, course, attempt, holder, seconds, replans, found.better)
+            form = self._plot(carried, order)
+        except InputError as error:
+            return self._none("failed", str(error))
+        self._telling.found(found.answer, carried.name)
+        if before is not None:
+            self._telling.replaced(before.name, carried.name, found.kept)
+        return self._carry(carried, form)
+
     def _rung(
         self, attempt: Attempt, course: Course, failed: PlanStep | None, end: tuple[PlanStep, ...] | None, why: str
     ) -> tuple[Rung, str | None]:
         """What to try, and the plot that was chosen for the failed step."""
         if failed is None:
             return attempt.interrupted(end[0] if end else None), None
-        choice = self._choice(failed)
+        choice = self._choices.of(failed)
         others = choice is not None and len(implementing(failed, self._library)) > 1
         failure = Failure(failed, why, situation(course.domain, self._knowledge, course.goal))
         return attempt.failed(failure, stands=end is not None, others=others), choice
@@ -242,15 +282,6 @@ class PlanningComponent(Component):
         step = course.steps[course.at_work[0] - 1]
         expected = expectation(self._domain.action(step).effect, self._domain.bindings(step))
         return None if _holds(expected, self._knowledge) else step
-
-    def _choice(self, step: PlanStep) -> str | None:
-        """The plot that was chosen last to carry out a step."""
-        bindings = self._domain.bindings(step)
-        for plot in implementing(step, self._library):
-            own = frozenset((name, value) for name, value in bindings.items() if name in plot.parameters)
-            if (step.action, own) in self._chosen:
-                return self._chosen[step.action, own]
-        return None
 
     def _go_on(self, carried: Carried, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None) -> Outcome:
         """Carry out `steps` without asking the planner; their first one rather not with the candidate `instead_of`."""
@@ -265,10 +296,8 @@ class PlanningComponent(Component):
         del self._carried[carried.name]
         order, before = self._order(Plan(steps), carried.goal), carried.course
         course = Course(steps, before.domain, before.goal, order.before)
-        again = Carried(
-            name, carried.goal, course, order, carried.attempt, carried.holder, carried.seconds, carried.replans
-        )
-        return self._carry(again, self._plot(again, instead_of))
+        again = Carried(name, carried.goal, course, carried.attempt, carried.holder, carried.seconds, carried.replans)
+        return self._carry(again, self._plot(again, order, instead_of))
 
     def _give_up(self, carried: Carried, reason: str) -> Outcome:
         del self._carried[carried.name]
@@ -279,10 +308,10 @@ class PlanningComponent(Component):
         self._telling.none(kind, reason)
         return Outcome("no_plan", {"reason": reason, "kind": kind})
 
-    def _plot(self, carried: Carried, instead_of: str | None = None) -> dict[str, Any]:
+    def _plot(self, carried: Carried, order: PartialOrder, instead_of: str | None = None) -> dict[str, Any]:
         rules = self._library.plot(carried.holder).rules if carried.holder in self._library else ()
         plan, domain = Plan(carried.course.steps), carried.course.domain
-        plot = plot_from_plan(plan, domain, self._library, rules, carried.name, carried.order, self._shared)
+        plot = plot_from_plan(plan, domain, self._library, rules, carried.name, order, self._shared)
         form = plot.to_form()
         if instead_of is not None:
             _put_last(instead_of, _state(plot, form, "step_1")["dynamic"])
