@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from domains.clean_up_table.results import Result
     from domains.clean_up_table.world import World
+    from dsc.skills import AfterCrash
 
 __all__ = ["Arm", "Base", "Camera", "Voice", "initial_knowledge"]
 
@@ -29,6 +30,7 @@ CHARACTERS_A_SECOND = 15.0
 _ITEM_AT = {"item": "item", "surface": "surface"}
 _ITEM_IN = {"item": "item", "carrier": "item", "surface": "surface"}
 _CARRIER_AT = {"carrier": "item", "surface": "surface"}
+_ONCE: AfterCrash = "same_id"  # the world does each id once
 _NOT_POSSIBLE: dict[str, str | None] = {"reason": None}
 
 
@@ -49,10 +51,11 @@ class Base(Component):
             "not_possible": _NOT_POSSIBLE,
         },
         types={"to": "place"},
+        after_crash=_ONCE,
     )
     async def drive(self, call: SkillCall, to: str) -> Outcome:
         """Drive to a place; a held item may slip, and then robot and item are at the floor."""
-        metres = distance(self.world.robot_at, to) if to in PLACES else 0.0
+        metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
         await call.clock.sleep(STARTING + metres / SPEED)
         return _outcome(self.world.drive(call.action_id, to))
 
@@ -75,13 +78,14 @@ class Arm(Component):
             "not_possible": _NOT_POSSIBLE,
         },
         types=_ITEM_AT,
+        after_crash=_ONCE,
     )
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Pick an item, with everything in it, up from a surface."""
         await call.clock.sleep(GRASPING)
         return _outcome(self.world.pick_up(call.action_id, item, surface))
 
-    @skill(outcomes={"put_down": _ITEM_AT, "not_possible": _NOT_POSSIBLE}, types=_ITEM_AT)
+    @skill(outcomes={"put_down": _ITEM_AT, "not_possible": _NOT_POSSIBLE}, types=_ITEM_AT, after_crash=_ONCE)
     async def put_down(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Put the held item on a surface."""
         await call.clock.sleep(PUTTING)
@@ -95,6 +99,7 @@ class Arm(Component):
             "not_possible": _NOT_POSSIBLE,
         },
         types=_ITEM_IN,
+        after_crash=_ONCE,
     )
     async def stack(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Put the held item into a carrier on a surface; `gone` names the carrier."""
@@ -110,6 +115,7 @@ class Arm(Component):
             "not_possible": _NOT_POSSIBLE,
         },
         types=_ITEM_IN,
+        after_crash=_ONCE,
     )
     async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Take an item out of its carrier on a surface; `gone` names the carrier."""
@@ -122,6 +128,7 @@ class Arm(Component):
             "not_possible": _NOT_POSSIBLE,
         },
         types={"item": "item", "destination": "destination"},
+        after_crash=_ONCE,
     )
     async def throw_away(self, call: SkillCall, item: str, destination: str) -> Outcome:
         """Throw the held item, with everything in it, into its destination."""
@@ -154,6 +161,7 @@ class Camera(Component):
             "not_possible": _NOT_POSSIBLE,
         },
         types={"surface": "surface"},
+        after_crash=_ONCE,
     )
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
         """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
@@ -163,6 +171,7 @@ class Camera(Component):
     @skill(
         outcomes={"looked": _CARRIER_AT, "gone": _ITEM_AT, "not_possible": _NOT_POSSIBLE},
         types=_CARRIER_AT,
+        after_crash=_ONCE,
     )
     async def look_into(self, call: SkillCall, carrier: str, surface: str) -> Outcome:
         """Look into a carrier on a surface, giving up one unit of its room; `gone` names the carrier."""
@@ -179,7 +188,7 @@ class Voice(Component):
         super().__init__(name)
         self.world = world
 
-    @skill(outcomes={"said": {"text": None}})
+    @skill(outcomes={"said": {"text": None}}, after_crash=_ONCE)
     async def say(self, call: SkillCall, text: str) -> Outcome:
         """Tell the operator something."""
         await call.clock.sleep(1.0 + len(text) / CHARACTERS_A_SECOND)
