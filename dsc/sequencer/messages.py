@@ -4,10 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dsc.engine.steps import SendLater
+from dsc.engine.steps import SendLater, Start, StartTimer
 from dsc.events import Event
-from dsc.sequencer.dispatcher import SkillMessage, TimerMessage
+from dsc.skills import Outcome
 from knowledge_base.facts import Delta
+
+
+@dataclass(frozen=True, slots=True)
+class SkillMessage:
+    """A component's answer for an activation; `final` if the skill has ended with it."""
+
+    start: Start
+    outcome: Outcome
+    final: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TimerMessage:
+    """A timer is due."""
+
+    timer: StartTimer
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.steps import Output, SendLater, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
-from dsc.sequencer.dispatcher import SkillMessage, TimerMessage
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message
+from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.tracing import StepTracer
 from dsc.trace import Trace

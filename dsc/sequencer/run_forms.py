@@ -15,8 +15,7 @@ from typing import Any
 from dsc.engine.state import NOTHING, FrameState, MachineState
 from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
-from dsc.sequencer.dispatcher import SkillMessage, TimerMessage
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message
+from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.run_tables import RunRow
 from dsc.skills import Outcome
 from dsc.trace import Record

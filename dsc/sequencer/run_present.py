@@ -10,8 +10,7 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.engine.state import FrameState, MachineState
 from dsc.engine.steps import Cancel, Output, Revoke, SendLater, SetParameter, Start, StartTimer, SwitchMode
-from dsc.sequencer.dispatcher import SkillMessage, TimerMessage
-from dsc.sequencer.messages import LateMessage, Message
+from dsc.sequencer.messages import LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import (
     Awaited,

@@ -13,8 +13,9 @@ from dsc.engine.machine import Machine
 from dsc.engine.steps import Output, SendLater, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import GAVE_UP, NO_PLAN, RESERVED, Event
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.dispatcher import Dispatcher, SkillMessage, broken
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message
+from dsc.sequencer.dispatcher import Dispatcher
+from dsc.sequencer.ends import broken
+from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.run_forms import Kept, Pending
 from dsc.sequencer.run_store import RunStore
@@ -235,7 +236,7 @@ class Sequencer:
             for one in older:
                 if isinstance(one.what, SetParameter | SwitchMode):
                     self.dispatcher.dispatch(one.what)
-            await self.dispatcher.configured()
+            await self.dispatcher.telling.all_taken()
             for one in older:
                 if not isinstance(one.what, SetParameter | SwitchMode):
                     self._await_again(one)
@@ -250,9 +251,9 @@ class Sequencer:
             case Start():
                 self.dispatcher.take_up(one.what, Earlier(one.at, one.reports))
             case StartTimer():
-                self.dispatcher.start_timer(one.what, one.at)
+                self.dispatcher.timers.start(one.what, one.at)
             case SendLater():
-                self.dispatcher.send_later(one.what, one.at)
+                self.dispatcher.timers.send(one.what, one.at)
             case LateMessage():
                 self._await_late(one.what, one.at)
             case _:
@@ -344,7 +345,7 @@ class Sequencer:
     def _idle(self) -> bool:
         """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
         in_vain = self._reactor.in_vain
-        coming = self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.periods <= in_vain
+        coming = self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.timers.periods <= in_vain
         return not self._open_ended and self._inbox.empty() and not coming
 
 
