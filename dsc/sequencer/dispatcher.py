@@ -32,7 +32,7 @@ from dsc.sequencer.messages import SkillMessage, TimerMessage
 from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
 from dsc.sequencer.telling import CLOSING, Telling, failure
 from dsc.sequencer.timers import Timers
-from dsc.skills import Clock, Component, Outcome, SkillCall
+from dsc.skills import Clock, Component, Ended, Outcome, SkillCall, Status
 from knowledge_base.errors import InputError, UnknownNameError
 
 DEFAULT_WITHIN = 300.0
@@ -90,9 +90,11 @@ class Dispatcher:
 
     def _within(self, start: Start) -> float:
         """Seconds that it may take; an event lasts as long as the state that activated it."""
+        return start.within or (math.inf if self._is_event(start) else DEFAULT_WITHIN)
+
+    def _is_event(self, start: Start) -> bool:
         signature = self.component(start.component).skills().get(start.skill)
-        lasting = signature is not None and signature.pattern == "event"
-        return start.within or (math.inf if lasting else DEFAULT_WITHIN)
+        return signature is not None and signature.pattern == "event"
 
     def dispatch(self, output: Output) -> None:
         """Carry out one output of the machine.
@@ -139,6 +141,10 @@ class Dispatcher:
         task.add_done_callback(self._ending.discard)
         task.cancel()
         give_up_after(task, GRACE, partial(self._leave_alone, start, task))
+
+    def tell_again(self, told: SetParameter | SwitchMode) -> None:
+        """Put in force what was before a restart; raises `UnknownNameError`."""
+        self.telling.tell(self.component(told.component), told, again=True)
 
     def take_up(self, start: Start, earlier: Earlier) -> None:
         """Go on with a skill that was under way before a restart; raises `UnknownNameError`."""
@@ -200,8 +206,8 @@ class Dispatcher:
             return
         self._post(SkillMessage(start, outcome, final=True))
 
-    def _call(self, component: Component, start: Start, earlier: Earlier | None) -> SkillCall:
-        heard = earlier.reports if earlier else 0
+    async def _outcome(self, component: Component, start: Start, earlier: Earlier | None) -> Outcome:
+        heard = 0
 
         def report(outcome: Outcome) -> None:
             nonlocal heard
@@ -211,18 +217,19 @@ class Dispatcher:
                 self._post(SkillMessage(start, declared(component, start, outcome), final=False))
 
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
-        return SkillCall(start.action_id, clock, report, clock.now() + self._within(start), self._given_up.append)
-
-    async def _outcome(self, component: Component, start: Start, earlier: Earlier | None) -> Outcome:
-        call = self._call(component, start, earlier)
-        bound = self._clock.timeout_at(call.deadline)
+        deadline = clock.now() + self._within(start)
+        call = SkillCall(start.action_id, clock, report, deadline, self._given_up.append)
+        bound = self._clock.timeout_at(deadline)
         try:
             async with bound:
                 await self.telling.taken(component)
                 support = await self._roster.ready(component)
-                known = await asked_after(component, start) if earlier else None
-                if known is not None:
-                    return declared(component, start, known)
+                if earlier is not None:
+                    status = await asked_after(component, start)
+                    if isinstance(status, Ended):
+                        return declared(component, start, status.outcome)
+                    if status is Status.RUNNING or not self._is_event(start):  # else it is activated anew
+                        heard = earlier.reports
                 work = component.execute(start.skill, call, encoded(start.arguments))
                 outcome = await self._roster.with_support(component, work, support)
             return declared(component, start, outcome)

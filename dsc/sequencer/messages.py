@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 from dsc.engine.steps import SendLater, Start, StartTimer
 from dsc.events import Event
 from dsc.skills import Outcome
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 
 
@@ -44,3 +46,12 @@ class LateMessage:
 
 Message = SkillMessage | TimerMessage | KnowledgeMessage | LateMessage | SendLater | Event
 """A `SendLater` is the chart's own event whose time has come."""
+
+
+def plain(event: Event) -> Event:
+    """The event with attributes of its own; raises `InputError` if they are no plain data."""
+    try:
+        attributes = json.loads(json.dumps(dict(event.attributes), allow_nan=False))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the attributes of '{event.name}' are no plain data: {error}") from None
+    return event._replace(attributes=attributes)

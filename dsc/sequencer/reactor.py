@@ -11,6 +11,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.steps import Output, SendLater, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
+from dsc.sequencer.ends import broken
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.tracing import StepTracer
@@ -89,6 +90,16 @@ class Reactor:
             self.problem = str(error)
             return ()
         return output
+
+    def believed(self, message: Message) -> Message:
+        """A skill that observes what cannot be has failed, and nothing of it is believed; else the message itself."""
+        if not isinstance(message, SkillMessage) or not message.outcome.observed:
+            return message
+        try:
+            self.knowledge.overlay().apply(message.outcome.observed)
+        except InputError as error:
+            return SkillMessage(message.start, broken(message.start, str(error)), final=True)
+        return message
 
     def leave(self) -> tuple[Output, ...]:
         """Wherever the run ends, exit actions put the components at rest; a finished machine has nothing to leave."""

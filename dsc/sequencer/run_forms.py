@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dsc.engine.state import NOTHING, FrameState, MachineState
-from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
+from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.run_tables import RunRow
@@ -22,8 +22,9 @@ from dsc.trace import Record
 from knowledge_base.exchange.forms import delta_form, delta_of
 
 Form = dict[str, Any]
-Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode
-"""What a run cannot do without after a restart. A parameter or mode that was set is in force until it is set anew."""
+Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage
+"""What a run cannot do without after a restart. A parameter or mode that was set is in force until it is set anew; a
+message is awaited until the component has taken it."""
 
 _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
@@ -183,6 +184,8 @@ def awaited_text(what: Awaited, short: Shortener) -> str:
             return text_of(message_form(what, short))
         case SetParameter():
             return text_of(_plain(what) | {"value": short.short(what.value)})
+        case SendMessage():
+            return text_of(_plain(what) | {"arguments": short(what.arguments)})
     return text_of(_plain(what))
 
 
@@ -192,14 +195,14 @@ def awaited_of(kind: str, text: str, find: Callable[[str], Any]) -> Awaited:
     match kind:
         case "Start":
             return Start(**form | {"arguments": full(form["arguments"], find)})
-        case "StartTimer":
-            return StartTimer(**form)
         case "SendLater":
             return _later_of(form, find)
         case "SetParameter":
             return SetParameter(**form | {"value": _full(form["value"], find)})
-        case "SwitchMode":
-            return SwitchMode(**form)
+        case "StartTimer" | "SwitchMode":
+            return StartTimer(**form) if kind == "StartTimer" else SwitchMode(**form)
+        case "SendMessage":
+            return SendMessage(**form | {"arguments": full(form["arguments"], find)})
     late = message_of(form, _no_action, find)
     assert isinstance(late, LateMessage)  # noqa: S101  the only one left
     return late

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
+from dsc.components.life import Life
 from dsc.dynamic.library import Library
 from dsc.engine.state import FrameState, MachineState
-from dsc.engine.steps import Cancel, Output, Revoke, SendLater, SetParameter, Start, StartTimer, SwitchMode
+from dsc.engine.steps import (
+    Cancel,
+    Output,
+    Revoke,
+    SendLater,
+    SendMessage,
+    SetParameter,
+    Start,
+    StartTimer,
+    SwitchMode,
+)
+from dsc.events import SKILL_ERROR
 from dsc.sequencer.messages import LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import (
@@ -26,6 +38,7 @@ from dsc.sequencer.run_forms import (
     text_of,
 )
 from dsc.sequencer.run_tables import RunArchive, RunRow
+from dsc.sequencer.telling import Told
 
 _INSERT = "INSERT INTO pending VALUES (?, ?, ?, ?, ?, 0, ?, 0)"
 _CANCELLED = "UPDATE pending SET cancelled = 1 WHERE place = ?"
@@ -49,7 +62,9 @@ class Present:
         self._frames: dict[int, FrameState] = {}
         self._places: dict[_Key, list[int]] = {}  # of what is pending, in the table; the earliest first
         self._activations: dict[int, set[_Key]] = {}
-        self._cancelled: list[int] = []  # places of what the last macrostep cancelled or overtook
+        self._cancelled: list[int] = []  # places of what the last macrostep cancelled
+        self._in_force: dict[_Key, int] = {}  # places of parameters and modes
+        self._telling: dict[int, Told] = {}  # by place: of this it is not known whether it has been taken
         self._last_place = 0
         self._memory: dict[str, str] = {}
 
@@ -63,8 +78,6 @@ class Present:
         root = self._root = kept.state.root
         self._frames = {frame.serial: frame for frame in root.frames()} if root else {}
         for one in kept.pending:
-            if isinstance(one.what, SetParameter | SwitchMode):
-                self._cancelled += self._places.pop(_key(one.what), [])
             self._note(one.what, one.place)
             if one.cancelled:
                 self._cancelled += self._places.pop(_key(one.what))
@@ -106,29 +119,37 @@ class Present:
         match message:
             case SkillMessage(start=start, final=False):
                 connection.executemany(_REPORTED, [(place,) for place in self._places.get(_key(start), ())])
-            case SkillMessage(start=start):
-                self._forget(connection, _key(start))
+            case SkillMessage(start=start, outcome=outcome):
+                # One that was not believed may go on until it is stopped, after the commit.
+                (self._cancel if outcome.event == SKILL_ERROR else self._forget)(connection, _key(start))
             case TimerMessage(timer=timer):
                 self._forget(connection, _key(timer))
             case LateMessage() | SendLater():
                 self._forget(connection, _key(message), 1)
 
+    def left(self, connection: sqlite3.Connection, under_way: Collection[Told]) -> None:
+        """What the macrostep before asked for has left; all that was told has been taken, but for what is under way."""
+        for place in self._cancelled:
+            connection.execute(_FORGET, (place,))
+        self._cancelled.clear()
+        for place, told in list(self._telling.items()):
+            if not any(told is one for one in under_way):
+                del self._telling[place]
+                if self._in_force.get(_key(told)) != place:
+                    connection.execute(_FORGET, (place,))
+
     def asked(
         self, connection: sqlite3.Connection, output: Iterable[Output], step: int, now: float, reactor: Reactor
     ) -> None:
         """What is awaited from now on, or no longer, and what is in force."""
-        for place in self._cancelled:  # that has left by now
-            connection.execute(_FORGET, (place,))
-        self._cancelled.clear()
-        earlier = self._last_place
         for one in output:
             match one:
                 case Start():
                     self.put(connection, one, step, now, reactor.caused_by.get(one.action_id, 0))
                 case StartTimer() | SendLater():
                     self.put(connection, one, step, now + one.seconds)
-                case SetParameter() | SwitchMode():
-                    self._overtake(connection, _key(one), earlier)
+                case SetParameter() | SwitchMode() | SendMessage():
+                    self._overtake(connection, _key(one))
                     self.put(connection, one, step, now)
                 case Cancel():
                     for key in self._activations.pop(one.activation, ()):
@@ -147,6 +168,11 @@ class Present:
     def _note(self, what: Awaited, place: int) -> None:
         key = _key(what)
         self._last_place = place
+        if isinstance(what, SetParameter | SwitchMode | SendMessage):
+            self._telling[place] = what
+            if not isinstance(what, SendMessage):
+                self._in_force[key] = place
+            return
         self._places.setdefault(key, []).append(place)
         if isinstance(what, Start | StartTimer):
             self._activations.setdefault(what.activation, set()).add(key)
@@ -160,12 +186,11 @@ class Present:
             connection.execute(_CANCELLED, (place,))
             self._cancelled.append(place)
 
-    def _overtake(self, connection: sqlite3.Connection, key: _Key, earlier: int) -> None:
-        """Something else is in force; what this very macrostep told before may never have left."""
-        places = self._places.pop(key, [])
-        for place in [place for place in places if place <= earlier]:
+    def _overtake(self, connection: sqlite3.Connection, key: _Key) -> None:
+        """Something else is in force; what has not been taken yet still has to be, and in order."""
+        place = self._in_force.pop(key, None)
+        if place is not None and place not in self._telling:
             connection.execute(_FORGET, (place,))
-        self._cancelled += [place for place in places if place > earlier]
 
     def _forget(self, connection: sqlite3.Connection, key: _Key, most: int | None = None) -> None:
         """Delete what is pending under that key, or only the earliest so many."""
@@ -218,6 +243,8 @@ def _key(what: Awaited) -> _Key:
             name = str(what.number)
         case SetParameter():
             name = f"{what.component} {what.parameter}"
-        case SwitchMode():
-            name = what.component
+        case SwitchMode():  # whether it lives and what it does then are in force side by side
+            name = f"{what.component} {'life' if what.mode in (Life.INIT, Life.SHUTDOWN) else 'mode'}"
+        case SendMessage():  # each one for itself
+            name = f"{what.component} {what.port}"
     return type(what).__name__, name

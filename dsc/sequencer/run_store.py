@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import Kept, Shortener, message_form, text_of
 from dsc.sequencer.run_present import Present, read
 from dsc.sequencer.run_tables import TABLES, archive, unfinished
+from dsc.sequencer.telling import Told
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
@@ -116,6 +117,7 @@ class RunStore:
         message: Message | None,
         output: Iterable[Output],
         reactor: Reactor,
+        under_way: Collection[Told] = (),
     ) -> None:
         """A macrostep; `message` is `None` for the first, in which the plot was started, and for leaving it.
 
@@ -124,6 +126,7 @@ class RunStore:
             message: what was taken.
             output: what is to be carried out after the commit.
             reactor: after it.
+            under_way: what components were told before and have not taken yet.
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
@@ -133,6 +136,7 @@ class RunStore:
             self._present.reactor(reactor), self._new_records(),
         ))  # fmt: skip
         self._present.frames(self._connection, reactor.machine.state.root)
+        self._present.left(self._connection, under_way)
         if message is not None:
             self._present.taken(self._connection, message)
         self._present.asked(self._connection, output, self._number, now, reactor)

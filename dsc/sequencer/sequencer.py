@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
-from dsc.engine.steps import Output, SendLater, SetParameter, Start, StartTimer, SwitchMode
+from dsc.engine.steps import Output
 from dsc.events import GAVE_UP, NO_PLAN, RESERVED, Event
 from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
-from dsc.sequencer.ends import broken
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage
+from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, plain
 from dsc.sequencer.reactor import Reactor, StepListener
-from dsc.sequencer.run_forms import Kept, Pending
+from dsc.sequencer.resuming import require_components, take_up
+from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.taking_up import Earlier
 from dsc.skills import Component
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
@@ -83,7 +82,7 @@ class Sequencer:
         self._inbox: asyncio.Queue[Message] = asyncio.Queue()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait)
         self._open_ended = open_ended
-        self._coming: dict[int, tuple[LateMessage, float, asyncio.TimerHandle]] = {}
+        self._coming = Coming(clock, self._inbox.put_nowait)
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
@@ -135,7 +134,7 @@ class Sequencer:
         """
         if event.name in RESERVED:
             raise InputError(f"the event '{event.name}' is fired by the executive itself", found=event.name)
-        self._hand_in(event._replace(attributes=_plain_data(event)), after)
+        self._hand_in(plain(event), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
         """Hand in a change of knowledge that somebody else made; from the loop's own thread.
@@ -175,9 +174,7 @@ class Sequencer:
             StoreError: the store cannot be written.
             UnknownNameError: a component that the run needs is not deployed; nothing has happened.
         """
-        started = [one.what.component for one in kept.pending if isinstance(one.what, Start)]
-        for needed in (*kept.memory, *started):
-            self.dispatcher.component(needed)
+        require_components(kept, self.dispatcher)
         return await self._until_end(lambda: self._take_up(kept))
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
@@ -200,8 +197,7 @@ class Sequencer:
             self._keep_end()
             raise
         finally:
-            for _, _, handle in self._coming.values():
-                handle.cancel()
+            self._coming.close()
             try:
                 self._leave()
             finally:
@@ -220,44 +216,11 @@ class Sequencer:
                 self._store.end(finished=self.machine.state.finished, problem=self._reactor.problem)
 
     async def _take_up(self, kept: Kept) -> None:
-        """Await again what was awaited when the run was broken off.
-
-        What the last macrostep asked for may never have left, so it leaves (again) when all else is as it was.
-        """
         self._reactor.restore(kept)
-        for name, memory in kept.memory.items():
-            self.dispatcher.component(name).recall(memory)
-        awaited = [one for one in kept.pending if not one.cancelled]
-        older = [one for one in awaited if one.step < kept.number]
         try:
-            for one in kept.pending:
-                if one.cancelled and isinstance(one.what, Start):
-                    await self.dispatcher.abandon(one.what)
-            for one in older:
-                if isinstance(one.what, SetParameter | SwitchMode):
-                    self.dispatcher.dispatch(one.what)
-            await self.dispatcher.telling.all_taken()
-            for one in older:
-                if not isinstance(one.what, SetParameter | SwitchMode):
-                    self._await_again(one)
-            await asyncio.sleep(0)  # until these have begun
-            for one in awaited[len(older) :]:
-                self._await_again(one)
+            await take_up(kept, self.dispatcher, self._coming)
         except InputError as error:
             self._reactor.problem = str(error)
-
-    def _await_again(self, one: Pending) -> None:
-        match one.what:
-            case Start():
-                self.dispatcher.take_up(one.what, Earlier(one.at, one.reports))
-            case StartTimer():
-                self.dispatcher.timers.start(one.what, one.at)
-            case SendLater():
-                self.dispatcher.timers.send(one.what, one.at)
-            case LateMessage():
-                self._await_late(one.what, one.at)
-            case _:
-                self.dispatcher.dispatch(one.what)
 
     # -- macrosteps: commit, then dispatch ---------------------------------------------------------------
 
@@ -270,20 +233,20 @@ class Sequencer:
         with store.writing():
             store.begin(plot, arguments, self.library)
             reactor.tracer.world(self.knowledge)
-            for late, due, _ in self._coming.values():
+            for late, due in self._coming:
                 store.late(late, due)
             output = reactor.start(plot, arguments)
-            store.step(self._clock.now(), None, output, reactor)
+            self._keep_step(None, output)
         self._carry_out(output)
 
     def _take(self, message: Message) -> None:
-        believed = self._believable(message)
+        believed = self._reactor.believed(message)
         if self._store is None:
             output = self._reactor.react(believed)
         else:
             with self._store.writing():
                 output = self._reactor.react(believed)
-                self._store.step(self._clock.now(), believed, output, self._reactor)
+                self._keep_step(believed, output)
                 for component, memory in self.dispatcher.memories():
                     self._store.memory(component, memory)
         if isinstance(message, SkillMessage):
@@ -292,16 +255,6 @@ class Sequencer:
             elif believed is not message:
                 self.dispatcher.stop(message.start)
         self._carry_out(output)
-
-    def _believable(self, message: Message) -> Message:
-        """A skill that observes what cannot be has failed, and nothing of it is believed."""
-        if not isinstance(message, SkillMessage) or not message.outcome.observed:
-            return message
-        try:
-            self.knowledge.overlay().apply(message.outcome.observed)
-        except InputError as error:
-            return SkillMessage(message.start, broken(message.start, str(error)), final=True)
-        return message
 
     def _leave(self) -> None:
         """Nothing is dispatched that could not be committed: a store that was lost has somebody else's run."""
@@ -312,8 +265,13 @@ class Sequencer:
         else:
             with self._store.writing():
                 output = self._reactor.leave()
-                self._store.step(self._clock.now(), None, output, self._reactor)
+                self._keep_step(None, output)
         self._carry_out(output)
+
+    def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:
+        assert self._store is not None  # noqa: S101
+        under_way = self.dispatcher.telling.under_way
+        self._store.step(self._clock.now(), message, output, self._reactor, under_way)
 
     def _carry_out(self, output: Iterable[Output]) -> None:
         try:
@@ -333,25 +291,10 @@ class Sequencer:
         if self._store is not None and self._store.begun:
             with self._store.writing():
                 self._store.late(late, due)
-        self._await_late(late, due)
-
-    def _await_late(self, late: LateMessage, due: float) -> None:
-        def arrive() -> None:
-            del self._coming[late.number]
-            self._inbox.put_nowait(late)
-
-        self._coming[late.number] = late, due, self._clock.call_at(due, arrive)
+        self._coming.wait_for(late, due)
 
     def _idle(self) -> bool:
         """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
         in_vain = self._reactor.in_vain
         coming = self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.timers.periods <= in_vain
         return not self._open_ended and self._inbox.empty() and not coming
-
-
-def _plain_data(event: Event) -> dict[str, Any]:
-    try:
-        attributes: dict[str, Any] = json.loads(json.dumps(dict(event.attributes), allow_nan=False))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"the attributes of '{event.name}' are no plain data: {error}") from None
-    return attributes

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Collection, Iterable
 
+from dsc.components.life import Life
 from dsc.components.stopping import GRACE
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
 from dsc.sequencer.ends import encoded
@@ -21,10 +22,32 @@ class Telling:
 
     def __init__(self) -> None:
         self._telling: dict[str, asyncio.Task[None]] = {}
+        self._under_way: dict[int, Told] = {}
+        self._last = 0
 
-    def tell(self, component: Component, told: Told) -> None:
-        """Let the component take it after what it was told before."""
-        self._in_turn(component.name, lambda: _taken(component, told))
+    @property
+    def under_way(self) -> Collection[Told]:
+        """What has been told and not been taken yet, nor refused."""
+        return self._under_way.values()
+
+    def tell(self, component: Component, told: Told, *, again: bool = False) -> None:
+        """Let the component take it after what it was told before.
+
+        Args:
+            component: whom.
+            told: what.
+            again: it is in force since before a restart: a component that was to start anew has done so.
+        """
+        number = self._last = self._last + 1
+        self._under_way[number] = told
+
+        async def take() -> None:
+            try:
+                await _take(component, told, again=again)
+            finally:
+                del self._under_way[number]
+
+        self._in_turn(component.name, take)
 
     async def taken(self, component: Component) -> None:
         """Wait until the component has taken what it was told; raises what it raised, once."""
@@ -39,9 +62,9 @@ class Telling:
             raise why
 
     async def all_taken(self) -> None:
-        """Wait until all components have taken, or refused, what they were told."""
+        """Wait until all components have taken, or refused, what they were told; not for ever."""
         if self._telling:
-            await asyncio.wait(self._telling.values())
+            await asyncio.wait(self._telling.values(), timeout=CLOSING)
 
     def tasks(self) -> Iterable[asyncio.Task[None]]:
         """What is to be waited for at the end."""
@@ -65,8 +88,10 @@ class Telling:
         self._telling[name] = asyncio.get_running_loop().create_task(in_order())
 
 
-async def _taken(component: Component, told: Told) -> None:
+async def _take(component: Component, told: Told, *, again: bool) -> None:
     match told:
+        case SwitchMode(mode=Life.INIT) if again:
+            await component.come_alive()
         case SetParameter():
             await component.configure(told.parameter, encoded(told.value))
         case SwitchMode():

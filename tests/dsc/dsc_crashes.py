@@ -116,8 +116,10 @@ def copied(folder: Path, to: Path) -> Path:
 class Crashes:
     """A whole run, with a copy of its files from each boundary; `Crashes.resumed` lives on from each of them."""
 
-    def __init__(self, folder: Path, *plots, prepare=None, arguments=None):
+    def __init__(self, folder: Path, *plots, prepare=None, arguments=None, make=Robot):
         self.plots = plots
+        self._make = make
+        self._prepare = prepare
         self.copies = []
         alive = folder / "alive"
         alive.mkdir()
@@ -132,9 +134,10 @@ class Crashes:
             if prepare is not None:
                 prepare(sequencer)
 
-        self.whole = Run(alive, plots, prepare=keep_hold, arguments=arguments, crash=crash)
+        first = make(crash=lambda: crash("done"))
+        self.whole = Run(alive, plots, robot=first, prepare=keep_hold, arguments=arguments, crash=crash)
 
     def resumed(self):
         """Each life after a crash; the first copy is older than the run's first commit, and is left out."""
         for what, done, folder in self.copies[1:]:
-            yield what, Run(folder, self.plots, done=done, resume=True)
+            yield what, Run(folder, self.plots, robot=self._make(done), resume=True)
