@@ -363,6 +363,12 @@ class Component:
         process dies; those that are part of it have ended with it.
         """
 
+    async def forget(self, action_id: str) -> None:
+        """Nobody will ask for the action's end any more: it has been taken and, with a store, is kept.
+
+        Override it where ends are remembered for that.
+        """
+
     def remember(self) -> Any:
         """Plain data to be kept, for `recall` after a restart; asked with each macrostep that is committed."""
         return None

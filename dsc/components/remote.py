@@ -1,6 +1,7 @@
 """A component on the other side of a transport: `Host` offers one there, `RemoteComponent` is used here like any other.
 
-An action is started by its id: however often a frame arrives, whatever is asked again, it is carried out once. While it
+An action is started by its id: however often a frame arrives, whatever is asked again, it is carried out once, and its
+end is there until it has been taken, so that a run which is resumed hears of it. While it
 runs the host is asked how it goes; one that is silent for `SILENCE` seconds is in FatalError as seen from here, which
 ends the action with `skill_error`, and the next action looks for it anew.
 """
@@ -18,7 +19,7 @@ from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedErro
 from dsc.components.heartbeats import Heart
 from dsc.components.life import Life
 from dsc.components.transport import Transport
-from dsc.skills import Clock, Component, Outcome, SkillCall, SkillSignature
+from dsc.skills import Clock, Component, Ended, Outcome, SkillCall, SkillSignature, Status
 from knowledge_base.exchange.forms import delta_form, delta_of
 
 WATCH = 1.0
@@ -43,8 +44,9 @@ def outcome_of(form: Mapping[str, Any]) -> Outcome:
 
 @dataclass(slots=True)
 class _Action:
-    """An action on the host's side: what it has said so far, its end last."""
+    """An action on the host's side: who wants to know, and what it has said so far, its end last."""
 
+    user: str
     task: asyncio.Task[None]
     said: list[dict[str, Any]] = field(default_factory=list)
 
@@ -87,14 +89,16 @@ class Host:
         return {"life": self._component.life.state, "reason": self._component.life.reason}
 
     async def _start(self, sender: str, said: dict[str, Any]) -> None:
-        if said["id"] not in self._actions:
-            task = asyncio.get_running_loop().create_task(self._carry_out(sender, said))
-            self._actions[said["id"]] = _Action(task)
+        if said["id"] in self._actions:  # whose user has been started anew
+            self._actions[said["id"]].user = sender
+        else:
+            task = asyncio.get_running_loop().create_task(self._carry_out(said))
+            self._actions[said["id"]] = _Action(sender, task)
 
-    async def _carry_out(self, sender: str, said: dict[str, Any]) -> None:
+    async def _carry_out(self, said: dict[str, Any]) -> None:
         def tell(form: dict[str, Any]) -> None:
             action.said.append(form)
-            self._endpoint.push(sender, f"news {said['id']}", len(action.said))
+            self._endpoint.push(action.user, f"news {said['id']}", len(action.said))
 
         await asyncio.sleep(0)  # until it is known under its id
         action = self._actions[said["id"]]
@@ -196,13 +200,26 @@ class RemoteComponent(Component):
                 if "report" in form:
                     call.report(outcome_of(form["report"]))
                     continue
-                await self._ask("stop", {"id": call.action_id})
                 if "failed" in form:
                     raise RefusedError(form["failed"])
                 return outcome_of(form["ended"])
             if not said:
                 with suppress(TimeoutError):
                     await asyncio.wait_for(news.wait(), WATCH)
+
+    async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
+        """Whether it is known there, going on or ended; a host that is new itself knows nothing."""
+        said = await self._ask("how", {"id": action_id, "heard": 0})
+        return Status.UNKNOWN if said is None else Status.RUNNING
+
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:  # noqa: ARG002
+        """Stop it there; raises `NoAnswerError`."""
+        await self._ask("stop", {"id": action_id})
+
+    async def forget(self, action_id: str) -> None:
+        """Let it be forgotten there."""
+        with suppress(NoAnswerError):  # then there is nothing to forget
+            await self._ask("stop", {"id": action_id})
 
     async def _ask(self, kind: str, said: Any, within: float = SILENCE) -> Any:
         try:

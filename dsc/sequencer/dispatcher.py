@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -131,6 +132,11 @@ class Dispatcher:
     def settle(self, start: Start) -> None:
         """The final answer of a skill has been taken; until then its component counts as busy."""
         self._running.pop(start.action_id, None)
+        component = self._components.get(start.component)
+        if component is not None and type(component).forget is not Component.forget:
+            task = asyncio.get_running_loop().create_task(_forgotten(component, start.action_id))
+            self._ending.add(task)
+            task.add_done_callback(self._ending.discard)
 
     def stop(self, start: Start) -> None:
         """Cancel a skill; nobody waits for its answer any more."""
@@ -251,6 +257,11 @@ class Dispatcher:
     def _leave_alone(self, start: Start, task: asyncio.Task[None]) -> None:
         self._ending.discard(task)
         self._not_stopped(start)
+
+
+async def _forgotten(component: Component, action_id: str) -> None:
+    with suppress(Exception):  # it is over: whatever goes wrong now must not end the run
+        await component.forget(action_id)
 
 
 def _cancelled_from_outside() -> bool:
