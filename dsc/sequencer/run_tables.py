@@ -117,6 +117,14 @@ class RunArchive:
                 tuple([Record.from_line(line) for line in records.split("\n") if line]),
             )  # fmt: skip
 
+    def records(self, run: int, after: int = 0) -> Iterator[Record]:
+        """The records of a run's trace that are kept, in order; only those with a higher number than `after`."""
+        rows = self.connection.execute("SELECT records FROM steps WHERE run = ? ORDER BY place", (run,))
+        for (lines,) in rows:
+            for line in lines.split("\n"):
+                if line and (record := Record.from_line(line)).seq > after:
+                    yield record
+
     def under_way(self) -> list[tuple[Start, float]]:
         """The skills of the unfinished run that have not ended, with the second at which they were started."""
         rows = self.connection.execute(
@@ -143,6 +151,22 @@ def archive(path: Path) -> Iterator[RunArchive]:
         if not _has_tables(connection):
             raise StoreError("no run was ever kept in this store", place=Place(str(path)))
         yield RunArchive(connection, path)
+
+
+def records_of(path: Path, run: int | None = None, after: int = 0) -> tuple[Mapping[str, Any], tuple[Record, ...]]:
+    """What a trace file of a kept run would have: its header, and the records so far; also while the run goes on.
+
+    Args:
+        path: the store, which is only read.
+        run: its number; the last one if left out.
+        after: number of the last record that is not wanted.
+
+    Raises:
+        StoreError: the file is not there, not a store, or has no such run.
+    """
+    with archive(path) as runs:
+        row = runs.run(run)
+        return row.header, tuple(runs.records(row.number, after))
 
 
 def has_run(path: Path) -> bool:

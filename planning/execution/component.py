@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     from planning.plan import PlanStep
 
 _PLAN_FOUND = {"plot": "plot", "name": "symbol", "steps": "number"}
-MOST_REMEMBERED = 16
-"""Of the plans that nobody watches, as many are kept for after a restart: a new one may have to take their place."""
+MOST_UNWATCHED = 64
+"""Plans that nobody watches are kept, since new ones may have to take their places; but of those that were left for
+good, nobody says so, and only as many."""
 
 
 class PlanningComponent(Component):
@@ -100,11 +101,9 @@ class PlanningComponent(Component):
     def remember(self) -> Any:
         """The plans that are on their way, what has been tried, and what was answered and has not been heard."""
         self._answers = {one: answer for one, answer in self._answers.items() if self._working_for(one)}
-        unwatched = [name for name, one in self._carried.items() if one.begun is None]
-        gone = set(unwatched[:-MOST_REMEMBERED])
         return {
             "plans": self._plans,
-            "carried": [one.to_json() for name, one in self._carried.items() if name not in gone],
+            "carried": [one.to_json() for one in self._carried.values()],
             "excluded": self._search.remember(),
             "chosen": self._choices.remember(),
             "answers": {one: [answer.event, dict(answer.attributes)] for one, answer in self._answers.items()},
@@ -164,14 +163,17 @@ class PlanningComponent(Component):
             self._carried.pop(after, None)
 
     @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}}, after_crash="repeat")
-    async def judge(self, call: SkillCall, goal: str) -> Outcome:  # noqa: ARG002
-        """Say whether the goal holds, and if not, which part of it is missing."""
+    async def judge(self, call: SkillCall, goal: str, plan: str = "") -> Outcome:  # noqa: ARG002
+        """Say whether the goal holds, and if not, which part of it is missing; `plan` was carried out for it."""
         try:
             wanted = self._derivation.at(self._knowledge).condition(parse_condition(goal))
             why = explain(wanted, self._knowledge)
         except InputError as error:  # what the goal is about is not there any more
             return Outcome("goal_open", {"reason": str(error)})
-        return Outcome("goal_holds") if why.truth else Outcome("goal_open", {"reason": str(why.deciding)})
+        if not why.truth:
+            return Outcome("goal_open", {"reason": str(why.deciding)})
+        self._carried.pop(plan, None)
+        return Outcome("goal_holds")
 
     @skill(
         outcomes={
@@ -195,7 +197,10 @@ class PlanningComponent(Component):
             self._required(plan), self._derivation, self._knowledge, self._search, self._telling, self._clock,
             self._new_name, is_own,
         )  # fmt: skip
-        return await watching.watch()
+        outcome = await watching.watch()
+        if outcome.event == "goal_holds":
+            del self._carried[plan]
+        return outcome
 
     @skill(
         outcomes={
@@ -326,6 +331,9 @@ class PlanningComponent(Component):
         return deordered(plan, self._derivation.original, self._knowledge, goal)
 
     def _carry(self, carried: Carried, form: dict[str, Any]) -> Outcome:
+        unwatched = [name for name, one in self._carried.items() if one.begun is None]
+        for name in unwatched[:-MOST_UNWATCHED]:
+            del self._carried[name]
         self._carried[carried.name] = carried
         return Outcome("plan_found", {"plot": form, "name": carried.name, "steps": len(carried.course.steps)})
 

@@ -13,7 +13,7 @@ from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.events import Event
 from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_tables import archive, has_run
+from dsc.sequencer.run_tables import archive, has_run, records_of
 from dsc.sequencer.sequencer import RunEnd
 from dsc.skills import Ended, Outcome, Status, skill
 from knowledge_base.errors import StoreError, UnknownNameError
@@ -193,9 +193,19 @@ def test_texts_with_any_kind_of_line_break_are_kept_in_their_records(tmp_path):
             return Outcome("did", {"n": "one\u2028two\x85three\nfour\u2029five"})
 
     run = Run(tmp_path, [TWICE], robot=Poet())
-    with archive(run.path) as runs:
-        records = [record for step in runs.steps(1) for record in step.records]
+    _, records = records_of(run.path)
     assert [record.to_line() for record in records] == [record.to_line() for record in run.records]
+
+
+def test_the_records_of_a_run_can_be_read_while_it_goes_on_and_only_the_new_ones(tmp_path):
+    crashes = Crashes(tmp_path, TWICE)
+    _, _, folder = crashes.copies[2]
+    _, first = records_of(folder / "run.kb")
+    _, whole = records_of(crashes.whole.path)
+    _, rest = records_of(crashes.whole.path, after=first[-1].seq)
+    assert first[0].type == "world"
+    assert [one.to_line() for one in whole] == [one.to_line() for one in (*first, *rest)]
+    assert whole[-1].type == "end"
 
 
 def test_a_run_that_has_ended_is_not_resumed(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from dataclasses import replace
 
@@ -156,3 +157,10 @@ def test_what_is_known_and_what_was_run_lasts_from_one_program_to_the_next(plann
         assert robot.achieve("(on a)").finished
     with archive(tmp_path / "run.kb") as runs:
         assert [run.ended["finished"] for run in runs.runs()] == [True, True]
+
+
+def test_plans_that_are_over_are_not_remembered(whole):
+    path, _, _ = whole
+    with archive(path) as runs:
+        (text,) = runs.connection.execute("SELECT memory FROM memory WHERE component = 'planner'").fetchone()
+    assert json.loads(text)["carried"] == []

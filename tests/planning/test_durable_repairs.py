@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 from breadth_first import BreadthFirst
+from errands import DOMAIN, HOLDER, ROOMS, ROUND
 from obedient_robot import FAILED, plots
-from test_carrying_out import DOMAIN, HOLDER, ROOMS, ROUND
 
 from dsc import Component, Outcome, SkillCall, parse_plot, skill
 from dsc.sequencer.run_tables import archive
