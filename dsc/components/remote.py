@@ -58,7 +58,7 @@ class Host:
         self._component = component
         self._clock = clock
         self._endpoint = Endpoint(component.name, transport)
-        self._actions: dict[str, _Action] = {}
+        self._actions: dict[tuple[str, str], _Action] = {}
         self._endpoint.answer("skills", self._skills)
         self._endpoint.answer("come alive", self._come_alive)
         self._endpoint.answer("start", self._start)
@@ -89,11 +89,12 @@ class Host:
         return {"life": self._component.life.state, "reason": self._component.life.reason}
 
     async def _start(self, sender: str, said: dict[str, Any]) -> None:
-        if said["id"] in self._actions:  # whose user has been started anew
-            self._actions[said["id"]].user = sender
+        action = self._actions.get(_key(said))
+        if action is not None:  # whose user has been started anew
+            action.user = sender
         else:
             task = asyncio.get_running_loop().create_task(self._carry_out(said))
-            self._actions[said["id"]] = _Action(sender, task)
+            self._actions[_key(said)] = _Action(sender, task)
 
     async def _carry_out(self, said: dict[str, Any]) -> None:
         def tell(form: dict[str, Any]) -> None:
@@ -101,7 +102,7 @@ class Host:
             self._endpoint.push(action.user, f"news {said['id']}", len(action.said))
 
         await asyncio.sleep(0)  # until it is known under its id
-        action = self._actions[said["id"]]
+        action = self._actions[_key(said)]
         seconds = {} if said["seconds"] is None else {"deadline": self._clock.now() + said["seconds"]}
         call = SkillCall(said["id"], self._clock, lambda outcome: tell({"report": outcome_form(outcome)}), **seconds)
         end: dict[str, Any]
@@ -114,25 +115,44 @@ class Host:
 
     async def _how(self, _: str, said: dict[str, Any]) -> list[dict[str, Any]] | None:
         """What the action has said after so many answers; `None` if it is unknown."""
-        action = self._actions.get(said["id"])
+        action = self._actions.get(_key(said))
         return None if action is None else action.said[said["heard"] :]
 
     async def _stop(self, _: str, said: dict[str, Any]) -> None:
         """Cancel the action if it is still going on, and forget it."""
-        action = self._actions.get(said["id"])
+        action = self._actions.get(_key(said))
         if action is not None and not action.task.done():
             action.task.cancel()
             await asyncio.wait([action.task])
-        self._actions.pop(said["id"], None)
+        self._actions.pop(_key(said), None)
+
+
+def _key(said: Mapping[str, Any]) -> tuple[str, str]:
+    return said["run"], said["id"]
 
 
 class RemoteComponent(Component):
-    """A hosted component as seen from here; made by `connect`."""
+    """A hosted component as seen from here; made by `connect`.
+
+    The host outlives programs, whose action ids are alike: there, they stand behind a name for the program's run.
+    """
 
     def __init__(self, name: str, endpoint: Endpoint, skills: dict[str, SkillSignature]) -> None:
         super().__init__(name)
         self._endpoint = endpoint
         self._skills = skills
+        self._run = endpoint.life
+
+    def remember(self) -> str:
+        """What its actions are known by there."""
+        return self._run
+
+    def recall(self, memory: Any) -> None:
+        """Go on with actions that were started before a restart."""
+        self._run = memory
+
+    def _key(self, action_id: str) -> dict[str, str]:
+        return {"run": self._run, "id": action_id}
 
     @classmethod
     async def connect(cls, name: str, transport: Transport, within: float = WITHIN) -> RemoteComponent:
@@ -177,13 +197,13 @@ class RemoteComponent(Component):
         news = asyncio.Event()
         self._endpoint.hear(f"news {call.action_id}", lambda _, __: news.set())
         seconds = call.remaining if call.remaining < float("inf") else None
-        said = {"id": call.action_id, "skill": skill_name, "arguments": dict(arguments), "seconds": seconds}
+        said = {"skill": skill_name, "arguments": dict(arguments), "seconds": seconds}
         try:
-            await self._ask("start", said)
+            await self._ask("start", {**self._key(call.action_id), **said})
             return await self._followed(call, news)
         except asyncio.CancelledError:
             with suppress(NoAnswerError):  # it is gone, and so is what it did
-                await self._ask("stop", {"id": call.action_id}, within=WITHIN)
+                await self._ask("stop", self._key(call.action_id), within=WITHIN)
             raise
         finally:
             self._endpoint.deafen(f"news {call.action_id}")
@@ -192,7 +212,7 @@ class RemoteComponent(Component):
         heard = 0
         while True:
             news.clear()
-            said = await self._ask("how", {"id": call.action_id, "heard": heard})
+            said = await self._ask("how", {**self._key(call.action_id), "heard": heard})
             if said is None:
                 raise RefusedError(f"'{self.name}' knows nothing of '{call.action_id}' any more")
             for form in said:
@@ -209,17 +229,17 @@ class RemoteComponent(Component):
 
     async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
         """Whether it is known there, going on or ended; a host that is new itself knows nothing."""
-        said = await self._ask("how", {"id": action_id, "heard": 0})
+        said = await self._ask("how", {**self._key(action_id), "heard": 0})
         return Status.UNKNOWN if said is None else Status.RUNNING
 
     async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:  # noqa: ARG002
         """Stop it there; raises `NoAnswerError`."""
-        await self._ask("stop", {"id": action_id})
+        await self._ask("stop", self._key(action_id))
 
     async def forget(self, action_id: str) -> None:
         """Let it be forgotten there."""
         with suppress(NoAnswerError):  # then there is nothing to forget
-            await self._ask("stop", {"id": action_id})
+            await self._ask("stop", self._key(action_id))
 
     async def _ask(self, kind: str, said: Any, within: float = SILENCE) -> Any:
         try:

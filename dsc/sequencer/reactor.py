@@ -8,6 +8,7 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
+from dsc.engine.state import MachineState
 from dsc.engine.steps import Output, SendLater, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
@@ -59,12 +60,13 @@ class Reactor:
         self.caused_by = {one.what.action_id: one.cause for one in kept.pending if isinstance(one.what, Start)}
         self.tracer.known_plots.update(record.data["hash"] for record in kept.records if record.type == "plot")
 
-    def start(self, plot: str, arguments: Mapping[str, Any]) -> tuple[Output, ...]:
-        """Enter the plot; what has to be carried out then.
+    def start(self, plot: str, arguments: Mapping[str, Any], serials: int = 0) -> tuple[Output, ...]:
+        """Enter the plot; what has to be carried out then. `serials` is the last serial number given out before.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
         """
+        self.machine.state = MachineState(serials=serials)
         try:
             step = self.machine.start(plot, arguments, self._situation())
         except RunawayError as error:

@@ -113,7 +113,8 @@ class _Again:
             return self._reactor.react(message_of(step.message, self._started.__getitem__, self._runs.form))
         if step.number > 1:
             return self._reactor.leave()
-        return self._reactor.start(self._row.plot, full(self._row.arguments, self._runs.form))
+        serials = self._runs.serials_before(self._row.number)
+        return self._reactor.start(self._row.plot, full(self._row.arguments, self._runs.form), serials)
 
     def _note(self, output: Iterable[Output]) -> None:
         self._started.update({one.action_id: one for one in output if isinstance(one, Start)})

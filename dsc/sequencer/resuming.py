@@ -36,26 +36,26 @@ async def take_up(kept: Kept, dispatcher: Dispatcher, coming: Coming) -> None:
     awaited = [one for one in kept.pending if not one.cancelled]
     older = [one for one in awaited if one.step < kept.number]
     in_force = _in_force(older)
-    for one in in_force:
-        assert isinstance(one.what, SetParameter | SwitchMode)  # noqa: S101
-        dispatcher.tell_again(one.what)
+    for told in in_force.values():
+        dispatcher.tell_again(told)
     await dispatcher.telling.all_taken()
     for one in older:
-        if one not in in_force:
+        if one.place not in in_force:
             _await_again(one, dispatcher, coming)
     await asyncio.sleep(0)  # until these have begun
     for one in awaited[len(older) :]:
         _await_again(one, dispatcher, coming)
 
 
-def _in_force(older: Iterable[Pending]) -> list[Pending]:
+def _in_force(older: Iterable[Pending]) -> dict[int, SetParameter | SwitchMode]:
     """What components have to be told before anything goes on; not what came after a message that was under way."""
-    found, behind = [], set()
+    found: dict[int, SetParameter | SwitchMode] = {}
+    behind = set()
     for one in older:
         if isinstance(one.what, SendMessage):
             behind.add(one.what.component)
         elif isinstance(one.what, SetParameter | SwitchMode) and one.what.component not in behind:
-            found.append(one)
+            found[one.place] = one.what
     return found
 
 

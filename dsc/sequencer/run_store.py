@@ -14,7 +14,7 @@ from dsc.sequencer.messages import LateMessage, Message
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import Kept, Shortener, message_form, text_of
 from dsc.sequencer.run_present import Present, read
-from dsc.sequencer.run_tables import TABLES, archive, unfinished
+from dsc.sequencer.run_tables import TABLES, archive, serials_before, unfinished
 from dsc.sequencer.telling import Told
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
@@ -90,8 +90,11 @@ class RunStore:
             raise
         self.begun = True
 
-    def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> None:
+    def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> int:
         """Make a new run; the knowledge is what is known at its start.
+
+        Returns:
+            The last serial number that earlier runs have given out.
 
         Raises:
             StoreError: another run is unfinished.
@@ -106,6 +109,7 @@ class RunStore:
             text_of(self._domain),
         )  # fmt: skip
         self._run = self._connection.execute(_BEGIN, row).lastrowid or 0
+        return serials_before(self._connection, self._run)
 
     def late(self, late: LateMessage, due: float) -> None:
         """Something was handed in that comes later, at second `due` of run time."""

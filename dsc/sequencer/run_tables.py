@@ -132,6 +132,10 @@ class RunArchive:
         )
         return [(Start(**json.loads(what)), since) for what, since in rows]
 
+    def serials_before(self, run: int) -> int:
+        """The last serial number given out before a run: no two runs of a store have an action id in common."""
+        return serials_before(self.connection, run)
+
     def form(self, digest: str) -> Any:
         """The plot of that hash, as data; always the same object."""
         if digest not in self._forms:
@@ -184,6 +188,14 @@ def unfinished(runs: RunArchive) -> RunRow:
         if run.ended is None:
             return run
     raise StoreError("there is no unfinished run in this store", place=Place(str(runs.path)))
+
+
+def serials_before(connection: sqlite3.Connection, run: int) -> int:
+    """As of `RunArchive`, for who writes the store."""
+    last = connection.execute(
+        "SELECT reactor FROM steps WHERE run < ? ORDER BY place DESC LIMIT 1", (run,)
+    ).fetchone()
+    return 0 if last is None else int(json.loads(last[0])["serials"])
 
 
 def _has_tables(connection: sqlite3.Connection) -> bool:

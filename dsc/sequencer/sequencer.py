@@ -231,11 +231,11 @@ class Sequencer:
             self._carry_out(reactor.start(plot, arguments))
             return
         with store.writing():
-            store.begin(plot, arguments, self.library)
+            serials = store.begin(plot, arguments, self.library)
             reactor.tracer.world(self.knowledge)
             for late, due in self._coming:
                 store.late(late, due)
-            output = reactor.start(plot, arguments)
+            output = reactor.start(plot, arguments, serials)
             self._keep_step(None, output)
         self._carry_out(output)
 
@@ -247,8 +247,6 @@ class Sequencer:
             with self._store.writing():
                 output = self._reactor.react(believed)
                 self._keep_step(believed, output)
-                for component, memory in self.dispatcher.memories():
-                    self._store.memory(component, memory)
         if isinstance(message, SkillMessage):
             if message.final:
                 self.dispatcher.settle(message.start)
@@ -272,6 +270,8 @@ class Sequencer:
         assert self._store is not None  # noqa: S101
         under_way = self.dispatcher.telling.under_way
         self._store.step(self._clock.now(), message, output, self._reactor, under_way)
+        for component, memory in self.dispatcher.memories():
+            self._store.memory(component, memory)
 
     def _carry_out(self, output: Iterable[Output]) -> None:
         try:

@@ -148,6 +148,27 @@ def test_it_does_what_it_does_without_a_crash(tmp_path):
     assert log == DONE
 
 
+def test_a_run_does_not_hear_of_what_another_program_has_left_there():
+    async def main():
+        transport, robot, clock = LocalTransport(), Robot(), LoopClock()
+        host = Host(robot, transport, clock)
+        for name, dies in (("one", True), ("two", False)):
+            mortal = Mortal(transport)
+            remote = await RemoteComponent.connect("robot", mortal)
+            chart = f"{{plot: p, states: {{a: {{entry: [{{trigger: robot.work, with: {{name: {name}}}}}], on: {{did: e}}}}, e: {{final: true}}}}}}"
+            running = asyncio.create_task(Sequencer(Library([plot(chart)]), KnowledgeBase(SCHEMA), [remote], clock).run("p"))
+            if dies:
+                await clock.sleep(1)
+                mortal.dead = True
+        end = await running
+        await host.close()
+        return end, robot.log
+
+    end, log = run_simulated(main())
+    assert end.finished
+    assert log == ["alive", "one", "two"]
+
+
 @pytest.mark.parametrize("crash_at", range(2, 16))
 def test_wherever_the_sequencer_dies_the_robot_does_each_thing_once(tmp_path, crash_at):
     (whole := tmp_path / "whole").mkdir()

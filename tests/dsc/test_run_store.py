@@ -12,6 +12,7 @@ from dsc_runs import SCHEMA, Ran
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.events import Event
+from dsc.sequencer.replay import replay
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.run_tables import archive, has_run, records_of
 from dsc.sequencer.sequencer import RunEnd
@@ -228,6 +229,13 @@ def test_a_store_holds_one_run_after_the_other_and_only_one_that_is_unfinished(t
             [(s.time, s.configuration) for s in runs.steps(run.number)] for run in runs.runs()
         )
         assert one == other
+
+
+def test_no_two_runs_of_a_store_have_an_action_in_common(tmp_path):
+    first = Run(tmp_path, [TWICE])
+    second = Run(tmp_path, [TWICE], done=first.robot.done)
+    assert len(second.robot.done) == 2 * len(first.robot.done)
+    assert replay(tmp_path / "run.kb", 2).divergence is None
 
 
 def test_a_mistake_in_what_is_to_be_run_leaves_the_store_as_it_was(tmp_path):
