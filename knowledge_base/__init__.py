@@ -35,19 +35,19 @@ if TYPE_CHECKING:
     from knowledge_base.language.query_plan import QueryPlan as QueryPlan
     from knowledge_base.language.query_plan import QueryStep as QueryStep
     from knowledge_base.overlay import Overlay as Overlay
+    from knowledge_base.prepared import Binding as Binding
     from knowledge_base.schema import Schema as Schema
     from knowledge_base.schema import Signature as Signature
     from knowledge_base.sources import Source as Source
     from knowledge_base.state import WorldState as WorldState
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
     from knowledge_base.transaction import Transaction as Transaction
-    from knowledge_base.view import Binding as Binding
     from knowledge_base.view import View as View
 
 __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
     {
-        "Binding": "view",
+        "Binding": "prepared",
         "Change": "facts",
         "Clock": "conditions.clock",
         "Computed": "computation",

@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
 
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.index import FactIndex
 from knowledge_base.schema import Schema
+
+
+@dataclass(slots=True)
+class Stamp:
+    """The version of a world, by which who reads a few facts without a lock knows that they are of one version.
+
+    Attributes:
+        version: `None` while a change is being made.
+    """
+
+    version: int | None = 0
 
 
 class WorldState:
@@ -14,9 +26,13 @@ class WorldState:
 
     Functions may be fed by sources (`sources`): their latest values are read like any other, but they are no
     part of `values`, of copies, and of what is committed.
+
+    Attributes:
+        stamp: kept by who changes it while others read.
     """
 
     def __init__(self, schema: Schema) -> None:
+        self.stamp = Stamp()
         self._schema = schema
         self._facts = FactIndex()
         self._values: dict[Fact, Content] = {}

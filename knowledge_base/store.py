@@ -343,11 +343,12 @@ class KnowledgeBase(Observable):
         """The change is kept; make it, and queue what others have to be told."""
         effective = change.delta
         departures = self._installed.departures(effective)
+        self._state.stamp.version = None
         self._sources.close_about(effective.removed_nodes)
         self._state.commit(effective)
         if self._graph is not None:
             self._graph.commit(effective)
-        self._version = change.version
+        self._version = self._state.stamp.version = change.version
         self._announcer.add(change)
         self._installed.commit(effective, departures, self._version)
 

@@ -6,19 +6,19 @@ from collections.abc import Mapping
 from threading import RLock
 
 from knowledge_base.exchange.json import to_json
+from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.exchange.problem_writer import problem_to_text
 from knowledge_base.facts import Content, Fact, Value
+from knowledge_base.inputs import require_params
 from knowledge_base.language.evaluation import Explanation, explain
 from knowledge_base.language.expression import TRUE, Expression
 from knowledge_base.language.query_plan import QueryPlan, plan_query
 from knowledge_base.overlay import Overlay
+from knowledge_base.prepared import Binding, Prepared, ReadyQuestions
 from knowledge_base.questions import Questions
 from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
 from knowledge_base.world_graph import Graph, WorldGraph
-
-Binding = dict[str, Value]
-"""One answer of a query: variables' names (without `?`) with their values."""
 
 
 class View:
@@ -32,6 +32,7 @@ class View:
         self._state = state
         self._version = version
         self._questions = Questions()
+        self._ready = ReadyQuestions(state, self._lock, self._questions)
         self._graph: WorldGraph | None = None
 
     @property
@@ -70,15 +71,24 @@ class View:
             SchemaError: a wrong number of arguments or a type that can never fit.
             InputError: a variable occurs only under `not` or in a comparison.
         """
-        with self._lock:
-            params = self._questions.given(text, params, self._state, "answers")
-            return self._questions.answers(text, params, self._state)
+        given = params if type(params) is dict else _plain(params)
+        return self._ready.querying(text, given)(*given.values())
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
         """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
-        with self._lock:
-            params = self._questions.given(text, params, self._state, "error")
-            return self._questions.ask(text, params, self._state)
+        given = params if type(params) is dict else _plain(params)
+        return self._ready.asking(text, given)(*given.values())
+
+    def prepare(self, text: str | Expression, *parameters: str) -> Prepared:
+        """A question to be asked again and again: `kb.prepare("(on ?x ?place)", "place").query("table")`.
+
+        It is read and checked now, and asked with the values alone, in the order of the parameters' names. That
+        takes the least time there is; `ask` and `query` with the same text each time do not take much more.
+
+        Raises:
+            ParseError, UnknownNameError, SchemaError, InputError: as for `query`.
+        """
+        return self._ready.prepared(text, parameters)
 
     def explain(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> Explanation:
         """Why the text is true or false; errors as for `ask`."""
@@ -106,20 +116,23 @@ class View:
         with self._lock:
             return to_json(self._state, self._version)
 
-    def to_pddl(self, domain: str, name: str = "world", goal: str | Expression | None = None) -> str:
+    def to_pddl(
+        self, domain: str, name: str = "world", goal: str | Expression | None = None, metric: Metric | None = None
+    ) -> str:
         """All of it as a PDDL problem for the domain of that name, which is not written.
 
         Args:
             domain: what the domain is called.
             name: what the problem is called.
             goal: what is wanted, if anything.
+            metric: what the best plan is, if that is said.
 
         Raises:
             InputError: as for `ask`, for the goal; and a name or number that PDDL cannot spell.
         """
         with self._lock:
             wanted = TRUE if goal is None else self._questions.condition(goal, {}, self._state)
-            return problem_to_text(self._state, name, domain, wanted)
+            return problem_to_text(self._state, name, domain, wanted, metric)
 
     def nodes(self) -> dict[str, str]:
         """All things with their types, in order of insertion."""
@@ -178,3 +191,10 @@ class View:
         """The thing's type; `None` if there is no such thing."""
         with self._lock:
             return self._state.type_of(name)
+
+
+def _plain(params: Mapping[str, Value] | None) -> dict[str, Value]:
+    if params is None:
+        return {}
+    require_params(params)
+    return dict(params)

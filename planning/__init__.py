@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from planning.plan import Plan as Plan
     from planning.plan import PlanStep as PlanStep
     from planning.posing.problem import pose as pose
+    from planning.unified import from_unified as from_unified
+    from planning.unified import to_unified as to_unified
     from planning.validation import validate as validate
 
 __getattr__, __dir__, __all__ = lazy_exports(
@@ -32,8 +34,10 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "PlannerRace": "engines.race",
         "PlanningAction": "domain",
         "PlanningDomain": "domain",
+        "from_unified": "unified",
         "plot_from_plan": "generation.plot",
         "pose": "posing.problem",
+        "to_unified": "unified",
         "validate": "validation",
     },
 )

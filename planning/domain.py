@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.action_text import ActionText
 from knowledge_base.exchange.domain_text import AxiomText, DomainText, parse_domain, read_domain
+from knowledge_base.exchange.domain_writer import domain_to_text
 from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
 from knowledge_base.language.effect import Add, Delete, effect_leaves
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
@@ -158,6 +159,17 @@ class PlanningDomain:
         axioms = tuple(_checked_axiom(a, schema) for a in read.axioms)
         _refuse_changed(actions.values(), axioms)
         return cls(read.name, schema, actions, axioms, tuple(dict.fromkeys(read.remarks())))
+
+    def to_pddl(self) -> str:
+        """All of it as one PDDL file, whatever it was made from; reading that gives the same domain.
+
+        Raises:
+            InputError: a name that PDDL cannot spell, or a predicate that Python computes.
+        """
+        if self.schema.computed:
+            computed = next(iter(self.schema.computed))
+            raise InputError(f"the predicate '{computed}' is computed by Python, which PDDL cannot say", found=computed)
+        return domain_to_text(text_of(self))
 
     def applicable(self, step: PlanStep, world: World) -> bool:
         """Whether the arguments are of the parameters' types and the precondition holds."""

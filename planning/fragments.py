@@ -89,7 +89,7 @@ def searched(texts: Sequence[DomainText]) -> Iterator[None]:
 
 
 def _declarations(signatures: Iterable[Signature]) -> tuple[DeclarationText, ...]:
-    return tuple(DeclarationText(s.name, s.parameters, s.place) for s in signatures)
+    return tuple(DeclarationText(s.name, s.parameters, s.place, s.result) for s in signatures)
 
 
 def _typed(schema: Schema, name: str, kind: str) -> TypedName:

@@ -1,4 +1,4 @@
-"""This knowledge base: the same text each time, values as parameters."""
+"""This knowledge base: questions prepared once, and the same with their text each time."""
 
 from collections.abc import Iterable
 
@@ -13,30 +13,41 @@ SCHEMA = Schema.parse(
 
 
 class Own(Contender):
-    """`kb.ask`, `kb.query` and `kb.apply` of a knowledge base in memory."""
+    """Prepared questions and `kb.apply` of a knowledge base in memory."""
 
     name = "this engine"
     package = "dynamic-state-charts"
 
     def __init__(self) -> None:
-        self.kb = KnowledgeBase(SCHEMA)
+        self.kb = kb = KnowledgeBase(SCHEMA)
+        self._point = kb.prepare("(on ?item ?place)", "item", "place")
+        self._pattern = kb.prepare("(on ?x ?place)", "place")
+        self._rare = kb.prepare("(opens ?x ?hall)", "hall")
+        self._inside = kb.prepare("(and (in ?x ?hall) (near ?x ?item))", "hall", "item")
+        self._join = kb.prepare("(and (on ?x ?place) (near ?x ?y))", "place")
 
     def insert(self, things: Iterable[str], arcs: Iterable[Arc]) -> None:
         self.kb.apply(Delta(dict.fromkeys(things, "thing"), added=tuple(fact(*arc) for arc in arcs)), "bench")
 
     def point(self, item: str, place: str) -> bool:
-        return self.kb.ask("(on ?item ?place)", {"item": item, "place": place})
+        return self._point.ask(item, place)
 
     def pattern(self, place: str) -> Answers:
-        return self.kb.query("(on ?x ?place)", {"place": place})
+        return self._pattern.query(place)
 
     def rare(self, hall: str) -> Answers:
-        return self.kb.query("(opens ?x ?hall)", {"hall": hall})
+        return self._rare.query(hall)
 
     def inside(self, hall: str, item: str) -> Answers:
-        return self.kb.query("(and (in ?x ?hall) (near ?x ?item))", {"hall": hall, "item": item})
+        return self._inside.query(hall, item)
 
     def join(self, place: str) -> Answers:
+        return self._join.query(place)
+
+    def point_by_text(self, item: str, place: str) -> bool:
+        return self.kb.ask("(on ?item ?place)", {"item": item, "place": place})
+
+    def join_by_text(self, place: str) -> Answers:
         return self.kb.query("(and (on ?x ?place) (near ?x ?y))", {"place": place})
 
     def move(self, item: str, old: str, new: str) -> None:

@@ -39,6 +39,8 @@ def question_rows(everyone: list[type[Contender]], size: int, pace: Pace) -> lis
         _agree(case, worlds.values(), method, asked)
         figures = measure({name: _asking(one, method, asked) for name, one in worlds.items()}, pace)
         rows.append(compared(f"{case}, {about}", figures, bound=2))
+        if hasattr(worlds.get(ENGINE), f"{method}_by_text"):
+            rows.append(_by_text(f"{case}, by its text, {about}", worlds[FLOOR], worlds[ENGINE], method, asked, pace))
     moves = measure({name: _moving(one, arcs) for name, one in worlds.items()}, pace)
     rows.append(compared(f"update, {about}", moves))
     gc.unfreeze()
@@ -55,6 +57,17 @@ def compared(case: str, figures: Figures, bound: float | None = None, unit: str 
     peers = [name for name in figures if name not in {FLOOR, ENGINE}]
     fastest = min(peers, key=lambda name: median(figures[name]))
     return Row(case, unit, cells, ratio(figures, fastest, ENGINE), fastest, targets)
+
+
+def _by_text(
+    case: str, floor: Contender, own: Contender, method: str, asked: list[tuple[str, ...]], pace: Pace
+) -> Row:
+    """What it takes to give the text of a question each time."""
+    jobs = {FLOOR: _asking(floor, method, asked), ENGINE: _asking(own, f"{method}_by_text", asked)}
+    figures = measure(jobs, pace)
+    cells = {name: Cell(1e6 * median(each)) for name, each in figures.items()}
+    cells[ENGINE] = Cell(cells[ENGINE].value, ratio(figures, ENGINE, FLOOR))
+    return Row(case, "µs", cells)
 
 
 def _filled(everyone: list[type[Contender]], arcs: Arcs) -> tuple[dict[str, Contender], Figures]:

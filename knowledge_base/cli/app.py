@@ -21,6 +21,7 @@ for command in (
     following.watch,
     following.history,
     asking.at,
+    telling.compact,
 ):
     app.command()(command)
 app.command("import")(exchanging.import_)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from knowledge_base.cli.moments import moment
 from knowledge_base.cli.printing import change_form, delta_lines, print_json
 from knowledge_base.cli.sources import Json, Store, writable
 
@@ -31,13 +32,17 @@ Key = Annotated[str | None, typer.Option(help="A name for this change: the same 
 def new(
     store: Annotated[Path, typer.Argument(metavar="STORE", help="The file to make.")],
     domain: Annotated[Path, typer.Option("--domain", metavar="D.pddl", help="What may be said: a PDDL domain.")],
+    functional: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PREDICATE", help="Only one of its facts that differ in the last argument alone is true."),
+    ] = None,
 ) -> None:
     """Make an empty store whose schema is that of a PDDL domain."""
     from knowledge_base.errors import StoreError
     from knowledge_base.schema import Schema
     from knowledge_base.store import KnowledgeBase
 
-    schema = Schema.from_pddl(domain)
+    schema = Schema.from_pddl(domain).with_functional(*functional or ())
     if store.exists():
         raise StoreError(f"'{store}' is there already; a new store takes the place of no file")
     with KnowledgeBase.open(schema, store) as kb:
@@ -71,6 +76,25 @@ def retract(
     from knowledge_base.statements import retracted
 
     _change(store, facts, retracted, author, expect, key, as_json=json)
+
+
+def compact(
+    store: Store,
+    keep: Annotated[
+        str | None, typer.Option(metavar="MOMENT", help="Keep what was since this version or time.  [default: now]")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Forget a store's past and make its file smaller; keys of changes are remembered."""
+    with writable(store) as kb:
+        before = store.stat().st_size
+        kb.compact(kb.version if keep is None else kb.at(**moment(keep)).version)
+        said = {"oldest": kb.oldest, "version": kb.version, "bytes_before": before, "bytes": store.stat().st_size}
+    if json:
+        print_json(said)
+        return
+    sizes = f"{said['bytes'] / 1000:,.0f} kB, before {before / 1000:,.0f} kB"
+    typer.echo(f"versions {said['oldest']} to {said['version']} are kept: {sizes}")
 
 
 def _change(

@@ -156,8 +156,8 @@ class Installed:
             row.relation.renew(row)
         for readers, args, sign in reached:
             for trigger, rows in tuple(readers.made(args, sign)):
-                if rows:  # still, for what came before may have closed them
-                    next(iter(rows)).relation.make(trigger, args, rows)
+                if rows and trigger.admits(*args):  # what came before may have closed them
+                    trigger.relation.make(trigger, args, rows)
         touched = {condition for row in self._changed for condition in row.conditions}
         for condition in sorted(touched, key=lambda c: c.number):
             condition.judge(self.version, self._changed)

@@ -45,8 +45,8 @@ class Relation:
         schema = world.schema
         self.shape = shape
         self.rows: dict[Args, Row] = {}
-        self._world = world
-        self._triggers = tuple(Trigger(o, shape, schema, readers(o)) for o in occurrences(shape.body, schema))
+        self.world = world
+        self._triggers = tuple(Trigger(o, self, readers(o)) for o in occurrences(shape.body, schema))
         self._test = compile_test(shape.body, schema)
         self._search = compile_query(shape.body, schema, frozenset(shape.params))
         self._joins = not all(t.covers for t in self._triggers)
@@ -89,7 +89,7 @@ class Relation:
     def loses(self, row: Row, witness: Args) -> bool:
         """Drop a witness that is none any more; whether the row has to be searched then."""
         try:
-            if self._test(self._world, {**row.bindings, **dict(zip(self.shape.answers, witness, strict=True))}):
+            if self._test(self.world, {**row.bindings, **dict(zip(self.shape.answers, witness, strict=True))}):
                 return False
         except InputError as error:
             self._fail(row, error)
@@ -97,13 +97,9 @@ class Relation:
         return not row.witnesses and not row.wants_all
 
     def make(self, trigger: Trigger, args: Args, rows: dict[Row, None]) -> None:
-        """Find what a change gives a witness among open rows, those which agree with it in their parameters."""
-        if not trigger.fits(args):
-            return
+        """Find what a change that the trigger admits makes true of open rows that agree with it in their parameters."""
         bindings = trigger.bindings(args)
         try:
-            if not trigger.may(self._world, bindings):
-                return
             if len(rows) == 1 or not trigger.finds:
                 for row in tuple(rows):
                     self._complete(row, trigger, bindings)
@@ -117,7 +113,7 @@ class Relation:
     def renew(self, row: Row) -> None:
         """Search the row as if it were new."""
         try:
-            found = dict.fromkeys(self._witness(b) for b in self._few(row, self._search(self._world, row.bindings)))
+            found = dict.fromkeys(self._witness(b) for b in self._few(row, self._search(self.world, row.bindings)))
             self._mend(row)
         except InputError as error:
             found = {}
@@ -132,10 +128,10 @@ class Relation:
         """Find what the change makes a witness of the row."""
         together = {**row.bindings, **bindings}
         if not trigger.leaves_open:
-            if self._test(self._world, together):
+            if self._test(self.world, together):
                 self._add(row, self._witness(together))
             return
-        for found in self._few(row, trigger.search(self._world, together)):
+        for found in self._few(row, trigger.search(self.world, together)):
             self._add(row, self._witness(found))
 
     def _few(self, row: Row, found: Iterator[Bindings]) -> list[Bindings]:

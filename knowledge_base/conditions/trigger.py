@@ -2,50 +2,57 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 from knowledge_base.conditions.dependencies import Occurrence
 from knowledge_base.conditions.readers import Readers, picker
 from knowledge_base.conditions.rows import ROWS, Row, schema_with_rows
-from knowledge_base.conditions.shape import Args, Shape
+from knowledge_base.conditions.shape import Args
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.compiler import compile_query, compile_test
-from knowledge_base.language.expression import And, Atom, Variable, free_variables
+from knowledge_base.language.expression import And, Atom, Expression, Variable, free_variables
 from knowledge_base.language.joins import conjuncts
 from knowledge_base.language.lookups import Search
-from knowledge_base.language.terms import Test
-from knowledge_base.schema import Schema
+from knowledge_base.language.source import test_source
+
+if TYPE_CHECKING:
+    from knowledge_base.conditions.relation import Relation
+
+
+_source = lru_cache(maxsize=1024)(test_source)
+"""Written once for conditions that are installed again and again."""
 
 
 class Trigger:
     """An occurrence in a shape; it puts the shape's rows and witnesses where a change finds them.
 
     Attributes:
+        relation: the shape with its rows.
         readers: all who read what it is about.
         covers: whether a change determines all parameters.
         finds: whether a change determines some of the answers.
         leaves_open: whether it leaves some of them open.
     """
 
-    def __init__(self, occurrence: Occurrence, shape: Shape, schema: Schema, readers: Readers) -> None:
+    def __init__(self, occurrence: Occurrence, relation: Relation, readers: Readers) -> None:
+        shape = relation.shape
         positions = dict(occurrence.bound)
         columns = {name: i for i, name in enumerate((*shape.params, *shape.answers))}
         params = sorted((positions[name], columns[name]) for name in shape.params if name in positions)
         everything = sorted((position, columns[name]) for name, position in positions.items())
+        self.relation = relation
         self.readers = readers
         self.covers = positions.keys() >= set(shape.params)
         self.finds = any(name in positions for name in shape.answers)
         self.leaves_open = not all(name in positions for name in shape.answers)
-        self._occurrence, self._shape, self._schema = occurrence, shape, schema
+        self._occurrence = occurrence
         self._relying = readers.relying_at(occurrence.polarity, tuple(position for position, _ in everything))
         self._relied_on = picker(tuple(column for _, column in everything))
         self._open = readers.open_at(occurrence.polarity, tuple(position for position, _ in params))
         self._known = picker(tuple(column for _, column in params))
-
-    def fits(self, args: Args) -> bool:
-        """Whether the arguments that must be equal are."""
-        equal = self._occurrence.equal
-        return not equal or all(args[i] == args[j] for i, j in equal)
 
     def bindings(self, args: Args) -> dict[str, Value]:
         """The values of the parameters and answers that the change determines."""
@@ -79,23 +86,47 @@ class Trigger:
                 del self._open[values]
 
     @cached_property
-    def may(self) -> Test:
-        """Whether what the change alone settles of the condition is true: most changes end here."""
-        places = sorted((position, name) for name, position in self._occurrence.bound)
-        said = Atom(self._occurrence.name, tuple(Variable(name) for _, name in places))  # it is true by the change
-        settled = {name for _, name in places}
-        parts = [part for part in conjuncts(self._shape.body) if part != said and free_variables(part) <= settled]
-        return compile_test(And(tuple(parts)), self._schema)
+    def admits(self) -> Callable[..., bool]:
+        """Whether a change with these arguments fits, and what it alone settles of the condition is true.
+
+        Most changes end here. What cannot be computed is left to who looks at the whole condition.
+        """
+        names = {position: name for name, position in self._occurrence.bound}
+        said = Atom(self._occurrence.name, tuple(Variable(names[i]) for i in sorted(names)))  # true by the change
+        settled = set(names.values())
+        rest = (part for part in conjuncts(self.relation.shape.body) if part != said)
+        parts = [part for part in rest if free_variables(part) <= settled]
+        test = self._settling(And(tuple(parts)), names)
+        equal = self._occurrence.equal
+        return test if not equal else lambda *args: all(args[i] == args[j] for i, j in equal) and test(*args)
+
+    def _settling(self, e: Expression, names: Mapping[int, str]) -> Callable[..., bool]:
+        """`e` as a function of a change's arguments; `names` are its variables by the positions of these."""
+        world, schema = self.relation.world, self.relation.world.schema
+        arguments = tuple([names.get(i, f"argument {i}") for i in range(max(names, default=-1) + 1)])
+        source = _source(e, schema, arguments)
+        if source is not None:
+            return source.bound(world)
+        holds = compile_test(e, schema)
+
+        def test(*args: Value) -> bool:
+            try:
+                return holds(world, self.bindings(args))
+            except InputError:
+                return True
+
+        return test
 
     @cached_property
     def search(self) -> Search:
         """Completes what the change and the row's parameters say to witnesses."""
-        bound = frozenset(self._shape.params).union(name for name, _ in self._occurrence.bound)
-        return compile_query(self._shape.body, self._schema, bound)
+        bound = frozenset(self.relation.shape.params).union(name for name, _ in self._occurrence.bound)
+        return compile_query(self.relation.shape.body, self.relation.world.schema, bound)
 
     @cached_property
     def join(self) -> Search:
         """Completes what the change says to open rows with witnesses: to be run on a `RowsWorld`."""
-        row = Atom(ROWS, tuple(map(Variable, self._shape.params)))
+        shape, schema = self.relation.shape, self.relation.world.schema
+        row = Atom(ROWS, tuple(map(Variable, shape.params)))
         bound = frozenset(name for name, _ in self._occurrence.bound)
-        return compile_query(And((row, self._shape.body)), schema_with_rows(self._schema, self._shape.params), bound)
+        return compile_query(And((row, shape.body)), schema_with_rows(schema, shape.params), bound)

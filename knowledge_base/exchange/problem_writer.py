@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from knowledge_base.errors import InputError
+from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.facts import Content, Fact
 from knowledge_base.language.expression import TRUE, Expression
 from knowledge_base.language.parser import LONGEST_NUMBER
@@ -12,7 +13,9 @@ from knowledge_base.spelling import is_plain_name, value_text
 from knowledge_base.state import WorldState
 
 
-def problem_to_text(state: WorldState, name: str, domain: str, goal: Expression = TRUE) -> str:
+def problem_to_text(
+    state: WorldState, name: str, domain: str, goal: Expression = TRUE, metric: Metric | None = None
+) -> str:
     """The world as the start of a problem.
 
     Args:
@@ -20,6 +23,7 @@ def problem_to_text(state: WorldState, name: str, domain: str, goal: Expression 
         name: what the problem is called.
         domain: the name of its domain.
         goal: what is wanted.
+        metric: what the best plan is.
 
     Raises:
         InputError: a name that PDDL cannot spell, such as one with blanks or capitals, or a number that is
@@ -36,7 +40,8 @@ def problem_to_text(state: WorldState, name: str, domain: str, goal: Expression 
     ]
     objects = [f"{thing} - {type_name}" for thing, type_name in state.nodes.items() if thing not in schema.constants]
     sections = (_section(":objects", objects), _section(":init", [*said, *values]), f"  (:goal {to_text(goal)})")
-    return "\n".join([f"(define (problem {name}) (:domain {domain})", *sections]) + ")\n"
+    wanted = [] if metric is None else [f"  (:metric {metric.direction} {to_text(metric.term)})"]
+    return "\n".join([f"(define (problem {name}) (:domain {domain})", *sections, *wanted]) + ")\n"
 
 
 def _section(keyword: str, lines: list[str]) -> str:

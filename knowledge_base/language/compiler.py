@@ -33,7 +33,7 @@ from knowledge_base.language.expression import (
     Variable,
     free_variables,
 )
-from knowledge_base.language.joins import Conjunct, Range, Step, candidates, conjuncts, opposite, order
+from knowledge_base.language.joins import Conjunct, Range, Step, as_range, candidates, conjuncts, opposite, order
 from knowledge_base.language.lookups import Answer, Answering, Lookup, Search, alternatives, distinct, smallest, things
 from knowledge_base.language.terms import (
     Bindings,
@@ -326,7 +326,7 @@ class SearchPlan:
         bound: frozenset[str],
         names: tuple[str, ...] | None = None,
     ) -> None:
-        self.steps = order((_as_range(c, schema) for c in conditions), bound, schema)
+        self.steps = order((as_range(c, schema) for c in conditions), bound, schema)
         self._schema = schema
         self._names = names
         self._stages: dict[tuple[int, ...], Stage] = {}
@@ -368,15 +368,6 @@ class SearchPlan:
             return compile_test(conjunct, self._schema)
         variable = conjunct.variable
         return _type_test(compile_term(Variable(variable.name), self._schema), variable.types, self._schema)
-
-
-def _as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
-    """A type's atom about a variable ranges over the things of that type."""
-    match conjunct:
-        case Atom(name, (Variable(variable),)) if schema.is_type(name, 1):
-            return Range(TypedVariable(variable, (name,), place=conjunct.place))
-        case _:
-            return conjunct
 
 
 def _lookup(step: Step, schema: Schema, bound: frozenset[str]) -> Lookup | Search:

@@ -85,6 +85,15 @@ def conjuncts(e: Expression) -> Iterator[Expression]:
         yield e
 
 
+def as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
+    """A type's atom about a variable ranges over the things of that type."""
+    match conjunct:
+        case Atom(name, (Variable(variable),)) if schema.is_type(name, 1):
+            return Range(TypedVariable(variable, (name,), place=conjunct.place))
+        case _:
+            return conjunct
+
+
 def opposite(e: Expression) -> Expression:
     """The negation of `e`, with `not` pushed inside so that its parts can be looked up."""
     match e:

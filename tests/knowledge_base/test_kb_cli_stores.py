@@ -261,3 +261,33 @@ def test_a_store_without_its_first_world_is_damaged(store) -> None:
     connection.close()
     with pytest.raises(StoreError, match="the store is damaged"):
         run("show", store)
+
+
+def test_a_store_is_made_with_functional_predicates(tmp_path) -> None:
+    (tmp_path / "domain.pddl").write_text(DOMAIN, encoding="utf-8")
+    path = str(tmp_path / "f.kb")
+    run("new", path, "--domain", str(tmp_path / "domain.pddl"), "--functional", "on")
+    run("tell", path, "(cup mug)", "(surface shelf)", "(on mug table)")
+    with pytest.raises(InputError, match="'on' is functional"):
+        run("tell", path, "(on mug shelf)")
+    with pytest.raises(InputError, match="'onn'"):
+        run("new", str(tmp_path / "g.kb"), "--domain", str(tmp_path / "domain.pddl"), "--functional", "onn")
+    assert not (tmp_path / "g.kb").exists()
+
+
+def test_the_past_of_a_store_is_forgotten_when_that_is_wanted(store) -> None:
+    for weight in range(1, 200):
+        run_quietly(store, weight)
+    said = json.loads(run("compact", store, "--keep", "150", "--json"))
+    assert (said["oldest"], said["version"]) == (150, 200)
+    assert next(change["version"] for change in json.loads(run("history", store, "--json"))) == 151
+    with pytest.raises(InputError, match="version 149"):
+        run("at", store, "149", "(clean mug)")
+    assert run("compact", store).startswith("versions 200 to 200 are kept: ")
+    assert json.loads(run("history", store, "--json")) == []
+    assert json.loads(run("ask", store, "(= (weight mug) 199)", "--json"))["holds"]
+
+
+def run_quietly(store: str, weight: int) -> None:
+    with KnowledgeBase.open(None, store) as kb, kb.transaction("scales") as tx:
+        tx.set("weight", "mug", weight)

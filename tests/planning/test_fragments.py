@@ -54,6 +54,12 @@ def test_pieces_make_one_domain(files):
     assert domain.schema.ancestors("cup") == ("cup", "item", "object")
 
 
+def test_pieces_keep_what_functions_are_worth():
+    labels = PlanningDomain.parse("(define (domain d) (:types item) (:functions (label ?i - item) - text))")
+    domain = PlanningDomain.from_fragments([labels, "(define (domain e) (:types place))"])
+    assert domain.schema.functions["label"].result == "text"
+
+
 def test_alone_a_piece_lacks_what_the_others_declare():
     with pytest.raises(InputError, match="'place'"):
         PlanningDomain.parse(ARM)

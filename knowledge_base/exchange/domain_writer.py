@@ -1,0 +1,120 @@
+"""A domain as a PDDL file, which `parse_domain` reads back: nothing but places and notes is lost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from graphlib import TopologicalSorter
+from typing import TypeVar
+
+from knowledge_base.errors import InputError
+from knowledge_base.exchange.action_text import ACTION, DURATIVE_ACTION, ActionText
+from knowledge_base.exchange.domain_text import DeclarationText, DomainText
+from knowledge_base.language.effect import NO_EFFECT, AllOf, Effect
+from knowledge_base.language.expression import TRUE, And, Constant, Expression, TypedVariable
+from knowledge_base.language.printer import to_text
+from knowledge_base.language.timed import Duration, Timed
+from knowledge_base.language.typed_list import TypedName
+from knowledge_base.schema import ROOT_TYPE
+from knowledge_base.spelling import is_plain_name
+
+_T = TypeVar("_T")
+
+
+def domain_to_text(domain: DomainText) -> str:
+    """The domain as text; types above others come before them, since not every reader takes them in any order.
+
+    Raises:
+        InputError: a name that PDDL cannot spell, such as one with blanks or capitals.
+    """
+    for name in _names(domain):
+        if not is_plain_name(name):
+            raise InputError(f"{name!r} cannot be a name in PDDL, which has lower case and no blanks there")
+    sections = [
+        _section(":requirements", domain.requirements, together=True),
+        _section(":types", [_name(one) for one in _from_the_top(domain.types)]),
+        _section(":constants", [_name(one) for one in domain.constants]),
+        _section(":predicates", [_declaration(one) for one in domain.predicates]),
+        _section(":functions", [f"{_declaration(one)} - {one.result or 'number'}" for one in domain.functions]),
+        *(f"  (:derived {_declaration(axiom.head)}\n    {to_text(axiom.condition)})" for axiom in domain.axioms),
+        *map(_action, domain.actions),
+    ]
+    return "\n".join([f"(define (domain {domain.name})", *filter(None, sections)]) + ")\n"
+
+
+def _names(domain: DomainText) -> Iterator[str]:
+    yield domain.name
+    for named in (domain.types, domain.constants, domain.predicates, domain.functions, domain.actions):
+        yield from (one.name for one in named)
+
+
+def _section(keyword: str, lines: Sequence[str], *, together: bool = False) -> str:
+    if not lines:
+        return ""
+    return (" " if together else "\n    ").join([f"  ({keyword}", *lines]) + ")"
+
+
+def _from_the_top(types: Iterable[TypedName]) -> list[TypedName]:
+    """Each after what it is a kind of."""
+    named = {one.name: one for one in types}
+    order = TopologicalSorter({name: one.types for name, one in named.items()}).static_order()
+    return [named[name] for name in order if name in named]
+
+
+def _name(one: TypedName) -> str:
+    return f"{one.name} - {_types(one.types)}"
+
+
+def _types(types: Sequence[str]) -> str:
+    return types[0] if len(types) == 1 else f"(either {' '.join(types)})" if types else ROOT_TYPE
+
+
+def _declaration(one: DeclarationText) -> str:
+    return "(" + " ".join([one.name, *map(_parameter, one.parameters)]) + ")"
+
+
+def _parameter(parameter: TypedVariable) -> str:
+    return f"?{parameter.name} - {_types(parameter.types)}"
+
+
+def _action(action: ActionText) -> str:
+    durative = action.duration is not None and action.timed is not None
+    lines = [f"  ({DURATIVE_ACTION if durative else ACTION} {action.name}"]
+    lines.append(f":parameters ({' '.join(map(_parameter, action.parameters))})")
+    if action.duration is not None and action.timed is not None:
+        lines.append(f":duration {_duration(action.duration)}")
+        lines.append(f":condition {_conditions(action.timed)}")
+        lines.append(f":effect {_effects(action.timed)}")
+    else:
+        lines.append(f":precondition {to_text(action.precondition)}")
+        lines.append(f":effect {to_text(action.effect)}")
+    return "\n    ".join(lines) + ")"
+
+
+def _duration(duration: Duration) -> str:
+    if duration.fixed:
+        return f"(= ?duration {to_text(duration.least)})"
+    bounds = [] if duration.least == Constant(0) else [f"(>= ?duration {to_text(duration.least)})"]
+    if duration.most != Constant(math.inf):
+        bounds.append(f"(<= ?duration {to_text(duration.most)})")
+    return bounds[0] if len(bounds) == 1 else f"(and {' '.join(bounds)})" if bounds else "()"
+
+
+def _conditions(timed: Timed) -> str:
+    def parts(e: Expression) -> tuple[Expression, ...]:
+        return e.parts if isinstance(e, And) else (e,)
+
+    named = {"at start": timed.start, "over all": timed.over_all, "at end": timed.end}
+    return _by_time({when: () if e == TRUE else parts(e) for when, e in named.items()}, to_text)
+
+
+def _effects(timed: Timed) -> str:
+    def parts(e: Effect) -> tuple[Effect, ...]:
+        return e.parts if isinstance(e, AllOf) else (e,)
+
+    named = {"at start": timed.start_effect, "at end": timed.end_effect}
+    return _by_time({when: () if e == NO_EFFECT else parts(e) for when, e in named.items()}, to_text)
+
+
+def _by_time(parts: dict[str, tuple[_T, ...]], written: Callable[[_T], str]) -> str:
+    return f"(and {' '.join(f'({when} {written(one)})' for when, each in parts.items() for one in each)})"
