@@ -240,18 +240,15 @@ class Sequencer:
         self._carry_out(output)
 
     def _take(self, message: Message) -> None:
-        believed = self._reactor.believed(message)
+        message = self._reactor.believed(message)
         if self._store is None:
-            output = self._reactor.react(believed)
+            output = self._reactor.react(message)
         else:
             with self._store.writing():
-                output = self._reactor.react(believed)
-                self._keep_step(believed, output)
-        if isinstance(message, SkillMessage):
-            if message.final:
-                self.dispatcher.settle(message.start)
-            elif believed is not message:
-                self.dispatcher.stop(message.start)
+                output = self._reactor.react(message)
+                self._keep_step(message, output)
+        if isinstance(message, SkillMessage) and message.final:
+            (self.dispatcher.stop if message.goes_on else self.dispatcher.settle)(message.start)
         self._carry_out(output)
 
     def _leave(self) -> None:
