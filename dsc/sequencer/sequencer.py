@@ -58,6 +58,7 @@ class Sequencer:
         open_ended: whether events may still come from outside when nothing is going on; if not, such a
             run ends with a problem instead of waiting for ever.
         store: keeps the run, so that it can be taken up again after a crash; its knowledge is `knowledge`.
+        part_of: stands before the action ids that components see; an id of another run, if this one is part of it.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class Sequencer:
         *,
         open_ended: bool = False,
         store: RunStore | None = None,
+        part_of: str = "",
     ) -> None:
         self.library = library
         self.knowledge = knowledge
@@ -80,7 +82,7 @@ class Sequencer:
         if store is not None:
             self.trace.listen(store.hear)
         self._inbox: asyncio.Queue[Message] = asyncio.Queue()
-        self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait)
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait, part_of)
         self._open_ended = open_ended
         self._coming = Coming(clock, self._inbox.put_nowait)
         self._last_late = store.last_late if store is not None else 0
