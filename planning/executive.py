@@ -235,8 +235,7 @@ class Executive:
     def _run_store(self, header: Mapping[str, Any]) -> RunStore | None:
         if self._store is None:
             return None
-        actions = {name: str(action) for name, action in self.domain.actions.items()}
-        return RunStore(self.knowledge, self._store, header, actions)
+        return RunStore(self.knowledge, self._store, header, self.domain.statements())
 
     def close(self) -> None:
         """End the planners' processes, if there are any of its own, and give back the store."""
