@@ -97,8 +97,8 @@ class Executive:
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        names = {PlanningComponent.name, *(c.name for c in self.components)}
-        findings = validate_library(self.library, self.domain.schema, skills, names)
+        declared = {PlanningComponent.name: {}, **{c.name: c.declares for c in self.components}}
+        findings = validate_library(self.library, self.domain.schema, skills, declared)
         raise_findings([*findings, *check_implementations(self.library, self.domain)])
         if knowledge is not None:
             self.knowledge = knowledge
