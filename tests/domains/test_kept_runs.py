@@ -149,8 +149,8 @@ def test_another_robot_is_the_same_one_after_the_crash(planner, tmp_path):
     (alive := tmp_path / "alive").mkdir()
     copies, profile = [], find_profile("on_tracks", PROFILES)
 
-    def boundary(step):
-        if step.state.serials and len(copies) < 30:
+    def boundary(_):
+        if len(copies) < 30:
             copies.append(copied(alive, tmp_path / f"copy{len(copies)}") if len(copies) in (15, 29) else None)
 
     with deploy(Scenario.parse(SCENARIO), 3, 0.2, planner, store=alive / "run.kb", profile=profile) as table:
@@ -158,7 +158,7 @@ def test_another_robot_is_the_same_one_after_the_crash(planner, tmp_path):
         world = table.world.state()
     for path in filter(None, copies):
         with resumed(path, planner) as table:
-            assert table.profile == profile
+            assert table.profile.digest == profile.digest
             assert replace(table.run(), wall_s=0) == report
             assert table.world.state() == world
         assert told(path) == told(alive / "run.kb")
