@@ -5,8 +5,8 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb soak-kb
-.PHONY: bench-startup bench-broken bench-engine bench-planning bench-kb bench-viewer pictures viewer test-viewer screenshots clean
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb
+.PHONY: bench-startup bench-broken bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer test-viewer screenshots clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -62,6 +62,9 @@ soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every re
 kill-kb: $(VENV)/.test   ## kill -9 a process that writes a store, for each durability: is all that it acknowledged there? (KILLS=N)
 	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/test_kb_kill.py
 
+kill-runs: $(VENV)/.test   ## kill -9 runs of the clean-up table and resume them: do they end like runs never killed? (KILLS=N)
+	KILLS=$(or $(KILLS),50) $(BIN)/python -m pytest tests/domains/test_kill_runs.py
+
 soak-kb: $(VENV)/.test   ## four threads and an event loop change, ask and watch one knowledge base at once (SECONDS=N)
 	$(BIN)/python tests/knowledge_base/kb_soak.py $(or $(SECONDS),30)
 
@@ -79,6 +82,9 @@ bench-planning: $(VENV)/.engines   ## tables of 5 to 50 items: each engine alone
 
 bench-kb: $(BENCH)/.peers   ## what facts, questions, updates and conditions cost: an index by hand, this knowledge base, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/kb.py $(if $(WRITE),--write)
+
+bench-run: $(VENV)/.run   ## what a macrostep costs without a store and with one, as ratios to the engine and to a bare commit
+	$(BIN)/python benchmarks/run_store.py
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg

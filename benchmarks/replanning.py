@@ -24,7 +24,7 @@ from planning import Executive, PlanStep
 from planning.domain import PlanningAction
 from planning.engines import planner as asking
 from planning.engines.race import PlannerRace
-from planning.execution import component, search
+from planning.execution import plotting, search
 from planning.plan import PlanFound, PlanningOutcome
 from planning.strips import Problem
 
@@ -36,7 +36,7 @@ _HERE = tuple(part for part in OURS if part != "translate")  # that the engine's
 _WRAPPED = (
     (search, "mending", "mend"), (search, "pose", "pose"), (search, "validate", "validate"),
     (asking, "written", "write"),
-    (component, "deordered", "de-order"), (component, "plot_from_plan", "generate"),
+    (plotting, "deordered", "de-order"), (plotting, "plot_from_plan", "generate"),
 )  # fmt: skip
 
 

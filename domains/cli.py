@@ -6,6 +6,7 @@ import errno
 import os
 import sys
 from collections.abc import Callable
+from enum import StrEnum
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
@@ -15,6 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from dsc.cli import app as plot_app
+from dsc.sequencer.cli import app as runs_app
 from dsc.viewer.cli import NoOpen, Port, view_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import readers
@@ -55,11 +57,19 @@ app = typer.Typer(
 )
 app.add_typer(plot_app, name="plot")
 app.add_typer(kb_app, name="kb")
+app.add_typer(runs_app, name="runs")
 app.command("plan")(plan_command)
 app.command("doctor")(doctor_command)
 app.command("view")(view_command)
 
 WORLDS = ("clean-up-table",)
+
+
+class Durability(StrEnum):
+    """What a kept run outlives: the death of the process, or a power cut too."""
+
+    process = "process"
+    power = "power"
 
 
 def _scenario(path: Path) -> KnowledgeBase:
@@ -92,7 +102,7 @@ def dsc(
 
 @app.command()
 def run(
-    world: Annotated[str, typer.Argument(help="The ready world to run: clean-up-table.")],
+    world: Annotated[str | None, typer.Argument(help="The ready world to run: clean-up-table.")] = None,
     scenario: Annotated[Path | None, typer.Option(help="What stands on the table (YAML).")] = None,
     seed: Annotated[int | None, typer.Option(help="Which faults happen; same seed, same run.")] = None,
     faults: Annotated[
@@ -104,6 +114,9 @@ def run(
     real_time: Annotated[bool, typer.Option("--real-time", help="Let time pass as on the wall.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
     trace: Annotated[Path | None, typer.Option(help="Write every record to this file (JSON lines).")] = None,
+    store: Annotated[Path | None, typer.Option(help="Keep the run in this new file: it can be resumed.")] = None,
+    durability: Annotated[Durability, typer.Option(help="With a store, what the run outlives.")] = Durability.process,
+    resume: Annotated[Path | None, typer.Option(help="Go on with the run that was broken off in this store.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Show it in the browser while it runs.")] = False,
     port: Port = 0,
     no_open: NoOpen = False,
@@ -113,17 +126,30 @@ def run(
     no_wait: Annotated[bool, typer.Option("--no-wait", help="With --view: end with the run, not at Ctrl-C.")] = False,
 ) -> None:
     """Run a ready world. Exit status: 0 goal reached, 1 something is left (the report says what and why)."""
-    from domains.clean_up_table.deployment import PROFILES, deploy
+    from domains.clean_up_table.deployment import PROFILES, deploy, resumed
     from domains.clean_up_table.scenario import Scenario
     from dsc.text.profiles import find_profile
-    from knowledge_base.errors import UnknownNameError
+    from knowledge_base.errors import InputError, UnknownNameError
 
-    if world not in WORLDS:
-        raise UnknownNameError(f"there is no world '{world}'", found=world, valid=WORLDS)
-    chosen = Scenario.load(scenario) if scenario is not None else Scenario.default()
-    deployed = deploy(chosen, seed, faults, profile=None if profile is None else find_profile(profile, PROFILES))
+    if resume is not None:
+        beginning = {
+            "WORLD": world, "--scenario": scenario, "--seed": seed, "--faults": faults, "--store": store,
+            "--profile": profile,
+        }  # fmt: skip
+        given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
+        if given:
+            raise InputError(f"a run is resumed as it was begun: --resume does not go with {', '.join(given)}")
+        deployed = resumed(resume, durability=durability.value)
+    else:
+        if world is None:
+            raise InputError("a run needs a world, or a store to --resume", valid=WORLDS)
+        if world not in WORLDS:
+            raise UnknownNameError(f"there is no world '{world}'", found=world, valid=WORLDS)
+        chosen = Scenario.load(scenario) if scenario is not None else Scenario.default()
+        robot = None if profile is None else find_profile(profile, PROFILES)
+        deployed = deploy(chosen, seed, faults, store=store, durability=durability.value, profile=robot)
     follow = partial(_followed, deployed, simulated=not real_time, quiet=json, trace=trace)
-    with deployed.executive:
+    with deployed:
         if not view:
             report = follow()
             _print(report, as_json=json)

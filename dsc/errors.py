@@ -51,3 +51,20 @@ class RunawayError(Exception):
     def __init__(self, problem: str, trail: Sequence[str]) -> None:
         super().__init__(f"{problem}: {' -> '.join(trail)}")
         self.trail = tuple(trail)
+
+
+class UncertainActionError(Exception):
+    """An action may or may not have happened before a restart, and must not be done again unseen."""
+
+
+class ChangedError(InputError):
+    """A run cannot be resumed with other plots, or another domain, than it was begun with.
+
+    Attributes:
+        differences: one sentence each.
+    """
+
+    def __init__(self, differences: Sequence[str], *, place: Place | None = None) -> None:
+        more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
+        super().__init__(f"the run was begun with others: {'; '.join(differences[:3])}{more}", place=place)
+        self.differences = tuple(differences)

@@ -17,6 +17,7 @@ import inspect
 import math
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol, TypeVar, cast
@@ -64,6 +65,10 @@ class SkillCall:
         report: hands over an intermediate event while the skill goes on (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
         give_up: says that something of the skill goes on that cannot be stopped.
+
+    When a run is resumed after a crash, a call may come again with the same id. Its clock then begins when the
+    action was started, and what was reported before is not heard twice: a skill that acts once for an id simply
+    goes the same way.
     """
 
     action_id: str
@@ -77,6 +82,25 @@ class SkillCall:
         """Seconds of run time until the deadline."""
         return self.deadline - self.clock.now()
 
+
+class Status(Enum):
+    """What a component says about an action that may have been under way when the run was broken off."""
+
+    RUNNING = "running"
+    UNKNOWN = "unknown"
+    NOT_BEGUN = "not begun"
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The action came to its end, and how."""
+
+    outcome: Outcome
+
+
+AfterCrash = Literal["repeat", "same_id", "sense"]
+"""What may be done about an action of which nothing is known: do it again, since twice is as once; do it with the
+same id, since the component does each id once; neither, since somebody has to look what happened first."""
 
 SkillBody = Callable[..., Any]
 """What is decorated: a coroutine function or, if it blocks, a plain one, that gives an `Outcome`."""
@@ -96,6 +120,7 @@ class SkillSignature:
         defaults: values of the parameters that may be left out.
         outcomes: events it may end with or report, with their attributes and types.
         pattern: how it communicates.
+        after_crash: see `AfterCrash`.
     """
 
     component: str
@@ -104,6 +129,7 @@ class SkillSignature:
     defaults: Mapping[str, Any]
     outcomes: Mapping[str, Mapping[str, str | None]]
     pattern: Pattern = "skill"
+    after_crash: AfterCrash = "sense"
 
 
 CarryOut = Callable[["Component", SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
@@ -120,6 +146,7 @@ class Declared:
         carry_out: how a call reaches the body.
         own: how many of the body's first parameters no chart gives.
         pattern: how it communicates.
+        after_crash: see `AfterCrash`.
     """
 
     types: Mapping[str, str]
@@ -127,6 +154,7 @@ class Declared:
     carry_out: CarryOut
     own: int = 2
     pattern: Pattern = "skill"
+    after_crash: AfterCrash = "sense"
 
     def __call__(self, body: _Body) -> _Body:
         """Note it; raises `SchemaError` for an outcome that is an event of the executive's own."""
@@ -147,6 +175,7 @@ def skill(
     types: Mapping[str, str] | None = None,
     *,
     blocking: Literal["thread", "process"] | None = None,
+    after_crash: AfterCrash = "sense",
 ) -> Callable[[_Body], _Body]:
     """Declare a component's method, or a function of its own (see `dsc.components.functions`), as a skill.
 
@@ -157,9 +186,10 @@ def skill(
         blocking: the body is no coroutine and blocks: it runs in a thread, with a `BlockingCall` to be asked now and
             then whether it shall stop; or in a process, which is ended when it shall stop. What goes to a process
             and comes back is pickled, the component itself included.
+        after_crash: what may be done when a run is resumed and the component does not know what became of it.
     """
     declared = {event: dict(attributes) for event, attributes in outcomes.items()}
-    return Declared(dict(types or {}), declared, _CARRIED_OUT[blocking])
+    return Declared(dict(types or {}), declared, _CARRIED_OUT[blocking], after_crash=after_crash)
 
 
 async def _awaited(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
@@ -334,6 +364,39 @@ class Component:
         """Names of the components it needs in its present mode."""
         return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
 
+    async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
+        """What became of an action that this process did not start; override to ask the robot.
+
+        `RUNNING` and `NOT_BEGUN` let the skill be executed with that id; it then awaits the action's end, or
+        does it. What may be done about an `UNKNOWN` one, the skill's `after_crash` says.
+        """
+        return Status.UNKNOWN
+
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:
+        """Stop an action, if it still goes on, that was cancelled just before the run was broken off.
+
+        Whether the cancellation has reached the robot is not known. Override it where actions go on when this
+        process dies; those that are part of it have ended with it.
+        """
+
+    async def forget(self, action_id: str) -> None:
+        """Nobody will ask for the action's end any more: it has been taken and, with a store, is kept.
+
+        Override it where ends are remembered for that.
+        """
+
+    def remember(self) -> Any:
+        """Plain data to be kept, for `recall` after a restart; asked with each macrostep that is committed."""
+        return None
+
+    def recall(self, memory: Any) -> None:
+        """Be as when `memory` was kept; called before anything else after a restart."""
+
+    @property
+    def remembers(self) -> bool:
+        """Whether there is anything to remember: most components are not asked again and again."""
+        return type(self).remember is not Component.remember
+
     async def diagnose(self) -> dict[str, Any]:
         """The *diagnose* port: how it is, as plain data; override to add what only it knows."""
         return {
@@ -393,4 +456,5 @@ def signature_of(component: str, name: str, body: SkillBody, declared: Declared)
         defaults={p.name: p.default for p in given if p.default is not inspect.Parameter.empty},
         outcomes=declared.outcomes,
         pattern=declared.pattern,
+        after_crash=declared.after_crash,
     )

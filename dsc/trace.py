@@ -13,6 +13,7 @@ from typing import IO, Any
 
 FORMAT = "dsc-trace"
 VERSION = 1
+_encode = json.JSONEncoder(ensure_ascii=False).encode  # `json.dumps` would make an encoder for each record
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,13 @@ class Record:
     def to_line(self) -> str:
         """One line of JSON, keys in a fixed order."""
         head = {"seq": self.seq, "t": round(self.t, 6), "type": self.type, "cause": self.cause}
-        return json.dumps({**head, **self.data}, ensure_ascii=False)
+        return _encode({**head, **self.data})
+
+    @staticmethod
+    def from_line(line: str) -> Record:
+        """The inverse of `to_line`, as far as the time is written."""
+        data = json.loads(line)
+        return Record(data.pop("seq"), data.pop("t"), data.pop("type"), data.pop("cause"), data)
 
 
 Listener = Callable[[Record], None]
@@ -45,12 +52,17 @@ Listener = Callable[[Record], None]
 
 
 class Trace:
-    """Numbers records and hands them to listeners; keeps none itself."""
+    """Numbers records and hands them to listeners; keeps none itself.
 
-    def __init__(self, now: Callable[[], float]) -> None:
+    Args:
+        now: tells the seconds of run time.
+        last: number of the last record there is already, of a run that is taken up again.
+    """
+
+    def __init__(self, now: Callable[[], float], last: int = 0) -> None:
         self._now = now
         self._listeners: list[Listener] = []
-        self._seq = 0
+        self._seq = last
         self.cause: int | None = None
 
     @property

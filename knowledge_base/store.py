@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sqlite3
 import time as wall
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import get_ident
+from threading import RLock, get_ident
 from types import TracebackType
 from typing import Self, get_args
 
@@ -53,6 +54,7 @@ class KnowledgeBase(Observable):
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
+        self._turn = RLock()  # to change something or ask for the past; taken before the lock, which all who ask need
 
     @classmethod
     def open(
@@ -126,7 +128,7 @@ class KnowledgeBase(Observable):
         super().close()
         for source in self.sources():
             source.close()
-        with self._lock:
+        with self._turn, self._lock:
             self._history.close()
 
     def refresh(self) -> int:
@@ -169,7 +171,7 @@ class KnowledgeBase(Observable):
         """
         _require_names(author, key)
         try:
-            with self._lock:
+            with self._turn, self._lock:
                 self._require_free()
                 first = self._first(key, expect)
                 transaction = Transaction(Overlay(self._state), self._questions, first)
@@ -208,7 +210,7 @@ class KnowledgeBase(Observable):
         """
         require_delta(delta)
         _require_names(author, key)
-        with self._lock:
+        with self._turn, self._lock:
             self._require_free()
             change = self._first(key, expect)
             if change is None:
@@ -217,6 +219,25 @@ class KnowledgeBase(Observable):
                 change = self._commit(pending.delta, author, key, along)
         self._announcer.deliver()
         return change
+
+    @contextmanager
+    def together(self) -> Iterator[sqlite3.Connection]:
+        """What is committed inside the block is written to the file as one, together with what the block itself writes.
+
+        Each change is a version of its own, and is seen and announced at once, as always; nobody may count on
+        it before the block is left. Other threads that change something, or ask for the past, wait until then.
+
+        Yields the connection; whoever writes with it neither commits nor rolls back.
+
+        Raises:
+            StoreError: there is no file, or it cannot be written. What is in memory is then ahead of it: every
+                further change is refused, and the file, opened anew, has what was before the block.
+            ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
+        """
+        with self._turn:
+            self._require_free()
+            with self._history.together() as connection:
+                yield connection
 
     def bind_source(self, function: str, *args: Value, reference: str) -> Source:
         """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
@@ -261,9 +282,11 @@ class KnowledgeBase(Observable):
             raise InputError("at(...) takes a version or a time")
         if version is None:
             require_time(time)
-            version = min(self._history.version_at(float(time or 0.0)), self._version)
-        self._require_reached(version)
-        return View(self._history.state(version, self._present), version)
+        with self._turn:
+            if version is None:
+                version = min(self._history.version_at(float(time or 0.0)), self._version)
+            self._require_reached(version)
+            return View(self._history.state(version, self._present), version)
 
     @property
     def oldest(self) -> int:
@@ -277,12 +300,14 @@ class KnowledgeBase(Observable):
             HistoryError: some of them are not kept any more, or are not there yet.
             InputError: one of the two is no version, or `until` is before `since`.
         """
-        self._require_reached(since)
-        until = self._version if until is None else until
-        self._require_reached(until)
-        if until < since:
-            raise InputError(f"changes are told from a version on until a later one, not from {since} until {until}")
-        return self._history.changes(since, until)
+        with self._turn:
+            self._require_reached(since)
+            until = self._version if until is None else until
+            self._require_reached(until)
+            if until < since:
+                said = f"changes are told from a version on until a later one, not from {since} until {until}"
+                raise InputError(said)
+            return self._history.changes(since, until)
 
     def compact(self, keep_since: int | None = None) -> None:
         """Forget what only versions before `keep_since` need (default: the present one); keys are remembered.
@@ -292,7 +317,7 @@ class KnowledgeBase(Observable):
             InputError: it is no version.
             StoreError: the file cannot be written, or the knowledge base is closed.
         """
-        with self._lock:
+        with self._turn, self._lock:
             self._require_open()
             version = self._version if keep_since is None else keep_since
             self._require_reached(version)

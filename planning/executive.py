@@ -17,13 +17,15 @@ from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
+from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.skills import Component, signatures
 from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
 from dsc.validation import raise_findings, validate_library
 from knowledge_base.compatibility import require_extension
-from knowledge_base.errors import InputError, SchemaError
+from knowledge_base.errors import InputError, SchemaError, StoreError
+from knowledge_base.journal.file import Durability
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
@@ -54,11 +56,16 @@ class Executive:
             time the engines that suit a problem, in a race.
         parallel: whether steps of a plan that need not wait for each other are carried out side by side.
         foresight: tries out plans in a simulation before they are carried out.
+        store: a file in which knowledge and runs are kept, so that a run can be resumed after a crash; it is made
+            when it is not there. The knowledge is the file's then.
+        durability: with a store, what it outlives: "process" the death of the process, "power" a power cut too.
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
-        InputError: a domain file is wrong, two fragments contradict each other, or two plots have one name.
+        InputError: a domain file is wrong, two fragments contradict each other, two plots have one name, or both
+            knowledge and a store are given.
         SchemaMismatchError: the given world model does not know what the domain is about.
+        StoreError: the store cannot be opened, or somebody else is writing it.
     """
 
     def __init__(
@@ -71,12 +78,17 @@ class Executive:
         *,
         parallel: bool = True,
         foresight: Foresight | None = None,
+        store: Path | str | None = None,
+        durability: Durability = "process",
     ) -> None:
         self.components = tuple(components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
         _refuse_namesakes(self.components)
-        self.knowledge = knowledge if knowledge is not None else KnowledgeBase(self.domain.schema)
-        require_extension(self.domain.schema, self.knowledge.schema)
+        if knowledge is not None and store is not None:
+            raise InputError("with a store the knowledge is the store's; none can be given beside it")
+        if knowledge is not None:
+            require_extension(self.domain.schema, knowledge.schema)
+        self._store = None if store is None else Path(store).resolve()
         self.library = Library(plots)
         if ACHIEVE not in self.library:
             self.library.add(achieve_plot())
@@ -90,6 +102,11 @@ class Executive:
         declared = {PlanningComponent.name: {}, **{c.name: c.declares for c in self.components}}
         findings = validate_library(self.library, self.domain.schema, skills, declared)
         raise_findings([*findings, *check_implementations(self.library, self.domain)])
+        if knowledge is not None:
+            self.knowledge = knowledge
+        else:  # at last, since what is opened has to be closed
+            kept = None if store is None else durability
+            self.knowledge = KnowledgeBase.open(self.domain.schema, self._store, kept)
 
     def listen(self, listener: Listener) -> None:
         """Tell `listener` every record of every run from now on."""
@@ -103,6 +120,7 @@ class Executive:
         simulated: bool = True,
         open_ended: bool = False,
         prepare: Prepare | None = None,
+        header: Mapping[str, Any] | None = None,
     ) -> RunEnd:
         """Run a plot to its end.
 
@@ -113,12 +131,45 @@ class Executive:
             open_ended: whether events may still come from outside (an operator, a user interface) when nothing
                 is going on; if not, such a run ends and says so.
             prepare: see `Prepare`.
+            header: what is to be found with the run in the store, plain data.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
+            StoreError: the store cannot be written, or has an unfinished run.
         """
         runner = run_simulated if simulated else run_real
-        return runner(self.execute(plot, arguments or {}, prepare, open_ended=open_ended))
+        how = {"simulated": simulated, "open_ended": open_ended}
+        store = self._run_store({**(header or {}), **how})
+        return runner(self.execute(plot, arguments or {}, prepare, open_ended=open_ended, store=store))
+
+    def resume(self, *, prepare: Prepare | None = None) -> RunEnd:
+        """Go on with the store's unfinished run where it was broken off, and run it to its end.
+
+        Those who listen hear its records from the beginning. `prepare` is called again; what was handed in to
+        come later, and has not come, is kept and need not be handed in again.
+
+        Raises:
+            StoreError: there is no store, no unfinished run in it, or it cannot be read or written.
+            ChangedError: plots or domain are not those with which it was begun; the error says what is different.
+        """
+        store = self._run_store({})
+        if store is None:
+            raise StoreError("only a run with a store can be resumed")
+        kept = store.take_up(self.library)
+        for record in kept.records:
+            for listener in self._listeners:
+                listener(record)
+
+        async def go_on() -> RunEnd:
+            open_ended = bool(kept.run.header["open_ended"])
+            clock = LoopClock(kept.time)
+            sequencer = self._sequencer(clock, kept.last_record, store, open_ended=open_ended)
+            if prepare is not None:
+                prepare(sequencer)
+            with nullcontext() if clock.simulated else _settled():
+                return await sequencer.resume(kept)
+
+        return run_simulated(go_on(), kept.time) if kept.run.header["simulated"] else run_real(go_on())
 
     def achieve(
         self,
@@ -153,15 +204,30 @@ class Executive:
         return self.run(ACHIEVE, arguments, simulated=simulated, open_ended=open_ended, prepare=prepare)
 
     async def execute(
-        self, plot: str, arguments: Mapping[str, Any], prepare: Prepare | None = None, *, open_ended: bool = False
+        self,
+        plot: str,
+        arguments: Mapping[str, Any],
+        prepare: Prepare | None = None,
+        *,
+        open_ended: bool = False,
+        store: RunStore | None = None,
     ) -> RunEnd:
-        """As `run`, inside a loop that is there already."""
+        """As `run`, inside a loop that is there already; `store` keeps the run."""
         clock = LoopClock()
-        trace = Trace(clock.now)
+        sequencer = self._sequencer(clock, 0, store, open_ended=open_ended)
+        if prepare is not None:
+            prepare(sequencer)
+        with nullcontext() if clock.simulated else _settled():
+            return await sequencer.run(plot, arguments)
+
+    def _sequencer(self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool) -> Sequencer:
+        trace = Trace(clock.now, last)
         for listener in self._listeners:
             trace.listen(listener)
         components: list[Component] = list(self.components)
-        sequencer = Sequencer(self.library, self.knowledge, components, clock, trace, open_ended=open_ended)
+        sequencer = Sequencer(
+            self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store
+        )
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
             working_for=sequencer.working_for, parallel=self._parallel,
@@ -170,13 +236,17 @@ class Executive:
         )  # fmt: skip
         sequencer.listen(planning.note_choices)
         sequencer.dispatcher.deploy(planning)
-        if prepare is not None:
-            prepare(sequencer)
-        with nullcontext() if clock.simulated else _settled():
-            return await sequencer.run(plot, arguments)
+        return sequencer
+
+    def _run_store(self, header: Mapping[str, Any]) -> RunStore | None:
+        if self._store is None:
+            return None
+        return RunStore(self.knowledge, self._store, header, self.domain.statements())
 
     def close(self) -> None:
-        """End the planners' processes, if there are any of its own."""
+        """End the planners' processes, if there are any of its own, and give back the store."""
+        if self._store is not None:
+            self.knowledge.close()
         for planner in self._own_planners.values():
             planner.kill()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from knowledge_base.errors import InputError
@@ -17,6 +18,16 @@ class PlanStep:
     def __str__(self) -> str:
         """In PDDL: `(pick-up cup1 table)`."""
         return "(" + " ".join((self.action, *self.args)) + ")"
+
+    def to_json(self) -> list[str]:
+        """The name of the action, then its arguments."""
+        return [self.action, *self.args]
+
+    @classmethod
+    def from_json(cls, form: Sequence[str]) -> PlanStep:
+        """The inverse of `to_json`."""
+        action, *args = form
+        return cls(action, tuple(args))
 
 
 @dataclass(frozen=True, slots=True)

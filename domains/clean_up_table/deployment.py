@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from domains.clean_up_table.foresight import Physics
 from domains.clean_up_table.report import Report, summarise
@@ -17,16 +17,18 @@ from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.second_robot import PatientCamera, SuctionArm, Tracks
 from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
 from domains.clean_up_table.world import World
+from domains.clean_up_table.world_file import LastingWorld, beside
 from domains.tally import Tally
 from dsc.model.plot import ActionPlot
 from dsc.model.profile import Profile
 from dsc.profiles import adapted, configure
+from dsc.sequencer.run_tables import archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.skills import Component
 from dsc.text.plots import load_library
 from dsc.trace import Listener, Record
-from knowledge_base.errors import UnknownNameError
-from knowledge_base.store import KnowledgeBase
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.journal.file import Durability
 from planning.domain import PlanningDomain
 from planning.engines.planner import Planner
 from planning.executive import Executive
@@ -43,26 +45,51 @@ class CleanUpTable:
         world: the simulated truth.
         executive: the robot program over it.
         tally: counts what happens.
+        resumes: whether there is a run to go on with.
         profile: what the robot was made after; `None` is the usual one.
     """
 
     world: World
     executive: Executive
     tally: Tally = field(default_factory=Tally)
+    resumes: bool = False
     profile: Profile | None = None
+
+    def __enter__(self) -> Self:
+        """Itself; `close` at the end."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """`close`."""
+        self.close()
+
+    def close(self) -> None:
+        """End the planner's process, if there is one of its own, and give back the files."""
+        self.executive.close()
+        if isinstance(self.world, LastingWorld):
+            self.world.close()
 
     def run(self, *, simulated: bool = True, prepare: Callable[[Sequencer], None] | None = None) -> Report:
         """Clear the table and report; the report says so if the operator ends the run (Ctrl-C).
 
         Args:
-            simulated: whether time jumps from event to event.
+            simulated: whether time jumps from event to event; a run that is resumed goes on as it began.
             prepare: called with the sequencer before the run starts.
+
+        Raises:
+            StoreError: the store cannot be read or written.
+            ChangedError: a run is to be resumed with other plots, or another domain.
         """
         started = time.perf_counter()
+
+        def ready(sequencer: Sequencer) -> None:
+            self._prepare(sequencer, prepare)
+
         try:
-            end = self.executive.run(
-                MAIN_PLOT, simulated=simulated, prepare=lambda sequencer: self._prepare(sequencer, prepare)
-            )
+            if self.resumes:
+                end = self.executive.resume(prepare=ready)
+            else:
+                end = self.executive.run(MAIN_PLOT, simulated=simulated, prepare=ready, header=self._kept())
         except KeyboardInterrupt:
             end = RunEnd(finished=False, problem="the operator ended the run")
         return summarise(self.world, self.executive.knowledge, self.tally, end, time.perf_counter() - started)
@@ -71,6 +98,11 @@ class CleanUpTable:
         sequencer.trace.listen(_SceneWriter(self.world, sequencer))
         if more is not None:
             more(sequencer)
+
+    def _kept(self) -> dict[str, Any]:
+        """The header, and what a robot is made after, for who resumes the run."""
+        settings = {} if self.profile is None else {"settings": self.profile.model_dump(by_alias=True)}
+        return {**self.header(), **settings}
 
     def header(self) -> dict[str, Any]:
         """What determines a run, for the first line of its trace."""
@@ -91,9 +123,11 @@ def deploy(
     faults: float | None = None,
     planner: Planner | None = None,
     listener: Listener | None = None,
+    store: Path | None = None,
+    durability: Durability = "process",
     profile: Profile | None = None,
 ) -> CleanUpTable:
-    """Wire everything for one run; close `executive` when done.
+    """Wire everything for one run; close it when done.
 
     Args:
         scenario: what stands on the table; the default one if left out.
@@ -101,17 +135,60 @@ def deploy(
         faults: chance of a fault per skill call in [0, 1]; the scenario's own if left out.
         planner: finds plans; pyperplan in a process of its own if left out.
         listener: is told every record of the run.
+        store: a file to keep the run in, with the world beside it; one that has no run yet.
+        durability: what the run outlives, see `Executive`.
         profile: which of `ROBOTS` does it, and what its parameters are worth; the one on wheels if left out.
 
     Raises:
-        InputError: the scenario or the profile is wrong.
+        InputError: the scenario or the profile is wrong, or the store has a run already.
+        StoreError: the store cannot be opened, or the world not be written.
     """
     world = (scenario or Scenario.default()).world(seed, faults)
+    if store is None:
+        return _wired(world, planner, listener, profile)
+    if has_run(store):
+        raise InputError(f"'{store}' has a run already; go on with it by --resume, or take another file")
+    lasting = LastingWorld.from_state(world.state())
+    deployed = _wired(lasting, planner, listener, profile, store, durability)
+    try:
+        lasting.create(beside(store))
+    except BaseException:
+        deployed.close()
+        raise
+    return deployed
+
+
+def resumed(
+    store: Path,
+    planner: Planner | None = None,
+    listener: Listener | None = None,
+    durability: Durability = "process",
+) -> CleanUpTable:
+    """Wire everything to go on with the run in a store; arguments as for `deploy`.
+
+    Raises:
+        StoreError: the store or its world is not there, or cannot be read.
+    """
+    with archive(store) as runs:
+        said = unfinished(runs).header.get("settings")
+    profile = None if said is None else Profile.model_validate(said)
+    deployed = _wired(LastingWorld.open(beside(store)), planner, listener, profile, store, durability)
+    deployed.resumes = True
+    return deployed
+
+
+def _wired(
+    world: World,
+    planner: Planner | None,
+    listener: Listener | None,
+    profile: Profile | None,
+    store: Path | None = None,
+    durability: Durability = "process",
+) -> CleanUpTable:
     domain = PlanningDomain.from_pddl(HOME / "domain.pddl")
-    knowledge = KnowledgeBase(domain.schema)
-    knowledge.apply(initial_knowledge(world), "deployment")
 
     def believed(surface: str) -> list[str]:
+        knowledge = executive.knowledge
         lying = [str(found["item"]) for found in knowledge.query("(lies-at ?item ?at)", {"at": surface})]
         for item in lying:  # grows: what is in an item is where the item is
             lying += [str(found["inner"]) for found in knowledge.query("(inside ?inner ?item)", {"item": item})]
@@ -119,7 +196,11 @@ def deploy(
 
     components = robot(profile)(world, believed)
     configure(components, profile)
-    executive = Executive(domain, adapted(plots(), profile), components, knowledge, planner, foresight=Physics())
+    executive = Executive(
+        domain, adapted(plots(), profile), components, None, planner,
+        foresight=Physics(), store=store, durability=durability,
+    )  # fmt: skip
+    executive.knowledge.apply(initial_knowledge(world), "deployment", key="deployment")
     deployed = CleanUpTable(world, executive, profile=profile)
     executive.listen(deployed.tally)
     if listener is not None:

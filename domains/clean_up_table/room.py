@@ -34,6 +34,7 @@ class Room:
         trips: how often something was thrown away.
         said: what the robot said, in order.
         done: the first result of every action executed, by action id.
+        departure: the last drive, and the place it began at.
     """
 
     def __init__(
@@ -48,6 +49,16 @@ class Room:
         self.trips = 0
         self.said: list[str] = []
         self.done: dict[str, Result] = {}
+        self.departure = "", robot_at
+
+    def executed(self, action_id: str, result: Result) -> None:
+        """An action was done, and this came of it."""
+        self.done[action_id] = result
+
+    def place_before(self, action_id: str) -> str:
+        """Where a drive begins; where it began, if it has been done already: asked again, it takes as long."""
+        drive, place = self.departure
+        return place if drive == action_id else self.robot_at
 
     # Somebody else
 
@@ -153,6 +164,7 @@ class Room:
             "trips": self.trips,
             "said": list(self.said),
             "faults": self.faults.to_json(),
+            "departure": list(self.departure),
             "done": {action_id: result.to_json() for action_id, result in self.done.items()},
         }
 
@@ -168,6 +180,8 @@ class Room:
             room.trips = state["trips"]
             room.said = list(state["said"])
             room.faults = Faults.from_json(state["faults"])
+            drive, place = state["departure"]
+            room.departure = drive, place
             room.done = {name: Result.from_json(data) for name, data in state["done"].items()}
         except (AttributeError, KeyError, TypeError, ValueError) as wrong:
             raise InputError(f"this is not the state of a clean-up-table world: {wrong!r}") from wrong

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 from domains.clean_up_table.places import PLACES, distance
-from domains.clean_up_table.skills import ITEM_AT, ITEM_IN, NOT_POSSIBLE, Arm, Base, Camera, outcome_of, seconds
+from domains.clean_up_table.skills import ITEM_AT, ITEM_IN, NOT_POSSIBLE, ONCE, Arm, Base, Camera, outcome_of, seconds
 from dsc.components.parameters import Parameter
 from dsc.skills import Outcome, SkillCall, skill
 
@@ -35,10 +35,11 @@ class Tracks(Base):
             "not_possible": NOT_POSSIBLE,
         },
         types={"to": "place"},
+        after_crash=ONCE,
     )
     async def drive(self, call: SkillCall, to: str) -> Outcome:
         """Turn, drive to a place, and if the way is blocked wait and try once more."""
-        metres = distance(self.world.robot_at, to) if to in PLACES else 0.0
+        metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
         await call.clock.sleep(self.parameters["turning"] + metres / self.parameters["speed"])
         result = self.world.drive(call.action_id, to)
         if result.outcome == "no_path":
@@ -66,6 +67,7 @@ class SuctionArm(Arm):
             "not_possible": NOT_POSSIBLE,
         },
         types=ITEM_AT,
+        after_crash=ONCE,
     )
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Pick an item, with everything in it, up from a surface."""
@@ -80,12 +82,13 @@ class SuctionArm(Arm):
             "not_possible": NOT_POSSIBLE,
         },
         types=ITEM_IN,
+        after_crash=ONCE,
     )
     async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Take an item out of its carrier on a surface; `gone` names the carrier."""
         return await self._held(call, lambda action_id: self.world.take_out(action_id, item, carrier, surface))
 
-    @skill(outcomes={"vented": {}})
+    @skill(outcomes={"vented": {}}, after_crash="repeat")
     async def vent(self, call: SkillCall) -> Outcome:
         """Let air into the cup, which empties the pump; nothing is held then."""
         await call.clock.sleep(0.5)
@@ -111,6 +114,7 @@ class PatientCamera(Camera):
             "not_possible": NOT_POSSIBLE,
         },
         types={"surface": "surface"},
+        after_crash=ONCE,
     )
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
         """Recognise what stands on a surface; `count` is how many items do, without what is in them."""

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from domains.clean_up_table.results import Result
     from domains.clean_up_table.world import World
+    from dsc.skills import AfterCrash
 
 __all__ = ["Arm", "Base", "Camera", "Voice", "initial_knowledge"]
 
@@ -32,6 +33,8 @@ ITEM_AT = {"item": "item", "surface": "surface"}
 ITEM_IN = {"item": "item", "carrier": "item", "surface": "surface"}
 CARRIER_AT = {"carrier": "item", "surface": "surface"}
 NOT_POSSIBLE: dict[str, str | None] = {"reason": None}
+ONCE: AfterCrash = "same_id"
+"""The world does each id once."""
 
 
 class Base(Component):
@@ -56,10 +59,11 @@ class Base(Component):
             "not_possible": NOT_POSSIBLE,
         },
         types={"to": "place"},
+        after_crash=ONCE,
     )
     async def drive(self, call: SkillCall, to: str) -> Outcome:
         """Drive to a place; a held item may slip, and then robot and item are at the floor."""
-        metres = distance(self.world.robot_at, to) if to in PLACES else 0.0
+        metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
         await call.clock.sleep(self.parameters["starting"] + metres / self.parameters["speed"])
         return outcome_of(self.world.drive(call.action_id, to))
 
@@ -89,13 +93,14 @@ class Arm(Component):
             "not_possible": NOT_POSSIBLE,
         },
         types=ITEM_AT,
+        after_crash=ONCE,
     )
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Pick an item, with everything in it, up from a surface."""
         await call.clock.sleep(self.parameters["grasping"])
         return outcome_of(self.world.pick_up(call.action_id, item, surface))
 
-    @skill(outcomes={"put_down": ITEM_AT, "not_possible": NOT_POSSIBLE}, types=ITEM_AT)
+    @skill(outcomes={"put_down": ITEM_AT, "not_possible": NOT_POSSIBLE}, types=ITEM_AT, after_crash=ONCE)
     async def put_down(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Put the held item on a surface."""
         await call.clock.sleep(self.parameters["putting"])
@@ -109,6 +114,7 @@ class Arm(Component):
             "not_possible": NOT_POSSIBLE,
         },
         types=ITEM_IN,
+        after_crash=ONCE,
     )
     async def stack(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Put the held item into a carrier on a surface; `gone` names the carrier."""
@@ -124,6 +130,7 @@ class Arm(Component):
             "not_possible": NOT_POSSIBLE,
         },
         types=ITEM_IN,
+        after_crash=ONCE,
     )
     async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Take an item out of its carrier on a surface; `gone` names the carrier."""
@@ -136,6 +143,7 @@ class Arm(Component):
             "not_possible": NOT_POSSIBLE,
         },
         types={"item": "item", "destination": "destination"},
+        after_crash=ONCE,
     )
     async def throw_away(self, call: SkillCall, item: str, destination: str) -> Outcome:
         """Throw the held item, with everything in it, into its destination."""
@@ -169,6 +177,7 @@ class Camera(Component):
             "not_possible": NOT_POSSIBLE,
         },
         types={"surface": "surface"},
+        after_crash=ONCE,
     )
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
         """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
@@ -178,6 +187,7 @@ class Camera(Component):
     @skill(
         outcomes={"looked": CARRIER_AT, "gone": ITEM_AT, "not_possible": NOT_POSSIBLE},
         types=CARRIER_AT,
+        after_crash=ONCE,
     )
     async def look_into(self, call: SkillCall, carrier: str, surface: str) -> Outcome:
         """Look into a carrier on a surface, giving up one unit of its room; `gone` names the carrier."""
@@ -197,7 +207,7 @@ class Voice(Component):
         super().__init__(name)
         self.world = world
 
-    @skill(outcomes={"said": {"text": None}})
+    @skill(outcomes={"said": {"text": None}}, after_crash=ONCE)
     async def say(self, call: SkillCall, text: str) -> Outcome:
         """Tell the operator something."""
         await call.clock.sleep(1.0 + len(text) / self.parameters["pace"])

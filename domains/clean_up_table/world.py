@@ -30,7 +30,7 @@ def _verb(
     @functools.wraps(body)
     def once(world: _World, action_id: str, /, *args: _Arguments.args, **named: _Arguments.kwargs) -> Result:
         if action_id not in world.done:
-            world.done[action_id] = body(world, action_id, *args, **named)
+            world.executed(action_id, body(world, action_id, *args, **named))
         return world.done[action_id]
 
     return once
@@ -46,6 +46,8 @@ class World(Robot):
             return not_possible(f"there is no place '{to}'")
         if to in self.faults.unreachable:
             return self._no_path(to)
+        if to != self.robot_at:
+            self.departure = action_id, self.robot_at
         draw = self.faults.draw(action_id, self._drive_faults(to))
         if draw is None:
             return self._arrive(to)

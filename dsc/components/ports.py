@@ -33,7 +33,7 @@ def query(answer: Mapping[str, str | None], types: Mapping[str, str] | None = No
 
     A chart asks with `trigger`, gets the event `answered`, and says `within` which time.
     """
-    return Declared(dict(types or {}), {ANSWERED: dict(answer)}, _ask, own=1, pattern="query")
+    return Declared(dict(types or {}), {ANSWERED: dict(answer)}, _ask, own=1, pattern="query", after_crash="repeat")
 
 
 def event(attributes: Mapping[str, str | None], types: Mapping[str, str] | None = None) -> Callable[[_Body], _Body]:
@@ -51,8 +51,9 @@ def event(attributes: Mapping[str, str | None], types: Mapping[str, str] | None 
 
     def declare(test: _Body) -> _Body:
         return Declared(
-            dict(types or {}), {test.__name__: dict(attributes)}, _activate, own=_values_of(test), pattern="event"
-        )(test)
+            dict(types or {}), {test.__name__: dict(attributes)}, _activate,
+            own=_values_of(test), pattern="event", after_crash="repeat",
+        )(test)  # fmt: skip
 
     return declare
 

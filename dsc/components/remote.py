@@ -1,6 +1,7 @@
 """A component on the other side of a transport: `Host` offers one there, `RemoteComponent` is used here like any other.
 
-An action is started by its id: however often a frame arrives, whatever is asked again, it is carried out once. While it
+An action is started by its id: however often a frame arrives, whatever is asked again, it is carried out once, and its
+end is there until it has been taken, so that a run which is resumed hears of it. While it
 runs the host is asked how it goes; one that is silent for `SILENCE` seconds is in FatalError as seen from here, which
 ends the action with `skill_error`, and the next action looks for it anew.
 """
@@ -18,7 +19,7 @@ from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedErro
 from dsc.components.heartbeats import Heart
 from dsc.components.life import Life
 from dsc.components.transport import Transport
-from dsc.skills import Clock, Component, Outcome, SkillCall, SkillSignature
+from dsc.skills import Clock, Component, Ended, Outcome, SkillCall, SkillSignature, Status
 from knowledge_base.exchange.forms import delta_form, delta_of
 
 WATCH = 1.0
@@ -43,8 +44,9 @@ def outcome_of(form: Mapping[str, Any]) -> Outcome:
 
 @dataclass(slots=True)
 class _Action:
-    """An action on the host's side: what it has said so far, its end last."""
+    """An action on the host's side: who wants to know, and what it has said so far, its end last."""
 
+    user: str
     task: asyncio.Task[None]
     said: list[dict[str, Any]] = field(default_factory=list)
 
@@ -56,7 +58,7 @@ class Host:
         self._component = component
         self._clock = clock
         self._endpoint = Endpoint(component.name, transport)
-        self._actions: dict[str, _Action] = {}
+        self._actions: dict[tuple[str, str], _Action] = {}
         self._endpoint.answer("skills", self._skills)
         self._endpoint.answer("come alive", self._come_alive)
         self._endpoint.answer("start", self._start)
@@ -87,17 +89,20 @@ class Host:
         return {"life": self._component.life.state, "reason": self._component.life.reason}
 
     async def _start(self, sender: str, said: dict[str, Any]) -> None:
-        if said["id"] not in self._actions:
-            task = asyncio.get_running_loop().create_task(self._carry_out(sender, said))
-            self._actions[said["id"]] = _Action(task)
+        action = self._actions.get(_key(said))
+        if action is not None:  # whose user has been started anew
+            action.user = sender
+        else:
+            task = asyncio.get_running_loop().create_task(self._carry_out(said))
+            self._actions[_key(said)] = _Action(sender, task)
 
-    async def _carry_out(self, sender: str, said: dict[str, Any]) -> None:
+    async def _carry_out(self, said: dict[str, Any]) -> None:
         def tell(form: dict[str, Any]) -> None:
             action.said.append(form)
-            self._endpoint.push(sender, f"news {said['id']}", len(action.said))
+            self._endpoint.push(action.user, f"news {said['id']}", len(action.said))
 
         await asyncio.sleep(0)  # until it is known under its id
-        action = self._actions[said["id"]]
+        action = self._actions[_key(said)]
         seconds = {} if said["seconds"] is None else {"deadline": self._clock.now() + said["seconds"]}
         call = SkillCall(said["id"], self._clock, lambda outcome: tell({"report": outcome_form(outcome)}), **seconds)
         end: dict[str, Any]
@@ -110,25 +115,44 @@ class Host:
 
     async def _how(self, _: str, said: dict[str, Any]) -> list[dict[str, Any]] | None:
         """What the action has said after so many answers; `None` if it is unknown."""
-        action = self._actions.get(said["id"])
+        action = self._actions.get(_key(said))
         return None if action is None else action.said[said["heard"] :]
 
     async def _stop(self, _: str, said: dict[str, Any]) -> None:
         """Cancel the action if it is still going on, and forget it."""
-        action = self._actions.get(said["id"])
+        action = self._actions.get(_key(said))
         if action is not None and not action.task.done():
             action.task.cancel()
             await asyncio.wait([action.task])
-        self._actions.pop(said["id"], None)
+        self._actions.pop(_key(said), None)
+
+
+def _key(said: Mapping[str, Any]) -> tuple[str, str]:
+    return said["run"], said["id"]
 
 
 class RemoteComponent(Component):
-    """A hosted component as seen from here; made by `connect`."""
+    """A hosted component as seen from here; made by `connect`.
+
+    The host outlives programs, whose action ids are alike: there, they stand behind a name for the program's run.
+    """
 
     def __init__(self, name: str, endpoint: Endpoint, skills: dict[str, SkillSignature]) -> None:
         super().__init__(name)
         self._endpoint = endpoint
         self._skills = skills
+        self._run = endpoint.life
+
+    def remember(self) -> str:
+        """What its actions are known by there."""
+        return self._run
+
+    def recall(self, memory: Any) -> None:
+        """Go on with actions that were started before a restart."""
+        self._run = memory
+
+    def _key(self, action_id: str) -> dict[str, str]:
+        return {"run": self._run, "id": action_id}
 
     @classmethod
     async def connect(cls, name: str, transport: Transport, within: float = WITHIN) -> RemoteComponent:
@@ -173,13 +197,13 @@ class RemoteComponent(Component):
         news = asyncio.Event()
         self._endpoint.hear(f"news {call.action_id}", lambda _, __: news.set())
         seconds = call.remaining if call.remaining < float("inf") else None
-        said = {"id": call.action_id, "skill": skill_name, "arguments": dict(arguments), "seconds": seconds}
+        said = {"skill": skill_name, "arguments": dict(arguments), "seconds": seconds}
         try:
-            await self._ask("start", said)
+            await self._ask("start", {**self._key(call.action_id), **said})
             return await self._followed(call, news)
         except asyncio.CancelledError:
             with suppress(NoAnswerError):  # it is gone, and so is what it did
-                await self._ask("stop", {"id": call.action_id}, within=WITHIN)
+                await self._ask("stop", self._key(call.action_id), within=WITHIN)
             raise
         finally:
             self._endpoint.deafen(f"news {call.action_id}")
@@ -188,7 +212,7 @@ class RemoteComponent(Component):
         heard = 0
         while True:
             news.clear()
-            said = await self._ask("how", {"id": call.action_id, "heard": heard})
+            said = await self._ask("how", {**self._key(call.action_id), "heard": heard})
             if said is None:
                 raise RefusedError(f"'{self.name}' knows nothing of '{call.action_id}' any more")
             for form in said:
@@ -196,13 +220,26 @@ class RemoteComponent(Component):
                 if "report" in form:
                     call.report(outcome_of(form["report"]))
                     continue
-                await self._ask("stop", {"id": call.action_id})
                 if "failed" in form:
                     raise RefusedError(form["failed"])
                 return outcome_of(form["ended"])
             if not said:
                 with suppress(TimeoutError):
                     await asyncio.wait_for(news.wait(), WATCH)
+
+    async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
+        """Whether it is known there, going on or ended; a host that is new itself knows nothing."""
+        said = await self._ask("how", {**self._key(action_id), "heard": 0})
+        return Status.UNKNOWN if said is None else Status.RUNNING
+
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:  # noqa: ARG002
+        """Stop it there; raises `NoAnswerError`."""
+        await self._ask("stop", self._key(action_id))
+
+    async def forget(self, action_id: str) -> None:
+        """Let it be forgotten there."""
+        with suppress(NoAnswerError):  # then there is nothing to forget
+            await self._ask("stop", self._key(action_id))
 
     async def _ask(self, kind: str, said: Any, within: float = SILENCE) -> Any:
         try:

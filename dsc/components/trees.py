@@ -22,7 +22,7 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Repeat, Retry
 
-from dsc.skills import Component, Declared, Outcome, SkillBody, SkillCall
+from dsc.skills import AfterCrash, Component, Declared, Outcome, SkillBody, SkillCall
 from knowledge_base.facts import Delta
 
 PERIOD = 0.1
@@ -38,6 +38,7 @@ def tree_skill(
     outcomes: Mapping[str, Mapping[str, str | None]],
     types: Mapping[str, str] | None = None,
     period: float = PERIOD,
+    after_crash: AfterCrash = "sense",
 ) -> Callable[[_Body], _Body]:
     """Declare a method that makes a behaviour tree as a skill; each call makes a fresh tree.
 
@@ -49,6 +50,7 @@ def tree_skill(
         outcomes: these two, and what else actions report; neither has attributes.
         types: of the parameters, as for `skill`.
         period: seconds of run time between two ticks.
+        after_crash: as for `skill`; the tree begins anew then.
     """
 
     async def carry_out(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
@@ -63,7 +65,8 @@ def tree_skill(
             await _halt(root)
         return Outcome(success if succeeded else failure, observed=_observed(root))
 
-    return Declared(dict(types or {}), {name: dict(one) for name, one in outcomes.items()}, carry_out)
+    declared = {name: dict(one) for name, one in outcomes.items()}
+    return Declared(dict(types or {}), declared, carry_out, after_crash=after_crash)
 
 
 def sequence(*children: Behaviour, name: str = "sequence") -> Behaviour:

@@ -15,14 +15,23 @@ from dsc.engine.tables import Chart
 from dsc.events import Event
 
 
-def start(chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situation) -> Step:
+def start(
+    chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situation, serials: int = 0
+) -> Step:
     """Enter the plot and run to completion.
+
+    Args:
+        chart: where plots are found.
+        plot: its name.
+        arguments: values for its parameters.
+        situation: the world.
+        serials: the last serial number that was given out before, so that no action id is used twice.
 
     Raises:
         InputError: the plot is unknown, or a parameter is missing or unknown.
         RunawayError: the chart does not come to rest.
     """
-    macrostep = Macrostep(chart, situation, MachineState())
+    macrostep = Macrostep(chart, situation, MachineState(serials=serials))
     macrostep.start(plot, arguments)
     return macrostep.finish(None, handled=True)
 
@@ -68,8 +77,8 @@ class Machine:
     state: MachineState = field(default_factory=MachineState)
 
     def start(self, plot: str, arguments: Mapping[str, Any], situation: Situation) -> Step:
-        """See `start`."""
-        done = start(self.chart, plot, arguments, situation)
+        """See `start`; serial numbers go on from those of the state."""
+        done = start(self.chart, plot, arguments, situation, self.state.serials)
         self.state = done.state
         return done
 

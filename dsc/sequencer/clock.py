@@ -7,6 +7,7 @@ a real answer is awaited (a planner in another process) the clock is held: nothi
 from __future__ import annotations
 
 import asyncio
+import math
 import selectors
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -16,10 +17,14 @@ _Result = TypeVar("_Result")
 
 
 class LoopClock:
-    """A `Clock` on the running asyncio loop's time, which is real or simulated; 0 when it is made."""
+    """A `Clock` on the running asyncio loop's time, which is real or simulated.
 
-    def __init__(self) -> None:
-        self._start = asyncio.get_running_loop().time()
+    Args:
+        at: what it shows when it is made, in seconds; a run that is taken up again goes on from there.
+    """
+
+    def __init__(self, at: float = 0.0) -> None:
+        self._start = asyncio.get_running_loop().time() - at
 
     def now(self) -> float:
         """Seconds of run time."""
@@ -28,6 +33,23 @@ class LoopClock:
     async def sleep(self, seconds: float) -> None:
         """Let `seconds` of run time pass."""
         await asyncio.sleep(seconds)
+
+    async def sleep_until(self, due: float) -> None:
+        """Let run time pass until `due`, if that is still to come."""
+        passed = asyncio.Event()
+        handle = self.call_at(due, passed.set)
+        try:
+            await passed.wait()
+        finally:
+            handle.cancel()
+
+    def call_at(self, due: float, call: Callable[[], object]) -> asyncio.TimerHandle:
+        """Let the loop make a call at that run time, or soon if it is over."""
+        return asyncio.get_running_loop().call_at(due + self._start, call)
+
+    def timeout_at(self, due: float) -> asyncio.Timeout:
+        """A bound for the waiting in a block: `TimeoutError` at that run time; none if it never comes."""
+        return asyncio.timeout_at(due + self._start if math.isfinite(due) else None)
 
     @property
     def simulated(self) -> bool:
@@ -46,15 +68,19 @@ def _no_hold() -> Iterator[None]:
 
 
 class SimulatedEventLoop(asyncio.SelectorEventLoop):
-    """An asyncio loop whose time jumps to the next scheduled callback once nothing is ready."""
+    """An asyncio loop whose time jumps to the next scheduled callback once nothing is ready.
 
-    def __init__(self) -> None:
-        self._simulated_now = 0.0
+    Args:
+        at: its time when it is made, in simulated seconds.
+    """
+
+    def __init__(self, at: float = 0.0) -> None:
+        self._simulated_now = at
         self._holds = 0
         super().__init__(_JumpingSelector(self._jump, lambda: self._holds > 0))
 
     def time(self) -> float:
-        """Simulated seconds since the loop was made."""
+        """Simulated seconds."""
         return self._simulated_now
 
     @contextmanager
@@ -85,9 +111,12 @@ class _JumpingSelector(selectors.DefaultSelector):
         return ready
 
 
-def run_simulated(main: Coroutine[Any, Any, _Result]) -> _Result:
-    """Run a coroutine in simulated time; a fresh clock, starting at 0."""
-    with asyncio.Runner(loop_factory=SimulatedEventLoop) as runner:
+def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0) -> _Result:
+    """Run a coroutine in simulated time that begins at `at`; a clock made with the same time then counts like before.
+
+    The loop's own time is what is due at equal times compared by: it must not be off by a rounding error.
+    """
+    with asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at)) as runner:
         return runner.run(main)
 
 

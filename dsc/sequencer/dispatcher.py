@@ -7,10 +7,9 @@ skill that is started after it. Arguments and answers are encoded, so that nothi
 from __future__ import annotations
 
 import asyncio
-import json
 import math
-from collections.abc import Awaitable, Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -28,41 +27,41 @@ from dsc.engine.steps import (
     StartTimer,
     SwitchMode,
 )
-from dsc.events import EVERY, SKILL_ERROR, TIMED_OUT, Event
-from dsc.skills import Clock, Component, Outcome, SkillCall
-from knowledge_base.errors import UnknownNameError
+from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.ends import broken, declared, encoded, late
+from dsc.sequencer.messages import SkillMessage, TimerMessage
+from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
+from dsc.sequencer.telling import CLOSING, Telling, failure
+from dsc.sequencer.timers import Timers
+from dsc.skills import Clock, Component, Ended, Outcome, SkillCall, Status
+from knowledge_base.errors import InputError, UnknownNameError
 
 DEFAULT_WITHIN = 300.0
 """Seconds a skill may take if the trigger does not say: every wait has a bound."""
-CLOSING = GRACE
-"""Seconds for components to take what they were last told, and for cancelled skills to stop."""
-
-
-@dataclass(frozen=True, slots=True)
-class SkillMessage:
-    """A component's answer for an activation; `final` if the skill has ended with it."""
-
-    start: Start
-    outcome: Outcome
-    final: bool
-
-
-@dataclass(frozen=True, slots=True)
-class TimerMessage:
-    """A timer is due."""
-
-    timer: StartTimer
 
 
 class Dispatcher:
-    """Starts, configures and cancels; `post` receives the answers, in the order in which they come."""
+    """Starts, configures and cancels; `post` receives the answers, in the order in which they come.
+
+    Args:
+        components: the skills.
+        clock: run time.
+        post: see above.
+        part_of: stands before the action ids that components see.
+
+    Attributes:
+        telling: what components are told.
+        timers: what is due later.
+    """
 
     def __init__(
         self,
         components: Iterable[Component],
-        clock: Clock,
-        post: Callable[[SkillMessage | TimerMessage | Event], None],
+        clock: LoopClock,
+        post: Callable[[SkillMessage | TimerMessage | SendLater], None],
+        part_of: str = "",
     ) -> None:
+        self._part_of = part_of
         self._components = {component.name: component for component in components}
         self._roster = Roster(self._components)
         self._given_up: list[str] = []
@@ -70,11 +69,9 @@ class Dispatcher:
         self._clock = clock
         self._post = post
         self._running: dict[str, tuple[Start, asyncio.Task[None]]] = {}
-        self._configuring: dict[str, asyncio.Task[None]] = {}
         self._ending: set[asyncio.Task[None]] = set()
-        self._timers: dict[tuple[int, str, int], asyncio.TimerHandle] = {}
-        self._sent: dict[int, tuple[SendLater, asyncio.TimerHandle]] = {}
-        self._last_sent = 0
+        self.telling = Telling()
+        self.timers = Timers(clock, post)
 
     def deploy(self, component: Component) -> None:
         """Add a component; it replaces one of the same name. Who has waited for it goes on."""
@@ -95,22 +92,21 @@ class Dispatcher:
 
         Periods, which always are, do not count; nor do events that were activated without a bound and may never come.
         """
-        timeouts = any(event != EVERY for _, event, _ in self._timers)
-        return any(map(self._will_end, self.started())) or timeouts or bool(self._sent)
+        return self.timers.waiting or any(map(self._will_end, self.started()))
 
     def _will_end(self, start: Start) -> bool:
         return math.isfinite(self._within(start))
 
     def _within(self, start: Start) -> float:
         """Seconds that it may take; an event lasts as long as the state that activated it."""
-        signature = self.component(start.component).skills().get(start.skill)
-        lasting = signature is not None and signature.pattern == "event"
-        return start.within or (math.inf if lasting else DEFAULT_WITHIN)
+        return start.within or (math.inf if self._is_event(start) else DEFAULT_WITHIN)
 
-    @property
-    def periods(self) -> frozenset[tuple[int, int]]:
-        """Activation and number of every period that passes at present."""
-        return frozenset((activation, number) for activation, event, number in self._timers if event == EVERY)
+    def _id(self, start: Start) -> str:
+        return self._part_of + start.action_id
+
+    def _is_event(self, start: Start) -> bool:
+        signature = self.component(start.component).skills().get(start.skill)
+        return signature is not None and signature.pattern == "event"
 
     def dispatch(self, output: Output) -> None:
         """Carry out one output of the machine.
@@ -123,19 +119,13 @@ class Dispatcher:
         elif isinstance(output, Cancel):
             self._cancel(output.activation)
         elif isinstance(output, StartTimer):
-            self._start_timer(output)
+            self.timers.start(output, self._clock.now() + output.seconds)
         elif isinstance(output, SendLater):
-            self._send_later(output)
+            self.timers.send(output, self._clock.now() + output.seconds)
         elif isinstance(output, Revoke):
-            self._revoke(output)
-        elif isinstance(output, SetParameter):
-            component = self.component(output.component)
-            self._configure(component, lambda: component.configure(output.parameter, _encoded(output.value)))
-        elif isinstance(output, SwitchMode):
-            self._switch(output)
-        elif isinstance(output, SendMessage):
-            component = self.component(output.component)
-            self._configure(component, lambda: component.take(output.port, _encoded(output.arguments)))
+            self.timers.revoke(output)
+        elif isinstance(output, SetParameter | SwitchMode | SendMessage):
+            self.telling.tell(self.component(output.component), output)
         # What is left is a note, which the trace has.
 
     def component(self, name: str) -> Component:
@@ -144,9 +134,20 @@ class Dispatcher:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
 
+    def memories(self) -> Iterator[tuple[str, Any]]:
+        """What components have to remember, by their names."""
+        for component in self._components.values():
+            if component.remembers:
+                yield component.name, component.remember()
+
     def settle(self, start: Start) -> None:
         """The final answer of a skill has been taken; until then its component counts as busy."""
         self._running.pop(start.action_id, None)
+        component = self._components.get(start.component)
+        if component is not None and type(component).forget is not Component.forget:
+            task = asyncio.get_running_loop().create_task(_forgotten(component, self._id(start)))
+            self._ending.add(task)
+            task.add_done_callback(self._ending.discard)
 
     def stop(self, start: Start) -> None:
         """Cancel a skill; nobody waits for its answer any more."""
@@ -158,6 +159,24 @@ class Dispatcher:
         task.cancel()
         give_up_after(task, GRACE, partial(self._leave_alone, start, task))
 
+    def tell_again(self, told: SetParameter | SwitchMode) -> None:
+        """Put in force what was before a restart; raises `UnknownNameError`."""
+        self.telling.tell(self.component(told.component), told, again=True)
+
+    def take_up(self, start: Start, earlier: Earlier) -> None:
+        """Go on with a skill that was under way before a restart; raises `UnknownNameError`."""
+        self._start(start, earlier)
+
+    async def abandon(self, start: Start) -> None:
+        """Let a component stop what was cancelled just before a restart; raises `InputError` if it cannot."""
+        component = self.component(start.component)
+        try:
+            async with asyncio.timeout(CLOSING):
+                await component.abandon(self._id(start), start.skill, encoded(start.arguments))
+        except Exception as error:  # whatever a component does wrong must not end the program
+            why = f"{type(error).__name__}: {error}"
+            raise InputError(f"{start.component}.{start.skill} may still go on: {why}") from error
+
     async def close(self) -> list[str]:
         """Cancel skills and timers, and wait until they have stopped and components are told what they were sent.
 
@@ -167,33 +186,25 @@ class Dispatcher:
         """
         for activation in {start.activation for start, _ in self._running.values()}:
             self._cancel(activation)
-        for handle in self._timers.values():
-            handle.cancel()
-        self._timers.clear()
-        for _, handle in self._sent.values():
-            handle.cancel()
-        self._sent.clear()
-        tasks = [*self._ending, *self._configuring.values()]
+        self.timers.close()
+        tasks = [*self._ending, *self.telling.tasks()]
         if tasks:
-            stopped, late = await asyncio.wait(tasks, timeout=CLOSING)
-            for task in late:
+            stopped, others = await asyncio.wait(tasks, timeout=CLOSING)
+            for task in others:
                 task.cancel()
                 give_up(task)
             for task in stopped:
-                _failure(task)  # of a skill that was cancelled, nobody wants to hear it
-        untaken = [_untaken(name, task) for name, task in self._configuring.items() if not _succeeded(task)]
-        return [*untaken, *self._given_up]
+                failure(task)  # of a skill that was cancelled, nobody wants to hear it
+        return [*self.telling.untaken(), *self._given_up]
 
-    def _switch(self, output: SwitchMode) -> None:
-        component = self.component(output.component)
-        self._configure(component, lambda: component.change_mode(output.mode))
-
-    def _start(self, start: Start) -> None:
+    def _start(self, start: Start, earlier: Earlier | None = None) -> None:
         component = self.component(start.component)
-        task = asyncio.get_running_loop().create_task(self._execute(component, start))
+        task = asyncio.get_running_loop().create_task(self._execute(component, start, earlier))
         self._running[start.action_id] = (start, task)
-        if math.isfinite(self._within(start)):
-            give_up_after(task, self._within(start) + GRACE, lambda: self._overdue(start))
+        within = self._within(start)
+        if math.isfinite(within):
+            left = within if earlier is None else earlier.began + within - self._clock.now()
+            give_up_after(task, left + GRACE, lambda: self._overdue(start))
 
     def _overdue(self, start: Start) -> None:
         """It swallowed that its time is over; the chart need not wait for it."""
@@ -206,139 +217,64 @@ class Dispatcher:
         skill = f"{start.component}.{start.skill}"
         self._given_up.append(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
 
-    async def _execute(self, component: Component, start: Start) -> None:
-        outcome = await self._outcome(component, start)
+    async def _execute(self, component: Component, start: Start, earlier: Earlier | None) -> None:
+        outcome = await self._outcome(component, start, earlier)
         if start.action_id in self._answered_for:
             return
         self._post(SkillMessage(start, outcome, final=True))
 
-    async def _outcome(self, component: Component, start: Start) -> Outcome:
-        def report(outcome: Outcome) -> None:
-            if start.action_id in self._running:
-                self._post(SkillMessage(start, _declared(component, start, outcome), final=False))
+    async def _outcome(self, component: Component, start: Start, earlier: Earlier | None) -> Outcome:
+        heard = 0
 
-        within = self._within(start)
-        bound = asyncio.timeout(within if math.isfinite(within) else None)
-        call = SkillCall(start.action_id, self._clock, report, self._clock.now() + within, self._given_up.append)
+        def report(outcome: Outcome) -> None:
+            nonlocal heard
+            if heard:
+                heard -= 1
+            elif start.action_id in self._running:
+                self._post(SkillMessage(start, declared(component, start, outcome), final=False))
+
+        clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
+        deadline = clock.now() + self._within(start)
+        call = SkillCall(self._id(start), clock, report, deadline, self._given_up.append)
+        bound = self._clock.timeout_at(deadline)
         try:
             async with bound:
-                await self._configured(component)
+                await self.telling.taken(component)
                 support = await self._roster.ready(component)
-                work = component.execute(start.skill, call, _encoded(start.arguments))
+                if earlier is not None:
+                    status = await asked_after(component, start, self._id(start))
+                    if isinstance(status, Ended):
+                        return declared(component, start, status.outcome)
+                    if status is Status.RUNNING or not self._is_event(start):  # else it is activated anew
+                        heard = earlier.reports
+                work = component.execute(start.skill, call, encoded(start.arguments))
                 outcome = await self._roster.with_support(component, work, support)
-            return _declared(component, start, outcome)
+            return declared(component, start, outcome)
         except asyncio.CancelledError:
             if _cancelled_from_outside():
                 raise
             return broken(start, "CancelledError: it cancelled itself")
         except Exception as error:  # noqa: BLE001  # whatever a skill does wrong must not end the run
             if bound.expired() or isinstance(error, DeadlineError):
-                return late(start, within)
+                return late(start, self._within(start))
             return broken(start, f"{type(error).__name__}: {error}")
-
-    async def _configured(self, component: Component) -> None:
-        """Wait until the component has taken what it was told; raises what it raised, once."""
-        pending = self._configuring.get(component.name)
-        if pending is None:
-            return
-        await asyncio.wait([pending])  # unlike `await pending`, this does not cancel it when a skill is cancelled
-        if self._configuring.get(component.name) is pending:
-            del self._configuring[component.name]
-        failure = _failure(pending)
-        if failure is not None:
-            raise failure
 
     def _cancel(self, activation: int) -> None:
         for start in self.started():
             if start.activation == activation:
                 self.stop(start)
-        for key in [key for key in self._timers if key[0] == activation]:
-            self._timers.pop(key).cancel()
+        self.timers.cancel(activation)
 
     def _leave_alone(self, start: Start, task: asyncio.Task[None]) -> None:
         self._ending.discard(task)
         self._not_stopped(start)
 
-    def _start_timer(self, timer: StartTimer) -> None:
-        handle = asyncio.get_running_loop().call_later(timer.seconds, self._timer_due, timer)
-        self._timers[timer.activation, timer.event, timer.index] = handle
 
-    def _send_later(self, later: SendLater) -> None:
-        number = self._last_sent = self._last_sent + 1
-
-        def due() -> None:
-            del self._sent[number]
-            self._post(later.event)
-
-        self._sent[number] = (later, asyncio.get_running_loop().call_later(later.seconds, due))
-
-    def _revoke(self, revoke: Revoke) -> None:
-        for number, (later, handle) in list(self._sent.items()):
-            if (later.event.frame, later.id) == (revoke.frame, revoke.id):
-                handle.cancel()
-                del self._sent[number]
-
-    def _timer_due(self, timer: StartTimer) -> None:
-        del self._timers[timer.activation, timer.event, timer.index]
-        self._post(TimerMessage(timer))
-
-    def _configure(self, component: Component, change: Callable[[], Awaitable[None]]) -> None:
-        before = self._configuring.get(component.name)
-
-        async def in_order() -> None:
-            if before is not None:
-                await asyncio.wait([before])
-            await change()
-            failure = None if before is None else _failure(before)
-            if failure is not None:  # still to be told to the next skill
-                raise failure
-
-        task = asyncio.get_running_loop().create_task(in_order())
-        self._configuring[component.name] = task
-
-
-def _failure(task: asyncio.Task[None]) -> BaseException | None:
-    """What a task that is over raised, if anything."""
-    return None if task.cancelled() else task.exception()
-
-
-def _succeeded(task: asyncio.Task[None]) -> bool:
-    return task.done() and not task.cancelled() and task.exception() is None
-
-
-def _untaken(component: str, task: asyncio.Task[None]) -> str:
-    why = _failure(task) if task.done() else None
-    reason = f"{type(why).__name__}: {why}" if why is not None else f"no answer within {CLOSING:g} s"
-    return f"component '{component}' did not take what it was told: {reason}"
+async def _forgotten(component: Component, action_id: str) -> None:
+    with suppress(Exception):  # it is over: whatever goes wrong now must not end the run
+        await component.forget(action_id)
 
 
 def _cancelled_from_outside() -> bool:
     task = asyncio.current_task()
     return task is not None and task.cancelling() > 0
-
-
-def _encoded(value: Any) -> Any:
-    return json.loads(json.dumps(value))
-
-
-def _declared(component: Component, start: Start, outcome: object) -> Outcome:
-    """The outcome, encoded; an error if the skill's signature does not declare it."""
-    if not isinstance(outcome, Outcome):
-        return broken(start, f"it ended with {outcome!r}, which is no outcome")
-    outcomes: Mapping[str, Any] = component.skills()[start.skill].outcomes
-    if outcome.event not in outcomes:
-        return broken(start, f"it ended with '{outcome.event}', which it does not declare")
-    return Outcome(outcome.event, _encoded(dict(outcome.attributes)), outcome.observed)
-
-
-def broken(start: Start, reason: str) -> Outcome:
-    """How a skill ends that did what no skill may do; the reason becomes one line."""
-    skill = f"{start.component}.{start.skill}"
-    return Outcome(SKILL_ERROR, {"skill": skill, "reason": f"{skill}: {' '.join(reason.split())}"})
-
-
-def late(start: Start, seconds: float) -> Outcome:
-    """How a skill ends that did not end within its time."""
-    skill = f"{start.component}.{start.skill}"
-    reason = f"{skill}: no outcome within {seconds:g} s"
-    return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason})

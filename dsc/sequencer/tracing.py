@@ -28,11 +28,15 @@ from knowledge_base.store import KnowledgeBase
 
 
 class StepTracer:
-    """Writes what the sequencer does into a trace."""
+    """Writes what the sequencer does into a trace.
+
+    Attributes:
+        known_plots: digests of the plots that it has in full already.
+    """
 
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
-        self._known_plots: set[str] = set()
+        self.known_plots: set[str] = set()
         self._frames: dict[str, FrameState] = {}
         self._at_work: dict[int, dict[str, str]] = {}  # activation -> action id -> skill
 
@@ -49,6 +53,12 @@ class StepTracer:
         if original not in (None, event.name):
             data["original"] = original
         return self._trace.record("event", **data)
+
+    def begun(self, start: Start) -> str:
+        """A skill has been started, here or before a crash; its name with its component's."""
+        skill = f"{start.component}.{start.skill}"
+        self._at_work.setdefault(start.activation, {})[start.action_id] = skill
+        return skill
 
     def answered(self, start: Start) -> None:
         """A skill has ended by itself: it cannot be cancelled any more."""
@@ -110,9 +120,7 @@ class StepTracer:
     def output(self, output: Output) -> int | None:
         """An action that leaves; timers do not."""
         if isinstance(output, Start):
-            skill = f"{output.component}.{output.skill}"
-            self._at_work.setdefault(output.activation, {})[output.action_id] = skill
-            arguments = dict(output.arguments)
+            skill, arguments = self.begun(output), dict(output.arguments)
             return self._trace.record("action", action="start", id=output.action_id, skill=skill, arguments=arguments)
         if isinstance(output, Cancel):
             for action_id, skill in self._at_work.pop(output.activation, {}).items():
@@ -142,8 +150,8 @@ class StepTracer:
     def _plots(self, step: Step) -> None:
         for bound in (bound for micro in step.microsteps for bound in micro.bound):
             digest = bound.plot.digest
-            if digest not in self._known_plots:
-                self._known_plots.add(digest)
+            if digest not in self.known_plots:
+                self.known_plots.add(digest)
                 self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
 
 

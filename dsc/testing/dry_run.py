@@ -12,8 +12,9 @@ from dsc.engine.machine import Machine
 from dsc.engine.steps import Cancel, Output, Revoke, SendLater, Start, StartTimer, Step
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
-from dsc.sequencer.dispatcher import DEFAULT_WITHIN, late
-from dsc.sequencer.sequencer import CHART
+from dsc.sequencer.dispatcher import DEFAULT_WITHIN
+from dsc.sequencer.ends import late
+from dsc.sequencer.reactor import CHART
 from dsc.testing.worlds import change_of, world
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -60,6 +60,14 @@ class Archive:
             return self._world(connection, self._last(connection))
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:  # noqa: ARG002
+        """Refused.
+
+        Raises:
+            ConflictError: always.
+        """
+        raise self._only_read()
+
+    def together(self) -> AbstractContextManager[sqlite3.Connection]:
         """Refused.
 
         Raises:

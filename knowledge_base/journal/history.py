@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -42,6 +43,16 @@ class History(Protocol):
 
         Raises:
             StoreError: it could not be written; nothing is kept.
+            ConflictError: this history is only read.
+        """
+        ...
+
+    def together(self) -> AbstractContextManager[sqlite3.Connection]:
+        """What is appended inside the block, and what is written with the connection, is kept as one or not at all.
+
+        Raises:
+            StoreError: it could not be written, or there is no file; from then on nothing can be appended, since
+                the world in memory has gone on without it.
             ConflictError: this history is only read.
         """
         ...

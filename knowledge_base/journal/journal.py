@@ -59,6 +59,8 @@ class Journal(Archive):
             raise _no_schema(path)
         self._place = Place(str(path))
         self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
+        self._grouped = self._appended = False  # whether appends are parts of an open transaction; whether any was made
+        self._behind: StoreError | None = None  # why the file lacks what the world in memory has
         self._writers = WriterLock(path)
         try:
             self._connection = writing(path, durability)
@@ -80,7 +82,7 @@ class Journal(Archive):
             raise InputError(f"what writes along is a function of a connection, not {along!r}")
         delta = compact(delta_form(change.delta))
         snapshot = None if self._tail < max(SNAPSHOT_AFTER, self._snapshot_size) else compact(world_form(before))
-        with self._transaction() as connection:
+        with self._part() as connection:
             if snapshot is not None:
                 self._put_snapshot(snapshot, change.version - 1)
             if change.delta:
@@ -94,6 +96,23 @@ class Journal(Archive):
         if snapshot is not None:
             self._tail, self._snapshot_size = 0, len(snapshot)
         self._tail += len(delta)
+
+    @contextmanager
+    def together(self) -> Iterator[sqlite3.Connection]:
+        """Write what is appended in the block, and what else the block writes, in one transaction."""
+        self._require_abreast()
+        try:
+            with self._transaction() as connection:
+                self._grouped, self._appended = True, False
+                try:
+                    yield connection
+                finally:
+                    self._grouped = False
+                self._require_abreast()  # a part that failed takes all others with it
+        except BaseException as error:
+            if self._appended and self._behind is None:
+                self._behind = error if isinstance(error, StoreError) else StoreError(str(error))
+            raise
 
     def first(self, key: str) -> Change | None:
         """The change that was kept under that key; asked by the one who writes."""
@@ -171,6 +190,37 @@ class Journal(Archive):
     def _measure(self) -> None:
         version, self._snapshot_size = self._connection.execute(_LAST_SNAPSHOT).fetchone()
         (self._tail,) = self._connection.execute(_SIZE_SINCE, (version,)).fetchone()
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        """What is committed; inside `together`, whose caller alone asks then, what it has appended as well."""
+        if self._grouped:
+            with reported(self._path, "read"):
+                yield self._connection
+            return
+        with super()._reading() as connection:
+            yield connection
+
+    @contextmanager
+    def _part(self) -> Iterator[sqlite3.Connection]:
+        """One change: a transaction of its own, or a part of the one that is open."""
+        self._require_abreast()
+        if not self._grouped:
+            with self._transaction() as connection:
+                yield connection
+            return
+        self._appended = True
+        try:
+            with reported(self._path, "write"):
+                yield self._connection
+        except StoreError as error:
+            self._behind = error
+            raise
+
+    def _require_abreast(self) -> None:
+        if self._behind is not None:
+            message = f"the store lacks the last changes, open it anew: {self._behind.message}"
+            raise StoreError(message, place=self._place)
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sqlite3
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from threading import Lock
 from typing import NamedTuple
 
@@ -75,6 +77,14 @@ class MemoryHistory:
             self._size += size
             while self._size > MOST_KEPT:
                 self._forget_oldest()
+
+    def together(self) -> AbstractContextManager[sqlite3.Connection]:
+        """Refused.
+
+        Raises:
+            StoreError: always.
+        """
+        raise StoreError("a knowledge base in memory has no file to write into")
 
     def first(self, key: str) -> Change | None:
         """The change that was kept under that key, if it is one of the last `MOST_KEYS`."""

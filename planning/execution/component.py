@@ -2,39 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
-from dsc.sequencer.sequencer import CHART
-from dsc.skills import Component, Outcome, SkillCall, skill
-from knowledge_base.errors import InputError, UnknownNameError
+from dsc.sequencer.reactor import CHART
+from dsc.skills import Component, Ended, Outcome, SkillCall, Status, skill
+from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition
 from planning.execution.carried import Carried
-from planning.execution.course import Course, shortest_end
-from planning.execution.repair import Attempt, Failure, Rung, situation
+from planning.execution.choices import Choices
+from planning.execution.course import Course
+from planning.execution.ladder import Ladder
+from planning.execution.plans import Plans
+from planning.execution.plotting import Plotting
+from planning.execution.repair import Attempt
 from planning.execution.search import NotFound, Search
 from planning.execution.telling import Telling
 from planning.execution.watching import Watching
-from planning.generation.plot import plot_from_plan
-from planning.generation.steps import expectation, implementing
-from planning.ordering.order import PartialOrder, deordered, in_sequence, scheduled
-from planning.plan import Plan
 from planning.posing.derived import derivation
 
 if TYPE_CHECKING:
     from dsc.dynamic.library import Library
     from dsc.engine.steps import Step
-    from dsc.model.plot import ActionPlot
     from dsc.sequencer.clock import LoopClock
     from dsc.trace import Trace
-    from knowledge_base.language.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
     from planning.execution.foresight import Foresight
-    from planning.plan import PlanStep
 
 _PLAN_FOUND = {"plot": "plot", "name": "symbol", "steps": "number"}
 
@@ -77,47 +73,68 @@ class PlanningComponent(Component):
     ) -> None:
         super().__init__()
         self._derivation = derivation(domain)
-        self._domain = self._derivation.domain
-        self._library = library
         self._knowledge = knowledge
+        self._clock = clock
         self._working_for = working_for
-        self._parallel = parallel
-        self._shared = {self.name, *shared}
         self._telling = Telling(trace)
         self._search = Search(domain, knowledge, planner, clock, self._telling, foresight)
-        self._carried: dict[str, Carried] = {}
-        self._chosen: dict[tuple[str, frozenset[tuple[str, Any]]], str] = {}
-        self._plans = 0
+        self._plans = Plans()
+        self._plotting = Plotting(self._derivation, library, knowledge, parallel, {self.name, *shared})
+        self._choices = Choices(self._derivation.domain, library)
+        self._ladder = Ladder(
+            self._derivation, self._plotting, self._plans, self._choices, self._search, self._telling
+        )
+        self._answers: dict[str, Outcome] = {}  # by action; of some it is not known yet whether they were heard
 
     def note_choices(self, step: Step) -> None:
         """Remember which plots were chosen to carry out planning actions; for the sequencer to call."""
-        for made in step.decisions:
-            decision = made.decision
-            plot = None if decision.chosen is None else self._library.plot(decision.chosen)
-            if plot is not None and plot.implements:
-                self._chosen[plot.implements, frozenset(decision.arguments.items())] = plot.name
+        self._choices.note(step)
+
+    def remember(self) -> Any:
+        """The plans that are on their way, what has been tried, and what was answered and has not been heard."""
+        self._answers = {one: answer for one, answer in self._answers.items() if self._working_for(one)}
+        return {
+            **self._plans.remember(),
+            "excluded": self._search.remember(),
+            "chosen": self._choices.remember(),
+            "answers": {one: [answer.event, dict(answer.attributes)] for one, answer in self._answers.items()},
+        }
+
+    def recall(self, memory: Any) -> None:
+        """The inverse of `remember`, in the world as it is now."""
+        self._plans.recall(memory, self._derivation.at(self._knowledge))
+        self._search.recall(memory["excluded"])
+        self._choices.recall(memory["chosen"])
+        self._answers = {one: Outcome(event, attributes) for one, (event, attributes) in memory["answers"].items()}
+
+    async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+        """As every component does; an answer is kept until it has been heard, since plans have changed with it."""
+        answer = self._answers[call.action_id] = await super().execute(skill_name, call, arguments)
+        return answer
+
+    async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:
+        """What was answered before a restart; any other action goes on where its plan is."""
+        answer = self._answers.get(action_id)
+        return await super().status(action_id, skill_name, arguments) if answer is None else Ended(answer)
 
     async def configure(self, parameter: str, value: Any) -> None:
         """The plan named `parameter` begins step number `value`; what earlier steps did is judged at this moment."""
         await super().configure(parameter, value)
-        carried = self._carried.get(parameter)
-        if carried is None:
-            return
-        if carried.begun is not None:
-            carried.begun(int(value))
-        else:
-            carried.course.begin(int(value))
+        carried = self._plans.get(parameter)
+        if carried is not None:
+            carried.begin(int(value))
 
     @skill(
         outcomes={
             "plan_found": _PLAN_FOUND,
             "goal_holds": {},
             "no_plan": {"reason": "text", "kind": "symbol"},
-        }
+        },
+        after_crash="repeat",
     )
     async def plan(
         self,
-        call: SkillCall,  # noqa: ARG002
+        call: SkillCall,
         goal: str,
         holder: str,
         seconds: float,
@@ -129,44 +146,31 @@ class PlanningComponent(Component):
         `after` is the name of the plan that it takes the place of, if there is one. `no_plan` has the kind
         `unsolvable`, `timed_out` or `failed`.
         """
-        before = self._carried.pop(after, None)
-        wanted, now = parse_condition(goal), self._derivation.at(self._knowledge)
-        if holds(now.condition(wanted), self._knowledge):
-            return Outcome("goal_holds")
-        self._telling.asked(goal, self._knowledge.version)
         try:
-            found = await self._search.plan(wanted, seconds, None if before is None else before.course)
-            if isinstance(found, NotFound):
-                return self._none(found.kind, found.reason)
-            now = self._derivation.at(self._knowledge)
-            order = self._order(found.answer.plan, wanted)
-            course = Course(found.steps, now.domain, now.condition(wanted), order.before)
-            attempt = Attempt() if before is None else before.attempt
-            carried = Carried(self._new_name(), wanted, course, order, attempt, holder, seconds, replans, found.better)
-            form = self._plot(carried)
-        except InputError as error:
-            return self._none("failed", str(error))
-        self._telling.found(found.answer, carried.name)
-        if before is not None:
-            self._telling.replaced(before.name, carried.name, found.kept)
-        return self._carry(carried, form)
+            return await self._planned(call, goal, holder, seconds, replans, self._plans.get(after))
+        finally:  # not before: a search that is broken off has to find it again
+            self._plans.over(after)
 
-    @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}})
-    async def judge(self, call: SkillCall, goal: str) -> Outcome:  # noqa: ARG002
-        """Say whether the goal holds, and if not, which part of it is missing."""
+    @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}}, after_crash="repeat")
+    async def judge(self, call: SkillCall, goal: str, plan: str = "") -> Outcome:  # noqa: ARG002
+        """Say whether the goal holds, and if not, which part of it is missing; `plan` was carried out for it."""
         try:
             wanted = self._derivation.at(self._knowledge).condition(parse_condition(goal))
             why = explain(wanted, self._knowledge)
         except InputError as error:  # what the goal is about is not there any more
             return Outcome("goal_open", {"reason": str(error)})
-        return Outcome("goal_holds") if why.truth else Outcome("goal_open", {"reason": str(why.deciding)})
+        if not why.truth:
+            return Outcome("goal_open", {"reason": str(why.deciding)})
+        self._plans.over(plan)
+        return Outcome("goal_holds")
 
     @skill(
         outcomes={
             "goal_holds": {},
             "plan_changed": {"why": "text"},
             "plan_invalid": {"which": "text", "why": "text", "author": "symbol"},
-        }
+        },
+        after_crash="repeat",
     )
     async def monitor(self, call: SkillCall, plan: str) -> Outcome:
         """Watch the plan of that name being carried out; ends when another one shall take its place, or none.
@@ -179,10 +183,13 @@ class PlanningComponent(Component):
             return author == CHART or author in self._working_for(call.action_id)
 
         watching = Watching(
-            self._required(plan), self._derivation, self._knowledge, self._search, self._telling, self._new_name,
-            is_own,
+            self._plans.required(plan), self._derivation, self._knowledge, self._search, self._telling, self._clock,
+            self._plans.new_name, is_own,
         )  # fmt: skip
-        return await watching.watch()
+        outcome = await watching.watch()
+        if outcome.event == "goal_holds":
+            self._plans.over(plan)
+        return outcome
 
     @skill(
         outcomes={
@@ -190,144 +197,41 @@ class PlanningComponent(Component):
             "goal_holds": {},
             "replan": {},
             "gave_up": {"reason": "text"},
-        }
+        },
+        after_crash="repeat",
     )
     async def repair(self, call: SkillCall, plan: str, why: str) -> Outcome:  # noqa: ARG002
         """Find out how to go on when the plan of that name did not, see `planning.execution.repair.Rung`.
 
         `plan_found` goes on without asking the planner, `replan` says that it has to be asked.
         """
-        carried = self._required(plan)
-        if self._derivation.recursive:
-            now = self._derivation.at(self._knowledge)
-            carried.course = carried.course.renewed(now.domain, now.condition(carried.goal))
-        course, attempt = carried.course, carried.attempt
-        if _holds(course.goal, self._knowledge):
-            del self._carried[plan]
+        return self._ladder.climb(self._plans.required(plan), why)
+
+    async def _planned(
+        self, call: SkillCall, goal: str, holder: str, seconds: float, replans: int, before: Carried | None
+    ) -> Outcome:
+        wanted, now = parse_condition(goal), self._derivation.at(self._knowledge)
+        if holds(now.condition(wanted), self._knowledge):
             return Outcome("goal_holds")
-        if carried.following is None:
-            end = course.shortest_end(self._knowledge)
-        else:
-            end = shortest_end(carried.following, course.domain, self._knowledge, course.goal)
-        failed = None if carried.stopped else self._failed_step(course)
-        if end is not None and (carried.following is not None if failed is None else failed not in end):
-            return self._go_on(carried, end, why)
-        rung, choice = self._rung(attempt, course, failed, end, why)
-        if end is not None and rung in (Rung.RESUME, Rung.OTHER_CANDIDATE):
-            attempt.resumed[end[0]] += 1
-            return self._go_on(carried, end, why, choice if rung is Rung.OTHER_CANDIDATE else None)
-        if rung is Rung.GIVE_UP:
-            return self._give_up(carried, f"{failed} has failed before, in the same way and the same situation: {why}")
-        if attempt.replans >= carried.replans:
-            return self._give_up(carried, f"the budget of {carried.replans} new plans is used up: {why}")
-        attempt.replans += 1
-        if rung is Rung.EXCLUDE and failed is not None:
-            self._search.exclude(failed, why)
-        return Outcome("replan")
-
-    def _rung(
-        self, attempt: Attempt, course: Course, failed: PlanStep | None, end: tuple[PlanStep, ...] | None, why: str
-    ) -> tuple[Rung, str | None]:
-        """What to try, and the plot that was chosen for the failed step."""
-        if failed is None:
-            return attempt.interrupted(end[0] if end else None), None
-        choice = self._choice(failed)
-        others = choice is not None and len(implementing(failed, self._library)) > 1
-        failure = Failure(failed, why, situation(course.domain, self._knowledge, course.goal))
-        return attempt.failed(failure, stands=end is not None, others=others), choice
-
-    def _failed_step(self, course: Course) -> PlanStep | None:
-        """The step at work, unless what it was for holds."""
-        if len(course.at_work) != 1:
-            return None
-        step = course.steps[course.at_work[0] - 1]
-        expected = expectation(self._domain.action(step).effect, self._domain.bindings(step))
-        return None if _holds(expected, self._knowledge) else step
-
-    def _choice(self, step: PlanStep) -> str | None:
-        """The plot that was chosen last to carry out a step."""
-        bindings = self._domain.bindings(step)
-        for plot in implementing(step, self._library):
-            own = frozenset((name, value) for name, value in bindings.items() if name in plot.parameters)
-            if (step.action, own) in self._chosen:
-                return self._chosen[step.action, own]
-        return None
-
-    def _go_on(self, carried: Carried, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None) -> Outcome:
-        """Carry out `steps` without asking the planner; their first one rather not with the candidate `instead_of`."""
-        left = carried.course.left_steps
-        name = carried.following_name or self._new_name()
-        if carried.following_name is not None:
-            self._telling.replaced(carried.name, name, carried.following_kept)
-        elif len(steps) < len(left):
-            self._telling.skipped(carried.name, [step for step in left if step not in steps], why)
-        else:
-            self._telling.resumed(carried.name, name, steps[0], why, instead_of)
-        del self._carried[carried.name]
-        order, before = self._order(Plan(steps), carried.goal), carried.course
-        course = Course(steps, before.domain, before.goal, order.before)
-        again = Carried(
-            name, carried.goal, course, order, carried.attempt, carried.holder, carried.seconds, carried.replans
-        )
-        return self._carry(again, self._plot(again, instead_of))
-
-    def _give_up(self, carried: Carried, reason: str) -> Outcome:
-        del self._carried[carried.name]
-        self._telling.gave_up(carried.name, reason)
-        return Outcome("gave_up", {"reason": reason})
+        self._telling.asked(goal, self._knowledge.version)
+        try:
+            left = None if before is None else before.course
+            found = await self._search.plan(wanted, seconds, left, call.clock.sleep)
+            if isinstance(found, NotFound):
+                return self._none(found.kind, found.reason)
+            now = self._derivation.at(self._knowledge)
+            order = self._plotting.order(found.answer.plan, wanted)
+            course = Course(found.steps, now.domain, now.condition(wanted), order.before)
+            attempt = Attempt() if before is None else before.attempt
+            carried = Carried(self._plans.new_name(), wanted, course, attempt, holder, seconds, replans, found.better)
+            form = self._plotting.form(carried, order)
+        except InputError as error:
+            return self._none("failed", str(error))
+        self._telling.found(found.answer, carried.name)
+        if before is not None:
+            self._telling.replaced(before.name, carried.name, found.kept)
+        return self._ladder.found(carried, order, form)
 
     def _none(self, kind: str, reason: str) -> Outcome:
         self._telling.none(kind, reason)
         return Outcome("no_plan", {"reason": reason, "kind": kind})
-
-    def _plot(self, carried: Carried, instead_of: str | None = None) -> dict[str, Any]:
-        rules = self._library.plot(carried.holder).rules if carried.holder in self._library else ()
-        plan, domain = Plan(carried.course.steps), carried.course.domain
-        plot = plot_from_plan(plan, domain, self._library, rules, carried.name, carried.order, self._shared)
-        self._library.expect(plot)
-        form = plot.to_form()
-        if instead_of is not None:
-            _put_last(instead_of, _state(plot, form, "step_1")["dynamic"])
-        return form
-
-    def _order(self, plan: Plan, goal: Expression) -> PartialOrder:
-        """Which steps wait for which."""
-        if plan.schedule:
-            return scheduled(plan)
-        order = deordered(plan, self._derivation.original, self._knowledge, goal)
-        return order if self._parallel else replace(order, before=in_sequence(plan).before)
-
-    def _carry(self, carried: Carried, form: dict[str, Any]) -> Outcome:
-        self._carried[carried.name] = carried
-        self._telling.ordered(carried.name, carried.order)
-        return Outcome("plan_found", {"plot": form, "name": carried.name, "steps": len(carried.course.steps)})
-
-    def _new_name(self) -> str:
-        self._plans += 1
-        return f"plan_{self._plans}"
-
-    def _required(self, plan: str) -> Carried:
-        if plan not in self._carried:
-            raise UnknownNameError(f"there is no plan '{plan}'", found=plan, valid=self._carried)
-        return self._carried[plan]
-
-
-def _state(plot: ActionPlot, form: dict[str, Any], name: str) -> dict[str, Any]:
-    """The form of a state, wherever it stands in the plot's."""
-    path = next(path for own, _, path in plot.walk() if own == name)
-    found: Any = form
-    for key in path:
-        found = found[key]
-    state: dict[str, Any] = found
-    return state
-
-
-def _put_last(candidate: str, candidates: list[str]) -> None:
-    candidates.sort(key=lambda name: name == candidate)  # the others stay in their order
-
-
-def _holds(e: Expression, world: KnowledgeBase) -> bool:
-    try:
-        return holds(e, world)
-    except InputError:
-        return False

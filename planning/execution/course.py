@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from typing import Any
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
@@ -92,6 +93,9 @@ class Course:
         goal: what they are for, in the same way.
         before: pairs of steps of which the first has to be done when the second begins; each pair of the
             sequence if left out.
+
+    Attributes:
+        early: somebody else has brought about what a later step would bring, so that steps may be of no use.
     """
 
     def __init__(
@@ -108,6 +112,23 @@ class Course:
         self._before = before
         self._begun: set[int] = set()
         self._done: set[int] = set()
+        self.early = False
+
+    def to_json(self) -> dict[str, Any]:
+        """The steps, their order, and how far they are; what is done follows from that."""
+        before = None if self._before is None else sorted(map(list, self._before))
+        steps = [step.to_json() for step in self.steps]
+        return {"steps": steps, "before": before, "begun": sorted(self._begun), "early": self.early}
+
+    @classmethod
+    def from_json(cls, form: Mapping[str, Any], domain: PlanningDomain, goal: Expression) -> Course:
+        """The inverse of `to_json`, with conditions written for the present state of the world."""
+        before = None if form["before"] is None else {(first, second) for first, second in form["before"]}
+        course = cls([PlanStep.from_json(step) for step in form["steps"]], domain, goal, before)
+        for number in form["begun"]:
+            course.begin(number)
+        course.early = form["early"]
+        return course
 
     def renewed(self, domain: PlanningDomain, goal: Expression) -> Course:
         """Just as far, with conditions written for another state of the world."""

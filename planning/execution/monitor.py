@@ -6,8 +6,9 @@ ended, that is when the next one begins; what anybody else changes is judged at 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from knowledge_base.conditions.condition import Condition, Firing
 from knowledge_base.errors import InputError
@@ -60,6 +61,25 @@ class Reached:
 News = Broken | Shorter | Reached
 
 
+def news_form(news: News) -> dict[str, Any]:
+    """As plain data."""
+    match news:
+        case Broken():
+            return {"broken": asdict(news)}
+        case Shorter(steps):
+            return {"shorter": [step.to_json() for step in steps]}
+        case Reached(author):
+            return {"reached": author}
+
+
+def news_from(form: Mapping[str, Any]) -> News:
+    """The inverse of `news_form`."""
+    ((kind, said),) = form.items()
+    if kind == "broken":
+        return Broken(**said)
+    return Reached(said) if kind == "reached" else Shorter(tuple(map(PlanStep.from_json, said)))
+
+
 class Monitor:
     """Watches one plan until it is closed.
 
@@ -85,13 +105,12 @@ class Monitor:
         self._hear = hear
         self._links: dict[Expression, Condition] = {}
         self._to_come: dict[Expression, Condition] = {}
-        self._early = False
         self._whole: Callable[[], None] = lambda: None
         self._goal = self._install(course.goal, self._goal_fired)
 
     def look(self, author: str) -> None:
         """Judge the plan as a whole, whoever changed the world (`author`, as far as that is known)."""
-        self._renew()
+        self.watch()
         course, world = self._course, self._knowledge
         if _true(course.goal, world):
             self._hear(Reached(author))
@@ -103,8 +122,8 @@ class Monitor:
             if end is None:
                 self._hear(self._broken(author, world.version))
                 return
-            if self._early:
-                self._early = False
+            if course.early:
+                course.early = False
                 end = thinned(end, self._domain, world, course.goal)
             if len(end) < len(course.left):
                 self._hear(Shorter(end))
@@ -117,7 +136,7 @@ class Monitor:
                 condition.cancel()
         self._links, self._to_come, self._goal = {}, {}, None
 
-    def _renew(self) -> None:
+    def watch(self) -> None:
         """Watch what is needed now, and what later steps will bring in case that somebody else does."""
         course = self._course
         needed, later = course.needed(), course.needed_later()
@@ -164,7 +183,7 @@ class Monitor:
 
     def _came(self, _: Expression, firing: Firing) -> None:
         if firing.truth and self._foreign(firing) is not None:
-            self._early = True
+            self._course.early = True
 
     def _link_fired(self, e: Expression, firing: Firing) -> None:
         author = None if firing.truth else self._foreign(firing)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import Any
 
 from knowledge_base.language.effect import effect_conditions
 from knowledge_base.language.expression import Expression
@@ -65,6 +66,21 @@ class Attempt:
     replans: int = 0
     failures: Counter[Failure] = field(default_factory=Counter)
     resumed: Counter[PlanStep] = field(default_factory=Counter)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        failures = [[one.step.to_json(), one.why, one.situation, often] for one, often in self.failures.items()]
+        resumed = [[step.to_json(), often] for step, often in self.resumed.items()]
+        return {"replans": self.replans, "failures": failures, "resumed": resumed}
+
+    @classmethod
+    def from_json(cls, form: Mapping[str, Any]) -> Attempt:
+        """The inverse of `to_json`."""
+        failures = {
+            Failure(PlanStep.from_json(step), why, where): often for step, why, where, often in form["failures"]
+        }
+        resumed = {PlanStep.from_json(step): often for step, often in form["resumed"]}
+        return cls(form["replans"], Counter(failures), Counter(resumed))
 
     def failed(self, failure: Failure, *, stands: bool, others: bool) -> Rung:
         """The answer to a failure, which is counted.

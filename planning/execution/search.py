@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import threading
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from planning.engines.improving import Improving
 from planning.engines.registry import timing
@@ -33,7 +33,7 @@ from planning.posing.unsolvable import why_unsolvable
 from planning.validation import Validation, validate
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Awaitable, Collection
+    from collections.abc import AsyncGenerator, Awaitable, Callable, Collection, Iterable
 
     from dsc.sequencer.clock import LoopClock
     from knowledge_base.language.expression import Expression
@@ -124,13 +124,24 @@ class Search:
         self._excluded[step] = self._clock.now() + EXCLUDED_SECONDS
         self._telling.excluded(step, EXCLUDED_SECONDS, why)
 
-    async def plan(self, goal: Expression, seconds: float, before: Course | None = None) -> Found | NotFound:
+    def remember(self) -> list[Any]:
+        """Which steps to do without until when, as plain data."""
+        return [[step.to_json(), until] for step, until in self._excluded.items()]
+
+    def recall(self, memory: Iterable[Any]) -> None:
+        """The inverse of `remember`."""
+        self._excluded = {PlanStep.from_json(step): until for step, until in memory}
+
+    async def plan(
+        self, goal: Expression, seconds: float, before: Course | None, sleep: Callable[[float], Awaitable[None]]
+    ) -> Found | NotFound:
         """A plan for the goal from the world as it is when it is found.
 
         Args:
             goal: what shall hold.
             seconds: real time for one search.
             before: the plan that it takes the place of; what is left of it is mended if that takes little.
+            sleep: lets the simulated time of a search pass, which has begun earlier if the run was broken off.
 
         Raises:
             InputError: the goal names what is not there, or uses what no engine can do.
@@ -143,7 +154,7 @@ class Search:
             if isinstance(found, NotFound):
                 return found
             if self._clock.simulated:
-                await self._clock.sleep(found.answer.simulated_seconds)
+                await sleep(found.answer.simulated_seconds)
             verdict = validate(found.answer.plan, self._domain, self._knowledge, goal)
             if verdict.valid and found.answer.plan.schedule:
                 alone = validate(Plan(found.steps), self._domain, self._knowledge, goal)

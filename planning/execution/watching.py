@@ -8,36 +8,24 @@ from contextlib import aclosing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dsc.sequencer.taking_up import PastClock
 from dsc.skills import Outcome
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
 from planning.execution.course import Course, cost_of, shortest_end
 from planning.execution.monitor import Broken, Monitor, News, Reached, Shorter
 from planning.execution.search import Found, NotFound, Search
+from planning.execution.watched import Better, Heard, StepEnded, Watched
 from planning.plan import PlanFound
 
 if TYPE_CHECKING:
+    from dsc.sequencer.clock import LoopClock
     from knowledge_base.facts import Change
     from knowledge_base.store import KnowledgeBase
     from planning.execution.carried import Carried
     from planning.execution.telling import Telling
     from planning.plan import Plan, PlanningOutcome, PlanStep
     from planning.posing.derived import Derivation, Settled
-
-
-@dataclass(frozen=True, slots=True)
-class _Better:
-    """A planner that goes on has found a better plan."""
-
-    answer: PlanFound
-
-
-@dataclass(frozen=True, slots=True)
-class _Ended:
-    """The step that was not to be interrupted has ended."""
-
-
-_Heard = News | Found | NotFound | _Better | _Ended
 
 
 @dataclass(slots=True)
@@ -47,7 +35,7 @@ class Watching:
     Attributes:
         carried: the plan.
         derivation: of the planning domain.
-        knowledge, search, telling: as in the planning component.
+        knowledge, search, telling, clock: as in the planning component.
         new_name: names a plan.
         is_own: whether a change by this author is the running step's own doing.
     """
@@ -57,17 +45,17 @@ class Watching:
     knowledge: KnowledgeBase
     search: Search
     telling: Telling
+    clock: LoopClock
     new_name: Callable[[], str]
     is_own: Callable[[str], bool]
 
     async def watch(self) -> Outcome:
         """Watch until another plan shall take the place, or none; the outcomes are those of the skill `monitor`."""
-        heard: asyncio.Queue[_Heard] = asyncio.Queue()
-        one = _Watch(self, heard.put_nowait)
+        one = _Watch(self)
         try:
             one.begin()
             while True:
-                outcome = one.answer(await heard.get())
+                outcome = one.answer(await one.heard())
                 if outcome is not None:
                     self.carried.stopped = True
                     return outcome
@@ -78,11 +66,12 @@ class Watching:
 class _Watch:
     """What is going on while a plan is watched."""
 
-    def __init__(self, about: Watching, hear: Callable[[_Heard], None]) -> None:
+    def __init__(self, about: Watching) -> None:
         self._about = about
         self._carried = about.carried
-        self._put = hear
-        self._said_broken = False
+        self._resumes = about.carried.watched is not None
+        self._state = about.carried.watched = about.carried.watched or Watched()
+        self._news = asyncio.Event()
         self._settled: Settled | None = None
         self._unsubscribe: Callable[[], None] = lambda: None
         self._monitor: Monitor | None = None
@@ -94,9 +83,32 @@ class _Watch:
         if self._about.derivation.recursive:
             self._settled = self._about.derivation.at(self._about.knowledge)
             self._unsubscribe = self._about.knowledge.subscribe(self._changed)
-        self._look("earlier")  # the world went on between the search and now
+        if self._resumes:
+            self._go_on()
+        else:
+            self._look("earlier")  # the world went on between the search and now
         if carried.better is not None:
             self._beside.append(asyncio.create_task(self._improve(carried.better)))
+
+    def _go_on(self) -> None:
+        """As before a restart; the step at work may be half done, and is judged when it has ended."""
+        state = self._state
+        self._install().watch()
+        if state.searching_since is not None:
+            self._search_beside(state.searching_since)
+        while state.missed:
+            self._begun(state.missed.pop(0))
+
+    async def heard(self) -> Heard:
+        """The next thing that has to be answered."""
+        while not self._state.heard:
+            self._news.clear()
+            await self._news.wait()
+        return self._state.heard.popleft()
+
+    def _put(self, heard: Heard) -> None:
+        self._state.heard.append(heard)
+        self._news.set()
 
     def end(self) -> None:
         self._carried.begun = None
@@ -106,10 +118,12 @@ class _Watch:
         if self._monitor is not None:
             self._monitor.close()
 
-    def answer(self, news: _Heard) -> Outcome | None:
+    def answer(self, news: Heard) -> Outcome | None:
         """What watching ends with; `None` if it goes on."""
         carried = self._carried
         outcome: Outcome | None = None
+        if isinstance(news, Found | NotFound):
+            self._state.searching_since = None
         match news:
             case Reached():
                 self._about.telling.skipped(carried.name, carried.course.left_steps, "the goal holds")
@@ -117,18 +131,18 @@ class _Watch:
             case Shorter(steps):
                 carried.following = steps
                 outcome = Outcome("plan_changed", {"why": "fewer steps lead to the goal"})
-            case _Ended():
+            case StepEnded():
                 outcome = Outcome("plan_changed", {"why": "another plan takes its place"})
             case NotFound():
                 outcome = Outcome("plan_invalid", {"which": "", "why": news.reason, "author": "earlier"})
             case Broken() if self._can_go_on(news):
                 carried.attempt.replans += 1
-                self._beside.append(asyncio.create_task(self._plan_meanwhile()))
+                self._search_beside(self._about.clock.now())
             case Broken():
                 outcome = Outcome("plan_invalid", {"which": news.needed, "why": news.why, "author": news.author})
             case Found():
                 outcome = self._follow(news.answer, news.steps, news.kept)
-            case _Better(answer):
+            case Better(answer):
                 better = self._better(answer.plan)
                 outcome = None if better is None else self._follow(answer, better, 0)
         return outcome
@@ -142,24 +156,26 @@ class _Watch:
             self._look(change.author)
 
     def _look(self, author: str) -> None:
-        about = self._about
+        self._install().look(author)
+
+    def _install(self) -> Monitor:
+        about, course = self._about, self._carried.course
         if self._monitor is not None:
             self._monitor.close()
-        course = self._carried.course
         self._monitor = Monitor(course, course.domain, about.knowledge, about.is_own, self._hear)
-        self._monitor.look(author)
+        return self._monitor
 
     def _hear(self, news: News) -> None:
         if isinstance(news, Broken):
-            if self._said_broken:
+            if self._state.said_broken:
                 return
-            self._said_broken = True
+            self._state.said_broken = True
             self._about.telling.broken(self._carried.course, news)
         self._put(news)
 
     def _begun(self, number: int) -> None:
         if self._carried.following is not None:
-            self._put(_Ended())
+            self._put(StepEnded())
             return
         self._carried.course.begin(number)
         if self._monitor is not None:
@@ -173,11 +189,15 @@ class _Watch:
         later = len(at_work) == 1 and bool(news.needed) and news.user > at_work[0]
         return later and within_budget and carried.following is None
 
-    async def _plan_meanwhile(self) -> None:
+    def _search_beside(self, since: float) -> None:
+        self._state.searching_since = since
+        self._beside.append(asyncio.create_task(self._plan_meanwhile(PastClock(self._about.clock, since))))
+
+    async def _plan_meanwhile(self, clock: PastClock) -> None:
         goal, course = self._carried.goal, self._carried.course
         self._about.telling.asked(to_text(goal), self._about.knowledge.version)
         try:
-            found = await self._about.search.plan(goal, self._carried.seconds, course)
+            found = await self._about.search.plan(goal, self._carried.seconds, course, clock.sleep)
             if isinstance(found, Found):
                 await found.close()
         except Exception as error:  # noqa: BLE001  whatever goes wrong beside a plan must not leave it unwatched
@@ -188,12 +208,12 @@ class _Watch:
         async with aclosing(better):
             async for answer in better:
                 if isinstance(answer, PlanFound):
-                    self._put(_Better(answer))
+                    self._put(Better(answer))
 
     def _better(self, plan: Plan) -> tuple[PlanStep, ...] | None:
         """The step at work and then the end of a better plan, if that costs less than what is left."""
         about, course = self._about, self._carried.course
-        if self._carried.following is not None or self._said_broken or len(course.at_work) != 1:
+        if self._carried.following is not None or self._state.said_broken or len(course.at_work) != 1:
             return None
         step = course.steps[course.at_work[0] - 1]
         ahead = Overlay(about.knowledge)
@@ -213,6 +233,6 @@ class _Watch:
             return Outcome("plan_changed", {"why": "a new plan begins in another way"})
         carried.course = Course(steps, carried.course.domain, carried.course.goal)
         carried.course.begin(1)
-        self._said_broken = False
+        self._state.said_broken = False
         self._look("earlier")
         return None

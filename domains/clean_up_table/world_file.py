@@ -1,0 +1,88 @@
+"""A world that goes on when the robot's program dies: each executed action is in a file before anybody hears of it."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from contextlib import closing, contextmanager
+from typing import TYPE_CHECKING, Any, Self
+
+from domains.clean_up_table.world import World
+from knowledge_base.errors import Place, StoreError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from domains.clean_up_table.results import Result
+
+_TABLES = (
+    "DROP TABLE IF EXISTS world",
+    "DROP TABLE IF EXISTS done",
+    "CREATE TABLE world (state TEXT NOT NULL)",
+    "CREATE TABLE done (action_id TEXT PRIMARY KEY, result TEXT NOT NULL)",
+)
+
+
+def beside(store: Path) -> Path:
+    """Where the world of the run in that store is kept."""
+    return store.with_name(store.name + "-world")
+
+
+class LastingWorld(World):
+    """A world in a file, from when `create` or `open` is called until `close`."""
+
+    _file: sqlite3.Connection | None = None
+
+    def create(self, path: Path) -> None:
+        """Keep this world in a file from now on, in the place of what is there; raises `StoreError`."""
+        with _reported(path, "write"):
+            self._file = sqlite3.connect(path, isolation_level=None)
+            self._file.execute("PRAGMA journal_mode = WAL")
+            self._file.execute("BEGIN")
+            for statement in _TABLES:
+                self._file.execute(statement)
+            self._file.execute("INSERT INTO world VALUES (?)", (self._present(),))
+            self._file.execute("COMMIT")
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """The world as it was left; raises `StoreError`."""
+        lasting = cls.from_state(_read(path))
+        lasting._file = sqlite3.connect(path, isolation_level=None)  # noqa: SLF001  of its own class
+        return lasting
+
+    def executed(self, action_id: str, result: Result) -> None:
+        """Write what became of the action, and the world after it, as one; no action is written twice."""
+        super().executed(action_id, result)
+        assert self._file is not None  # noqa: S101  it was created or opened
+        self._file.execute("BEGIN")
+        self._file.execute("INSERT INTO done VALUES (?, ?)", (action_id, json.dumps(result.to_json())))
+        self._file.execute("UPDATE world SET state = ?", (self._present(),))
+        self._file.execute("COMMIT")
+
+    def close(self) -> None:
+        """Give back the file."""
+        if self._file is not None:
+            self._file.close()
+
+    def _present(self) -> str:
+        """Everything but what was done, of which there is ever more."""
+        return json.dumps({name: value for name, value in self.state().items() if name != "done"})
+
+
+def _read(path: Path) -> dict[str, Any]:
+    if not path.exists():
+        raise StoreError("the world of the run is not there", place=Place(str(path)))
+    with _reported(path, "read"), closing(sqlite3.connect(path)) as file:
+        (state,) = file.execute("SELECT state FROM world").fetchone()
+        done = {action_id: json.loads(result) for action_id, result in file.execute("SELECT * FROM done")}
+    return {**json.loads(state), "done": done}
+
+
+@contextmanager
+def _reported(path: Path, doing: str) -> Iterator[None]:
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise StoreError(f"cannot {doing} the world: {error}", place=Place(str(path))) from error

@@ -1,0 +1,122 @@
+"""`dsc runs`: what is in a run store; the file is only read, also while a run goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from dsc.sequencer.run_tables import RunArchive, RunRow, StepRow
+
+app = typer.Typer(
+    name="runs", rich_markup_mode=None, no_args_is_help=True, help="Look at runs that were kept with --store."
+)
+DIVERGED = 1
+"""Exit status of `replay` when something else came out."""
+
+Store = Annotated[Path, typer.Argument(metavar="FILE", help="The store.")]
+Number = Annotated[int | None, typer.Option("--run", min=1, help="Which run.  [default: the last one]")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+@app.command("list")
+def list_(file: Store, as_json: AsJson = False) -> None:
+    """Name the runs: what was run, how far it came, how it ended."""
+    from dsc.sequencer.run_tables import archive
+
+    with archive(file) as runs:
+        found = [_summary(runs, run) for run in runs.runs()]
+    if as_json:
+        _print_json(found)
+        return
+    for one in found:
+        typer.echo(f"{one['run']:4}  {one['plot']}  {one['steps']} steps, {one['seconds']:.1f} s, {one['state']}")
+
+
+@app.command()
+def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
+    """Tell what happened in a run, one macrostep a line, and what is under way if it has not ended."""
+    from dsc.sequencer.run_tables import archive
+
+    with archive(file) as runs:
+        row = runs.run(run)
+        steps = list(runs.steps(row.number))
+        summary = _summary(runs, row) | {"header": row.header, "arguments": row.arguments}
+        under_way = _open(runs, row)
+    if as_json:
+        _print_json(summary | {"under_way": under_way, "macrosteps": [_step_form(step) for step in steps]})
+        return
+    for step in steps:
+        typer.echo(f"{step.time:8.1f} s {step.number:5}  {_taken(step)}: {', '.join(_innermost(step.configuration))}")
+    typer.echo(f"{row.plot}: {summary['state']}")
+    for one in under_way:
+        typer.echo(f"  under way since {one['since']:.1f} s: {one['skill']} ({one['id']})")
+
+
+@app.command()
+def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
+    """Take everything that came in once more, and say whether the same comes out. Exit status: 0 it does, 1 not."""
+    from dsc.sequencer.replay import replay as again
+
+    done = again(file, run)
+    found = None if done.divergence is None else str(done.divergence)
+    if as_json:
+        _print_json({"run": done.run, "steps": done.steps, "divergence": found})
+    elif found is None:
+        typer.echo(f"run {done.run}: {done.steps} steps, all as they were")
+    else:
+        typer.echo(f"run {done.run}: {done.steps} steps as they were, then {found}")
+    raise typer.Exit(DIVERGED if found else 0)
+
+
+def _summary(runs: RunArchive, run: RunRow) -> dict[str, Any]:
+    steps, seconds = runs.connection.execute(
+        "SELECT count(*), coalesce(max(time), 0) FROM steps WHERE run = ?", (run.number,)
+    ).fetchone()
+    return {"run": run.number, "plot": run.plot, "steps": steps, "seconds": seconds, "state": _state(run)}
+
+
+def _state(run: RunRow) -> str:
+    if run.ended is None:
+        return "unfinished"
+    return f"ended early: {run.ended['problem']}" if run.ended["problem"] else "finished"
+
+
+def _open(runs: RunArchive, run: RunRow) -> list[dict[str, Any]]:
+    return [] if run.ended is not None else [
+        {"id": start.action_id, "skill": f"{start.component}.{start.skill}", "since": since}
+        for start, since in runs.under_way()
+    ]  # fmt: skip
+
+
+def _taken(step: StepRow) -> str:
+    """What the macrostep took, in the words of the trace."""
+    events = [one.data for one in step.records if one.type == "event"]
+    if events:
+        return f"{events[-1]['name']} ({events[-1]['source']})"
+    if step.message:
+        return "a period" if "timer" in step.message else "a change of knowledge"
+    return "start" if step.number == 1 else "everything is left"
+
+
+def _innermost(configuration: Iterable[str]) -> Iterator[str]:
+    """The active states that have none inside."""
+    active = list(configuration)
+    yield from (path for path in active if not any(other.startswith(path + "/") for other in active))
+
+
+def _step_form(step: StepRow) -> dict[str, Any]:
+    return {
+        "step": step.number, "t": step.time, "version": step.version, "message": step.message,
+        "configuration": step.configuration,
+    }  # fmt: skip
+
+
+def _print_json(data: Any) -> None:
+    import json
+
+    typer.echo(json.dumps(data))

@@ -1,0 +1,39 @@
+"""How skills end, as far as that is not theirs to say: what they do wrong, and what nobody waits for any longer."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from dsc.engine.steps import Start
+from dsc.events import SKILL_ERROR, TIMED_OUT
+from dsc.skills import Component, Outcome
+
+
+def encoded(value: Any) -> Any:
+    """Plain data of its own, so that nothing is shared by accident."""
+    return json.loads(json.dumps(value))
+
+
+def declared(component: Component, start: Start, outcome: object) -> Outcome:
+    """The outcome, encoded; an error if the skill's signature does not declare it."""
+    if not isinstance(outcome, Outcome):
+        return broken(start, f"it ended with {outcome!r}, which is no outcome")
+    outcomes: Mapping[str, Any] = component.skills()[start.skill].outcomes
+    if outcome.event not in outcomes:
+        return broken(start, f"it ended with '{outcome.event}', which it does not declare")
+    return Outcome(outcome.event, encoded(dict(outcome.attributes)), outcome.observed)
+
+
+def broken(start: Start, reason: str) -> Outcome:
+    """How a skill ends that did what no skill may do; the reason becomes one line."""
+    skill = f"{start.component}.{start.skill}"
+    return Outcome(SKILL_ERROR, {"skill": skill, "reason": f"{skill}: {' '.join(reason.split())}"})
+
+
+def late(start: Start, seconds: float) -> Outcome:
+    """How a skill ends that did not end within its time."""
+    skill = f"{start.component}.{start.skill}"
+    reason = f"{skill}: no outcome within {seconds:g} s"
+    return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason})

@@ -1,0 +1,65 @@
+"""What reaches the sequencer, in the order in which it comes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+from dsc.engine.steps import SendLater, Start, StartTimer
+from dsc.events import Event
+from dsc.skills import Outcome
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Delta
+
+
+@dataclass(frozen=True, slots=True)
+class SkillMessage:
+    """A component's answer for an activation.
+
+    Attributes:
+        start: of the skill.
+        outcome: what it said.
+        final: whether the skill has ended with it.
+        goes_on: whether it has not, and only counts as ended: it has to be stopped.
+    """
+
+    start: Start
+    outcome: Outcome
+    final: bool
+    goes_on: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TimerMessage:
+    """A timer is due."""
+
+    timer: StartTimer
+
+
+@dataclass(frozen=True, slots=True)
+class KnowledgeMessage:
+    """Somebody who is no skill of this run changes the knowledge."""
+
+    delta: Delta
+    author: str
+
+
+@dataclass(frozen=True, slots=True)
+class LateMessage:
+    """Something that was handed in from outside to come later, and now is there; `number` tells it from others."""
+
+    message: Event | KnowledgeMessage
+    number: int
+
+
+Message = SkillMessage | TimerMessage | KnowledgeMessage | LateMessage | SendLater | Event
+"""A `SendLater` is the chart's own event whose time has come."""
+
+
+def plain(event: Event) -> Event:
+    """The event with attributes of its own; raises `InputError` if they are no plain data."""
+    try:
+        attributes = json.loads(json.dumps(dict(event.attributes), allow_nan=False))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the attributes of '{event.name}' are no plain data: {error}") from None
+    return event._replace(attributes=attributes)

@@ -1,0 +1,198 @@
+"""What a message does to machine and knowledge, and what is recorded of it; nothing leaves from here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.dynamic.situation import KnowledgeSituation
+from dsc.engine.machine import Machine
+from dsc.engine.state import MachineState
+from dsc.engine.steps import Output, SendLater, Start, StartTimer, Step
+from dsc.errors import RunawayError
+from dsc.events import EVERY, FAILURES, Event
+from dsc.sequencer.ends import broken
+from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
+from dsc.sequencer.run_forms import Kept
+from dsc.sequencer.tracing import StepTracer
+from dsc.trace import Trace
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Delta
+from knowledge_base.store import KnowledgeBase
+
+CHART = "chart"
+"""Author of what a plot tells the knowledge base."""
+StepListener = Callable[[Step], None]
+"""Is told every macrostep; must not block."""
+
+
+class Reactor:
+    """One macrostep after the other, for a live run and for the replay of a recorded one alike.
+
+    Attributes:
+        machine: the chart's state.
+        emitted: outcome events of the plot so far.
+        problem: why the run cannot go on, or what went wrong in its last step.
+        in_vain: periods that passed without any effect since anything else happened.
+        caused_by: the records of the skills that were started, by action id.
+        listeners: are told every macrostep, before its actions leave.
+    """
+
+    def __init__(self, library: Library, knowledge: KnowledgeBase, trace: Trace) -> None:
+        self.library = library
+        self.knowledge = knowledge
+        self.machine = Machine(library)
+        self.trace = trace
+        self.tracer = StepTracer(trace)
+        self.listeners: list[StepListener] = []
+        self.emitted: list[Event] = []
+        self.problem: str | None = None
+        self.in_vain: set[tuple[int, int]] = set()
+        self.caused_by: dict[str, int] = {}
+
+    def restore(self, kept: Kept) -> None:
+        """Be as after the last macrostep of a run that was broken off."""
+        self.machine.state = kept.state
+        self.emitted = list(kept.emitted)
+        self.in_vain = set(kept.in_vain)
+        self.problem = kept.problem
+        self.caused_by = {one.what.action_id: one.cause for one in kept.pending if isinstance(one.what, Start)}
+        for one in kept.pending:
+            if isinstance(one.what, Start) and not one.cancelled:
+                self.tracer.begun(one.what)
+        self.tracer.known_plots.update(record.data["hash"] for record in kept.records if record.type == "plot")
+
+    def start(self, plot: str, arguments: Mapping[str, Any], serials: int = 0) -> tuple[Output, ...]:
+        """Enter the plot; what has to be carried out then. `serials` is the last serial number given out before.
+
+        Raises:
+            InputError: the plot is unknown, or a parameter is missing or unknown.
+        """
+        self.machine.state = MachineState(serials=serials)
+        try:
+            step = self.machine.start(plot, arguments, self._situation())
+        except RunawayError as error:
+            self.problem = str(error)
+            return ()
+        try:
+            return self._commit(step)
+        except InputError as error:
+            self.problem = str(error)
+            return ()
+
+    def react(self, message: Message) -> tuple[Output, ...]:
+        """Let the machine take the message; what has to be carried out then."""
+        try:
+            event = self._received(message)
+            before = self.machine.state
+            step = self.machine.send(event, self._situation())
+            self._note_periods(message, in_vain=step.state == before and _is_vain(step))
+            output = self._commit(step)
+            if event is not None and not step.handled:
+                self._unhandled(message, event)
+        except (RunawayError, InputError) as error:
+            self.problem = str(error)
+            return ()
+        return output
+
+    def believed(self, message: Message) -> Message:
+        """A skill that observes what cannot be has failed, and nothing of it is believed; else the message itself."""
+        if not isinstance(message, SkillMessage) or not message.outcome.observed:
+            return message
+        try:
+            self.knowledge.overlay().apply(message.outcome.observed)
+        except InputError as error:
+            outcome = broken(message.start, str(error))
+            return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)
+        return message
+
+    def leave(self) -> tuple[Output, ...]:
+        """Wherever the run ends, exit actions put the components at rest; a finished machine has nothing to leave."""
+        if self.machine.state.root is None:
+            return ()
+        try:
+            return self._commit(self.machine.leave(self._situation()))
+        except InputError as error:
+            self.problem = self.problem or str(error)
+            return ()
+
+    def _situation(self) -> KnowledgeSituation:
+        return KnowledgeSituation(self.knowledge, self.library)
+
+    def _received(self, message: Message) -> Event | None:
+        """Apply what the message observed; the event the machine shall see, if any."""
+        if isinstance(message, LateMessage):
+            message = message.message
+        if isinstance(message, KnowledgeMessage):
+            self.trace.cause = None
+            self._apply(message.delta, message.author)
+            return None
+        if isinstance(message, TimerMessage):
+            return self._due(message)
+        if isinstance(message, SkillMessage):
+            return self._answered(message)
+        event = message.event if isinstance(message, SendLater) else message
+        self.trace.cause = None
+        self.trace.cause = self.tracer.event(event, "outside")
+        return event
+
+    def _due(self, message: TimerMessage) -> Event:
+        self.trace.cause = None
+        timer = message.timer
+        event = Event(timer.event, to=timer.activation, exact=True, number=timer.index)
+        if timer.event != EVERY:  # most periods pass without anything happening; if not, the step says so
+            self.trace.cause = self.tracer.event(event, "timer")
+        return event
+
+    def _answered(self, message: SkillMessage) -> Event:
+        start, outcome = message.start, message.outcome
+        if message.final:
+            self.tracer.answered(start)
+        name = start.names.get(outcome.event, outcome.event)
+        event = Event(name, outcome.attributes, to=start.activation)
+        self.trace.cause = self.caused_by.get(start.action_id)
+        self.trace.cause = self.tracer.event(event, f"{start.component}.{start.skill}", outcome.event)
+        self._apply(outcome.observed, start.component)
+        return event
+
+    def _apply(self, delta: Delta, author: str) -> None:
+        if delta:
+            self.knowledge.apply(delta, author)
+
+    def _commit(self, step: Step) -> tuple[Output, ...]:
+        """First what the chart told becomes knowledge, then actions may leave."""
+        for listener in self.listeners:
+            listener(step)
+        self.tracer.step(step)
+        self.tracer.decisions(step)
+        self._apply(step.knowledge, CHART)
+        for output in step.output:
+            seq = self.tracer.output(output)
+            if isinstance(output, Start) and seq is not None:
+                self.caused_by[output.action_id] = seq
+        self.emitted.extend(step.emitted)
+        if step.errors:
+            self.problem = self.problem or "; ".join(step.errors)
+        return step.output
+
+    def _note_periods(self, message: Message, *, in_vain: bool) -> None:
+        if not isinstance(message, TimerMessage) or not in_vain:
+            self.in_vain.clear()
+        elif message.timer.event == EVERY:
+            self.in_vain.add((message.timer.activation, message.timer.index))
+
+    def _unhandled(self, message: Message, event: Event) -> None:
+        """An answer that its own, still active state does not take would leave that state waiting for ever."""
+        if not isinstance(message, SkillMessage) or not message.final or event.to is None:
+            return
+        if self.machine.state.has_activation(event.to):
+            skill = f"{message.start.component}.{message.start.skill}"
+            whose = f": {event.attributes['reason']}" if event.name in FAILURES else f" of {skill}"
+            self.problem = f"nobody handles '{event.name}'{whose}"
+
+
+def _is_vain(step: Step) -> bool:
+    """Whether nothing came of it but the next period; in the same state and world, nothing ever will."""
+    only_timers = all(isinstance(output, StartTimer) for output in step.output)
+    return only_timers and not step.knowledge and not step.emitted

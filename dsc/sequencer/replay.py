@@ -1,0 +1,128 @@
+"""A recorded run once more: the same messages through a fresh machine, and whether the same comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from dsc.dynamic.library import Library
+from dsc.engine.steps import Output, Start
+from dsc.sequencer.changed import plots_of
+from dsc.sequencer.reactor import Reactor
+from dsc.sequencer.run_forms import full, message_of, text_of
+from dsc.sequencer.run_tables import RunArchive, RunRow, StepRow, archive
+from dsc.trace import Trace
+from knowledge_base.exchange.forms import delta_form
+from knowledge_base.facts import Delta
+from knowledge_base.journal.archive import Archive
+from knowledge_base.journal.history import Version
+from knowledge_base.journal.memory import MemoryHistory
+from knowledge_base.schema import Schema
+from knowledge_base.store import KnowledgeBase
+
+
+@dataclass(frozen=True, slots=True)
+class Divergence:
+    """Where a replay came to something else than the run.
+
+    Attributes:
+        step: number of the macrostep.
+        what: which of its results.
+        recorded, replayed: what it was then and now.
+    """
+
+    step: int
+    what: str
+    recorded: str
+    replayed: str
+
+    def __str__(self) -> str:
+        """One line."""
+        return f"step {self.step}: {self.what} was: {self.recorded}; now: {self.replayed}"
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """What came of a replay: how many macrosteps were made anew, and the first divergence, at which it ends."""
+
+    run: int
+    steps: int
+    divergence: Divergence | None
+
+
+def replay(
+    path: Path, run: int | None = None, *, library: Library | None = None, schema: Schema | None = None
+) -> Replay:
+    """Make the macrosteps of a run anew from what was recorded, without skills, time or planner.
+
+    Args:
+        path: the store, which is only read.
+        run: its number; the last one if left out.
+        library: plots to replay it with; those it was begun with if left out.
+        schema: an extension of the store's, where conditions use predicates that Python computes.
+
+    Raises:
+        StoreError: the store cannot be read, or has no such run.
+        HistoryError: the knowledge at the start of the run is not kept any more.
+    """
+    with archive(path) as runs:
+        row = runs.run(run)
+        past = Archive(path.resolve(), schema)
+        again = _Again(runs, row, past, library or plots_of(runs, row))
+        steps = 0
+        for step in runs.steps(row.number):
+            divergence = again.take(step)
+            if divergence is not None:
+                return Replay(row.number, steps, divergence)
+            steps += 1
+        return Replay(row.number, steps, None)
+
+
+class _Again:
+    """The run's reactor without anything around it; what it asks for is only noted."""
+
+    def __init__(self, runs: RunArchive, row: RunRow, past: Archive, library: Library) -> None:
+        self._runs = runs
+        self._row = row
+        self._past = past
+        start = Version(past.state(row.version, past.newest), row.version, 0.0)
+        self._knowledge = KnowledgeBase(past.schema, lambda: 0.0, MemoryHistory(start))
+        self._reactor = Reactor(library, self._knowledge, Trace(lambda: 0.0))
+        self._started: dict[str, Start] = {}
+
+    def take(self, step: StepRow) -> Divergence | None:
+        """Make one macrostep; the first result that is not as it was."""
+        for change in self._past.changes(self._knowledge.version, step.before):  # made beside the run
+            self._knowledge.apply(change.delta, change.author)
+        action_id = step.message.get("action")
+        if action_id not in (None, *self._started):
+            return Divergence(step.number, "what is answered", f"the action {action_id}", "not started at all")
+        self._note(self._output(step))
+        now = self._reactor.machine.state.configuration()
+        if now != step.configuration:
+            return Divergence(step.number, "the configuration", _listed(step.configuration), _listed(now))
+        recorded = [change.delta for change in self._past.changes(step.before, step.version)]
+        replayed = [change.delta for change in self._knowledge.changes(step.before)]
+        if recorded != replayed:
+            return Divergence(step.number, "what was told", _told(recorded), _told(replayed))
+        return None
+
+    def _output(self, step: StepRow) -> tuple[Output, ...]:
+        if step.message:
+            return self._reactor.react(message_of(step.message, self._started.__getitem__, self._runs.form))
+        if step.number > 1:
+            return self._reactor.leave()
+        serials = self._runs.serials_before(self._row.number)
+        return self._reactor.start(self._row.plot, full(self._row.arguments, self._runs.form), serials)
+
+    def _note(self, output: Iterable[Output]) -> None:
+        self._started.update({one.action_id: one for one in output if isinstance(one, Start)})
+
+
+def _listed(configuration: Iterable[str]) -> str:
+    return ", ".join(configuration) or "empty"
+
+
+def _told(deltas: Iterable[Delta]) -> str:
+    return "; ".join(text_of(delta_form(delta)) for delta in deltas) or "nothing"

@@ -1,0 +1,73 @@
+"""After a restart: everything is awaited again that was awaited when the run was broken off."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+
+from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
+from dsc.sequencer.coming import Coming
+from dsc.sequencer.dispatcher import Dispatcher
+from dsc.sequencer.messages import LateMessage
+from dsc.sequencer.run_forms import Kept, Pending
+from dsc.sequencer.taking_up import Earlier
+
+
+def require_components(kept: Kept, dispatcher: Dispatcher) -> None:
+    """Raise `UnknownNameError` if a component that the run needs is not deployed."""
+    started = [one.what.component for one in kept.pending if isinstance(one.what, Start)]
+    for needed in (*kept.memory, *started):
+        dispatcher.component(needed)
+
+
+async def take_up(kept: Kept, dispatcher: Dispatcher, coming: Coming) -> None:
+    """Let components be as they were, and let go on what was going on.
+
+    What the last macrostep asked for may never have left, so it leaves (again) when all else is as it was.
+
+    Raises:
+        InputError: a component cannot stop what was cancelled, or one is not deployed.
+    """
+    for name, memory in kept.memory.items():
+        dispatcher.component(name).recall(memory)
+    for one in kept.pending:
+        if one.cancelled and isinstance(one.what, Start):
+            await dispatcher.abandon(one.what)
+    awaited = [one for one in kept.pending if not one.cancelled]
+    older = [one for one in awaited if one.step < kept.number]
+    in_force = _in_force(older)
+    for told in in_force.values():
+        dispatcher.tell_again(told)
+    await dispatcher.telling.all_taken()
+    for one in older:
+        if one.place not in in_force:
+            _await_again(one, dispatcher, coming)
+    await asyncio.sleep(0)  # until these have begun
+    for one in awaited[len(older) :]:
+        _await_again(one, dispatcher, coming)
+
+
+def _in_force(older: Iterable[Pending]) -> dict[int, SetParameter | SwitchMode]:
+    """What components have to be told before anything goes on; not what came after a message that was under way."""
+    found: dict[int, SetParameter | SwitchMode] = {}
+    behind = set()
+    for one in older:
+        if isinstance(one.what, SendMessage):
+            behind.add(one.what.component)
+        elif isinstance(one.what, SetParameter | SwitchMode) and one.what.component not in behind:
+            found[one.place] = one.what
+    return found
+
+
+def _await_again(one: Pending, dispatcher: Dispatcher, coming: Coming) -> None:
+    match one.what:
+        case Start():
+            dispatcher.take_up(one.what, Earlier(one.at, one.reports))
+        case StartTimer():
+            dispatcher.timers.start(one.what, one.at)
+        case SendLater():
+            dispatcher.timers.send(one.what, one.at)
+        case LateMessage():
+            coming.wait_for(one.what, one.at)
+        case _:
+            dispatcher.dispatch(one.what)

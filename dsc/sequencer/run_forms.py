@@ -1,0 +1,265 @@
+"""What a run store keeps, as plain JSON values and back: messages, what is awaited, and a machine's frames.
+
+A plot that is a value (a plan, in a variable or an attribute) is long and comes again and again: it is kept once, by
+its hash, and stands as `{"$form": hash}` where it was.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dsc.engine.state import NOTHING, FrameState, MachineState
+from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
+from dsc.events import Event
+from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
+from dsc.sequencer.run_tables import RunRow
+from dsc.skills import Outcome
+from dsc.trace import Record
+from knowledge_base.exchange.forms import delta_form, delta_of
+
+Form = dict[str, Any]
+Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage
+"""What a run cannot do without after a restart. A parameter or mode that was set is in force until it is set anew; a
+message is awaited until the component has taken it."""
+
+_BY_HASH = "$form"
+_MOST_REMEMBERED = 256
+_encode = json.JSONEncoder(separators=(",", ":")).encode  # `json.dumps` would make one each time
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """Something that is still awaited, or in force.
+
+    Attributes:
+        place: of the row.
+        what: the output of the machine that asked for it, or what was handed in to come later.
+        step: number of the macrostep that asked.
+        at: second of run time at which a skill was started, or at which anything else is due.
+        reports: how many intermediate events of a skill were taken.
+        cause: number of the trace record about a skill's start.
+        cancelled: whether it is a skill that the last macrostep has cancelled.
+    """
+
+    place: int
+    what: Awaited
+    step: int
+    at: float
+    reports: int = 0
+    cause: int = 0
+    cancelled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A run as it was after its last macrostep.
+
+    Attributes:
+        run: what was to be run, and with what.
+        number: that of the macrostep.
+        time: its second of run time.
+        state: of the machine.
+        emitted, in_vain, problem: as of `Reactor`.
+        pending: in the order in which it was asked for.
+        memory: what components have to remember, by name.
+        records: of the trace, so far.
+    """
+
+    run: RunRow
+    number: int
+    time: float
+    state: MachineState
+    emitted: tuple[Event, ...]
+    in_vain: frozenset[tuple[int, int]]
+    problem: str | None
+    pending: tuple[Pending, ...]
+    memory: Mapping[str, Any]
+    records: tuple[Record, ...]
+
+    @property
+    def last_record(self) -> int:
+        """Number of the last record; what was recorded after it was lost with what it was about."""
+        return self.records[-1].seq if self.records else 0
+
+
+class Shortener:
+    """Puts hashes in the places of plots; `put` receives each one that was not there lately, as text."""
+
+    def __init__(self, put: Callable[[str, str], None]) -> None:
+        self._put = put
+        self._known: dict[int, tuple[Any, str]] = {}  # by identity; the value is kept, so that none takes its place
+
+    def __call__(self, values: Mapping[str, Any]) -> Form:
+        """The values, with hashes for those that are plots."""
+        return {name: self.short(value) if isinstance(value, dict) else value for name, value in values.items()}
+
+    def short(self, value: Any) -> Any:
+        """A hash in the place of a plot, anything else as it is."""
+        if not isinstance(value, Mapping) or not ({"plot", "states"} <= value.keys() or _BY_HASH in value):
+            return value
+        return {_BY_HASH: self.hash(value)}
+
+    def hash(self, value: Mapping[str, Any]) -> str:
+        """Put a plot away; the hash by which it is found again."""
+        known = self._known.get(id(value))
+        if known is None:
+            text = json.dumps(value)  # the order of states counts
+            known = value, hashlib.sha256(text.encode()).hexdigest()
+            self._put(known[1], text)
+            if len(self._known) >= _MOST_REMEMBERED:
+                self._known.clear()
+            self._known[id(value)] = known
+        return known[1]
+
+
+def full(values: Mapping[str, Any], form: Callable[[str], Any]) -> Form:
+    """The inverse of `Shortener`; `form` finds what a hash stands for."""
+    return {name: _full(value, form) for name, value in values.items()}
+
+
+def _full(value: Any, form: Callable[[str], Any]) -> Any:
+    return form(value[_BY_HASH]) if isinstance(value, dict) and _BY_HASH in value else value
+
+
+def text_of(form: Any) -> str:
+    """JSON without spaces; numbers that JSON lacks (`Infinity`) are written as Python reads them."""
+    return _encode(form)
+
+
+# -- messages ------------------------------------------------------------------------------------------------
+
+
+def message_form(message: Message, short: Shortener) -> Form:
+    """A message; a skill's refers to the action by its id."""
+    match message:
+        case SkillMessage():
+            outcome = message.outcome
+            form = {"action": message.start.action_id, "outcome": outcome.event, "final": message.final}
+            return form | {"attributes": short(outcome.attributes), "observed": delta_form(outcome.observed)}
+        case TimerMessage():
+            return {"timer": _plain(message.timer)}
+        case KnowledgeMessage():
+            return {"change": delta_form(message.delta), "author": message.author}
+        case LateMessage():
+            return {"late": message.number, "message": message_form(message.message, short)}
+        case SendLater():
+            return {"sent": _later_form(message, short)}
+    return {"event": _event_form(message, short)}
+
+
+def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Callable[[str], Any]) -> Message:
+    """The inverse of `message_form`; `action` finds what an id stands for."""
+    match form:
+        case {"action": action_id}:
+            outcome = Outcome(form["outcome"], full(form["attributes"], find), delta_of(form["observed"]))
+            return SkillMessage(action(action_id), outcome, form["final"])
+        case {"timer": timer}:
+            return TimerMessage(StartTimer(**timer))
+        case {"change": delta}:
+            return KnowledgeMessage(delta_of(delta), form["author"])
+        case {"late": number}:
+            inner = message_of(form["message"], action, find)
+            assert isinstance(inner, Event | KnowledgeMessage)  # noqa: S101  nothing else is handed in
+            return LateMessage(inner, number)
+        case {"sent": later}:
+            return _later_of(later, find)
+    return _event_of(form["event"], find)
+
+
+# -- what is awaited -----------------------------------------------------------------------------------------
+
+
+def awaited_text(what: Awaited, short: Shortener) -> str:
+    """As it is kept; equal ones have equal texts."""
+    match what:
+        case Start():
+            return text_of(_plain(what) | {"arguments": short(what.arguments), "names": dict(what.names)})
+        case SendLater():
+            return text_of(_later_form(what, short))
+        case LateMessage():
+            return text_of(message_form(what, short))
+        case SetParameter():
+            return text_of(_plain(what) | {"value": short.short(what.value)})
+        case SendMessage():
+            return text_of(_plain(what) | {"arguments": short(what.arguments)})
+    return text_of(_plain(what))
+
+
+def awaited_of(kind: str, text: str, find: Callable[[str], Any]) -> Awaited:
+    """The inverse of `awaited_text`; `kind` is the name of its class."""
+    form = json.loads(text)
+    match kind:
+        case "Start":
+            return Start(**form | {"arguments": full(form["arguments"], find)})
+        case "SendLater":
+            return _later_of(form, find)
+        case "SetParameter":
+            return SetParameter(**form | {"value": _full(form["value"], find)})
+        case "StartTimer" | "SwitchMode":
+            return StartTimer(**form) if kind == "StartTimer" else SwitchMode(**form)
+        case "SendMessage":
+            return SendMessage(**form | {"arguments": full(form["arguments"], find)})
+    late = message_of(form, _no_action, find)
+    assert isinstance(late, LateMessage)  # noqa: S101  the only one left
+    return late
+
+
+def _no_action(action_id: str) -> Start:
+    raise KeyError(action_id)  # what is handed in answers to none
+
+
+def _later_form(later: SendLater, short: Shortener) -> Form:
+    return {"event": _event_form(later.event, short), "seconds": later.seconds, "id": later.id}
+
+
+def _later_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> SendLater:
+    return SendLater(_event_of(form["event"], find), form["seconds"], form["id"])
+
+
+def _event_form(event: Event, short: Shortener) -> Form:
+    return {**event._asdict(), "attributes": short(event.attributes)}
+
+
+def _event_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> Event:
+    return Event(**{**form, "attributes": full(form["attributes"], find)})
+
+
+def events_form(events: Iterable[Event], short: Shortener) -> list[Form]:
+    """Several events."""
+    return [_event_form(event, short) for event in events]
+
+
+def events_of(forms: Iterable[Mapping[str, Any]], find: Callable[[str], Any]) -> tuple[Event, ...]:
+    """The inverse of `events_form`."""
+    return tuple([_event_of(form, find) for form in forms])
+
+
+# -- frames --------------------------------------------------------------------------------------------------
+
+
+def frame_text(frame: FrameState, short: Shortener) -> str:
+    """One running plot without those inside, which are referred to by their numbers."""
+    alone = frame._replace(children=NOTHING) if frame.children else frame
+    form = alone.to_json()
+    form["children"] = {host: child.serial for host, child in frame.children.items()}
+    form["form"] = short.short(form["form"])
+    form["variables"] = short(frame.variables)
+    return text_of(form)
+
+
+def frame_form(serial: int, frames: Mapping[int, str], find: Callable[[str], Any]) -> Form:
+    """The frame of that number with all inside it, as `FrameState.to_json` gives it."""
+    form: Form = json.loads(frames[serial])
+    form["children"] = {host: frame_form(child, frames, find) for host, child in form["children"].items()}
+    form["form"] = _full(form["form"], find)
+    form["variables"] = full(form["variables"], find)
+    return form
+
+
+def _plain(value: Any) -> Form:
+    """A frozen dataclass of plain fields; `asdict` copies deeply, which is not needed here."""
+    return {name: getattr(value, name) for name in value.__dataclass_fields__}

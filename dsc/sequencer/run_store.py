@@ -1,0 +1,188 @@
+"""A run in the file of its knowledge: one transaction a macrostep, with everything that a restart needs (S0.15)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.engine.steps import Output
+from dsc.sequencer.changed import require_unchanged
+from dsc.sequencer.messages import LateMessage, Message
+from dsc.sequencer.reactor import Reactor
+from dsc.sequencer.run_forms import Kept, Shortener, message_form, text_of
+from dsc.sequencer.run_present import Present, read
+from dsc.sequencer.run_tables import TABLES, archive, serials_before, unfinished
+from dsc.sequencer.telling import Told
+from dsc.trace import Record
+from knowledge_base.errors import Place, StoreError
+from knowledge_base.store import KnowledgeBase
+
+_STEP = "INSERT INTO steps VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
+_BEGIN = "INSERT INTO runs (plot, arguments, version, header, plots, domain) VALUES (?, ?, ?, ?, ?, ?)"
+_MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE place = (SELECT max(place) FROM steps)"
+
+
+class RunStore:
+    """Keeps one run of one sequencer; methods that write are called inside `writing`.
+
+    Args:
+        knowledge: the knowledge base of the run, opened at `path`.
+        path: its file.
+        header: what the run's program wants to find again, plain data.
+        domain: what the plots rely on that is no plot, as text by what it is called ("planning action 'go'").
+
+    Attributes:
+        begun: whether a run is kept here.
+        last_late: the highest number of a `LateMessage` that is still to come.
+        lost: whether something could not be kept: what is in memory is ahead of the file.
+
+    Raises:
+        StoreError: the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        knowledge: KnowledgeBase,
+        path: Path,
+        header: Mapping[str, Any] | None = None,
+        domain: Mapping[str, str] | None = None,
+    ) -> None:
+        self.path = path
+        self.begun = self.lost = False
+        self.last_late = 0
+        self._knowledge = knowledge
+        self._header = header or {}
+        self._domain = domain or {}
+        self._run = self._number = self._before = 0
+        self._records: list[str] = []
+        self._short = Shortener(self._put_form)
+        self._present = Present(self._short)
+        with knowledge.together() as connection:
+            self._connection = connection
+            for statement in TABLES:
+                connection.execute(statement)
+            (epoch,) = connection.execute("SELECT max(epoch) FROM fence").fetchone()
+            connection.execute("DELETE FROM fence")
+            self._epoch = (epoch or 0) + 1
+            connection.execute("INSERT INTO fence VALUES (?)", (self._epoch,))
+
+    def hear(self, record: Record) -> None:
+        """A record of the trace, to be kept with the next macrostep."""
+        self._records.append(record.to_line())
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """One transaction: what is committed to the knowledge inside, and what is written with the methods below.
+
+        Raises:
+            StoreError: it could not be written, or another sequencer has taken the run over.
+        """
+        try:
+            with self._knowledge.together() as self._connection:
+                self._require_right()
+                self._before = self._knowledge.version
+                yield
+        except BaseException:
+            self.lost = True
+            raise
+        self.begun = True
+
+    def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> int:
+        """Make a new run; the knowledge is what is known at its start.
+
+        Returns:
+            The last serial number that earlier runs have given out.
+
+        Raises:
+            StoreError: another run is unfinished.
+        """
+        (open_runs,) = self._connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
+        if open_runs:
+            raise StoreError("the store has an unfinished run, which can be resumed", place=Place(str(self.path)))
+        self._present.clear(self._connection)
+        plots = {one.name: self._short.hash(one.to_form()) for one in library}
+        row = (
+            plot, text_of(self._short(arguments)), self._knowledge.version, text_of(self._header), text_of(plots),
+            text_of(self._domain),
+        )  # fmt: skip
+        self._run = self._connection.execute(_BEGIN, row).lastrowid or 0
+        return serials_before(self._connection, self._run)
+
+    def late(self, late: LateMessage, due: float) -> None:
+        """Something was handed in that comes later, at second `due` of run time."""
+        self._present.put(self._connection, late, self._number, due)
+
+    def step(
+        self,
+        now: float,
+        message: Message | None,
+        output: Iterable[Output],
+        reactor: Reactor,
+        under_way: Collection[Told] = (),
+    ) -> None:
+        """A macrostep; `message` is `None` for the first, in which the plot was started, and for leaving it.
+
+        Args:
+            now: second of run time.
+            message: what was taken.
+            output: what is to be carried out after the commit.
+            reactor: after it.
+            under_way: what components were told before and have not taken yet.
+        """
+        self._number += 1
+        form = {} if message is None else message_form(message, self._short)
+        configuration = text_of(reactor.machine.state.configuration())
+        self._connection.execute(_STEP, (
+            self._run, self._number, now, self._before, self._knowledge.version, text_of(form), configuration,
+            self._present.reactor(reactor), self._new_records(),
+        ))  # fmt: skip
+        self._present.frames(self._connection, reactor.machine.state.root)
+        self._present.left(self._connection, under_way)
+        if message is not None:
+            self._present.taken(self._connection, message)
+        self._present.asked(self._connection, output, self._number, now, reactor)
+
+    def memory(self, component: str, memory: Any) -> None:
+        """What a component has to remember."""
+        self._present.memory(self._connection, component, memory)
+
+    def end(self, *, finished: bool, problem: str | None) -> None:
+        """The run is over."""
+        ended = text_of({"finished": finished, "problem": problem})
+        self._connection.execute(_MORE_RECORDS, (self._new_records(),))
+        self._connection.execute("UPDATE runs SET ended = ? WHERE run = ?", (ended, self._run))
+
+    def take_up(self, library: Library) -> Kept:
+        """The unfinished run as it is now, to be gone on with; to be called outside `writing`.
+
+        Raises:
+            StoreError: there is none, or it cannot be read.
+            ChangedError: the plots or the domain are not those with which it was begun.
+        """
+        with archive(self.path) as runs:
+            run = unfinished(runs)
+            require_unchanged(runs, run, library, self._domain)
+            kept = read(runs, run, library)
+        self.begun = True
+        self._run, self._number = run.number, kept.number
+        self._present.restored(kept)
+        late = [one.what.number for one in kept.pending if isinstance(one.what, LateMessage)]
+        self.last_late = max(late, default=0)
+        return kept
+
+    def _new_records(self) -> str:
+        """What was heard since the last time, one record a line."""
+        text = "".join([f"{line}\n" for line in self._records])
+        self._records.clear()
+        return text
+
+    def _put_form(self, digest: str, text: str) -> None:
+        self._connection.execute("INSERT OR IGNORE INTO forms VALUES (?, ?)", (digest, text))
+
+    def _require_right(self) -> None:
+        (epoch,) = self._connection.execute("SELECT epoch FROM fence").fetchone()
+        if epoch != self._epoch:
+            raise StoreError("another sequencer has taken this run over", place=Place(str(self.path)))

@@ -1,0 +1,164 @@
+"""The table in a store: broken off at boundaries, refused when something changed, looked at from the command line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from kept_lives import SCENARIO, told
+
+from domains.clean_up_table.deployment import PROFILES, deploy, resumed
+from domains.clean_up_table.scenario import Scenario
+from domains.clean_up_table.world_file import LastingWorld
+from dsc.sequencer.replay import replay
+from dsc.text.profiles import find_profile
+from knowledge_base.errors import InputError, StoreError
+
+DSC = Path(sys.executable).with_name("dsc")
+EVERY = 12
+"""Of the boundaries of a run, one in so many is lived on from: 50 would take a minute."""
+
+
+def copied(folder: Path, to: Path) -> Path:
+    to.mkdir()
+    for file in folder.iterdir():
+        if not file.name.endswith(("-lock", "-shm")):
+            shutil.copy(file, to)
+    return to / "run.kb"
+
+
+@pytest.fixture(scope="module")
+def whole(planner, tmp_path_factory):
+    """A run that was never broken off, with its report, its world, and copies of the files from its boundaries."""
+    folder = tmp_path_factory.mktemp("kept")
+    (alive := folder / "alive").mkdir()
+    boundaries, copies = [], []
+
+    def boundary(_):
+        boundaries.append(1)
+        if len(boundaries) % EVERY == 0:
+            copies.append(copied(alive, folder / f"copy{len(copies)}"))
+
+    class CopiedWorld(LastingWorld):
+        def executed(self, action_id, result):
+            super().executed(action_id, result)
+            boundary(action_id)
+
+    with deploy(Scenario.parse(SCENARIO), 3, 0.2, planner, store=alive / "run.kb") as table:
+        table.world.__class__ = CopiedWorld
+        report = table.run(prepare=lambda run: run.listen(boundary))
+        return alive / "run.kb", replace(report, wall_s=0), table.world.state(), copies
+
+
+def test_wherever_it_is_broken_off_it_ends_with_the_same_report(whole, planner, tmp_path):
+    path, report, world, copies = whole
+    assert len(copies) > 5
+    for number, kept in enumerate(copies):
+        copy = copied(kept.parent, tmp_path / str(number))
+        with resumed(copy, planner) as table:
+            assert replace(table.run(), wall_s=0) == report
+            assert table.world.state() == world
+        assert told(copy) == told(path)
+
+
+def test_a_store_changes_nothing_about_the_run(whole, planner):
+    _, report, world, _ = whole
+    table = deploy(Scenario.parse(SCENARIO), 3, 0.2, planner)
+    assert replace(table.run(), wall_s=0) == report
+    assert table.world.state() == world
+
+
+def test_the_replay_of_a_run_with_plans_and_faults_comes_to_the_same(whole):
+    path = whole[0]
+    done = replay(path)
+    assert done.divergence is None
+    assert done.steps == len(told(path)[1])
+
+
+def test_a_world_in_a_file_is_the_world_with_all_it_has_done(tmp_path):
+    world = LastingWorld.from_state(Scenario.parse(SCENARIO).world(1, 0.5).state())
+    world.create(tmp_path / "world")
+    for action_id, to in (("a", "table"), ("b", "sink"), ("a", "nowhere")):
+        world.drive(action_id, to)
+    world.close()
+    again = LastingWorld.open(tmp_path / "world")
+    assert again.state() == world.state()
+    assert again.drive("b", "sink") == world.done["b"]
+    assert again.place_before("b") == "table"
+    again.close()
+
+
+def test_a_world_that_is_not_there_or_none_is_said_so(tmp_path):
+    with pytest.raises(StoreError, match="the world of the run is not there"):
+        LastingWorld.open(tmp_path / "none")
+    (tmp_path / "text").write_text("this is no database, and long enough to be seen as none" * 20)
+    with pytest.raises(StoreError, match="cannot read the world"):
+        LastingWorld.open(tmp_path / "text")
+    with pytest.raises(StoreError, match="cannot write the world"):
+        LastingWorld.from_state(Scenario.default().world().state()).create(tmp_path / "no" / "folder")
+
+
+def test_a_store_that_has_a_run_is_not_begun_anew(whole, planner):
+    with pytest.raises(InputError, match="has a run already; go on with it by --resume"):
+        deploy(None, 3, 0.2, planner, store=whole[0])
+
+
+def dsc(*words):
+    done = subprocess.run([DSC, *map(str, words)], check=False, capture_output=True, text=True, timeout=120)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_the_command_keeps_a_run_resumes_it_and_tells_what_happened(whole, tmp_path):
+    _, report, _, copies = whole
+    path = copied(copies[3].parent, tmp_path / "copy")
+    status, out, _ = dsc("runs", "list", path)
+    assert (status, out.split()[1], out.split()[-1]) == (0, "clean_up_table", "unfinished")
+    assert "under way since" in dsc("runs", "show", path)[1]
+    status, out, _ = dsc("run", "--resume", path, "--json")
+    assert status == 0
+    assert json.loads(out) | {"wall_s": 0} == json.loads(json.dumps(report.to_json()))
+    assert dsc("runs", "list", path)[1].split()[-1] == "finished"
+    assert dsc("runs", "replay", path)[1].endswith("all as they were\n")
+    assert dsc("run", "--resume", path) == (2, "", f"dsc: {path}: there is no unfinished run in this store\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run"], "a run needs a world, or a store to --resume; valid: clean-up-table"),
+        (["run", "--resume", "x.kb", "--seed", "1"], "a run is resumed as it was begun: --resume does not go with --seed"),
+        (["run", "--resume", "x.kb", "--real-time"], "does not go with --real-time"),
+        (["run", "--resume", "x.kb"], "there is no store 'x.kb'"),
+        (["runs", "list", "x.kb"], "there is no store 'x.kb'"),
+        (["runs", "replay", __file__], "cannot read the store: file is not a database"),
+    ],
+)
+def test_a_mistake_is_one_line(words, message):
+    status, out, error = dsc(*words)
+    assert (status, out) == (2, "")
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_another_robot_is_the_same_one_after_the_crash(planner, tmp_path):
+    (alive := tmp_path / "alive").mkdir()
+    copies, profile = [], find_profile("on_tracks", PROFILES)
+
+    def boundary(_):
+        if len(copies) < 30:
+            copies.append(copied(alive, tmp_path / f"copy{len(copies)}") if len(copies) in (15, 29) else None)
+
+    with deploy(Scenario.parse(SCENARIO), 3, 0.2, planner, store=alive / "run.kb", profile=profile) as table:
+        report = replace(table.run(prepare=lambda run: run.listen(boundary)), wall_s=0)
+        world = table.world.state()
+    for path in filter(None, copies):
+        with resumed(path, planner) as table:
+            assert table.profile.digest == profile.digest
+            assert replace(table.run(), wall_s=0) == report
+            assert table.world.state() == world
+        assert told(path) == told(alive / "run.kb")

@@ -1,0 +1,238 @@
+"""Everything that leaves a chart outlives a crash: messages, modes, parameters, events that were activated, queries."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from dsc_crashes import Crashes, Robot, Run, copied
+
+from dsc.components.blocking import BlockingCall
+from dsc.components.ports import event, query, takes
+from dsc.components.trees import action, sequence, tree_skill
+from dsc.events import Event
+from dsc.skills import Outcome, skill
+from knowledge_base.facts import Delta, Fact
+
+
+class Station(Robot):
+    """A robot with all ports; what it was told it remembers, as one that never died would."""
+
+    modes = ("careful", "fast")
+
+    def __init__(self, done=(), crash=lambda: None):
+        super().__init__(done, crash)
+        self.abandoned = []
+
+    def remember(self):
+        return [list(one) for one in self.told]
+
+    def recall(self, memory):
+        self.told = [tuple(one) for one in memory]
+
+    async def start(self):
+        self.told.append(("life", "started"))
+
+    async def stop(self):
+        self.told.append(("life", "stopped"))
+
+    async def abandon(self, action_id, skill_name, arguments):
+        self.abandoned.append(skill_name)
+
+    @takes
+    async def note(self, text):
+        self.told.append(("note", text))
+
+    @takes
+    async def slow_note(self, text):
+        await asyncio.sleep(3)
+        self.told.append(("note", text))
+
+    @event({"level": "number"})
+    def low(self, level: float, below: float = 20.0):
+        return {"level": level} if level < below else None
+
+    @query({"n": "number"})
+    async def count(self):
+        return {"n": 7}
+
+    @skill(outcomes={"seen": {}}, after_crash="same_id")
+    async def sees_nonsense(self, call):
+        call.report(Outcome("seen", observed=Delta(added=(Fact("nonsense"),))))
+        await call.clock.sleep(50)
+        return Outcome("seen")
+
+    @skill(outcomes={"did": {}}, blocking="thread", after_crash="repeat")
+    def block(self, call: BlockingCall):
+        call.sleep(0.001)
+        return Outcome("did")
+
+    @tree_skill(success="did", failure="failed", outcomes={"did": {}, "failed": {}}, after_crash="repeat")
+    def climb(self, call):
+        async def nap():
+            await call.clock.sleep(1)
+            return Outcome("rested")
+
+        return sequence(action("one", nap, ends={"rested"}), action("two", nap, ends={"rested"}))
+
+
+def crashes(tmp_path, chart, prepare=None):
+    return Crashes(tmp_path, chart, prepare=prepare, make=Station)
+
+
+def notes(told):
+    return [text for kind, text in told if kind == "note"]
+
+
+MESSAGES = """
+    plot: p
+    states:
+      a:
+        entry: [{send: robot.note, with: {text: one}}, {send: robot.slow_note, with: {text: two}}, {send: robot.note, with: {text: three}}]
+        after: {seconds: 1, to: b}
+      b: {entry: [{send: robot.note, with: {text: four}}], after: {seconds: 1, to: c}}
+      c: {after: {seconds: 2, to: d}}
+      d: {entry: [{trigger: robot.work}], on: {did: e}}
+      e: {final: true}
+"""
+
+
+def test_a_message_that_was_not_taken_is_sent_again_in_order(tmp_path):
+    whole = crashes(tmp_path, MESSAGES)
+    assert notes(whole.whole.robot.told) == ["one", "two", "three", "four"]
+    for what, run in whole.resumed():
+        told = notes(run.robot.told)
+        assert list(dict.fromkeys(told)) == ["one", "two", "three", "four"], what
+        assert (run.end, run.robot.done) == (whole.whole.end, whole.whole.robot.done), what
+
+
+def test_a_message_that_was_taken_is_not_sent_again(tmp_path):
+    whole = crashes(tmp_path, MESSAGES)
+    _, last = list(whole.resumed())[-1]
+    assert notes(last.robot.told) == ["one", "two", "three", "four"]
+
+
+HURRY = """
+    plot: p
+    receives: {go: {}}
+    states:
+      a: {on: {go: b}}
+      b: {entry: [{set: robot.speed, to: 1}], on: {go: c}}
+      c: {entry: [{set: robot.speed, to: 2}], on: {go: d}}
+      d: {entry: [{set: robot.speed, to: 3}], on: {go: f}}
+      f: {entry: [{trigger: robot.work}], on: {did: e}}
+      e: {final: true}
+"""
+
+
+def test_no_parameter_is_passed_over_that_a_component_has_not_taken(tmp_path):
+    """Several macrosteps may be over before a component comes to its turn."""
+
+    def prepare(sequencer):
+        for _ in range(4):
+            sequencer.post(Event("go"), after=1)
+
+    whole = crashes(tmp_path, HURRY, prepare)
+    for what, run in whole.resumed():
+        speeds = [value for name, value in run.robot.told if name == "speed"]
+        assert list(dict.fromkeys(speeds)) == [1, 2, 3], what
+        assert run.robot.parameters == {"speed": 3}, what
+
+
+LIVES = """
+    plot: p
+    states:
+      a: {entry: [{switch: robot, to: careful}, {trigger: robot.work}], on: {did: b}}
+      b: {entry: [{switch: robot, to: shutdown}], after: {seconds: 1, to: c}}
+      c: {entry: [{switch: robot, to: init}, {trigger: robot.work}], on: {did: d}}
+      d: {entry: [{trigger: robot.work}], on: {did: e}}
+      e: {final: true}
+"""
+
+
+def test_mode_and_life_are_as_they_were(tmp_path):
+    whole = crashes(tmp_path, LIVES)
+    for what, run in whole.resumed():
+        assert run.outcome() == whole.whole.outcome(), what
+        assert (run.robot.mode, run.robot.life.state) == ("careful", "alive"), what
+
+
+def test_what_was_to_start_anew_before_the_crash_starts_once_after_it(tmp_path):
+    whole = crashes(tmp_path, LIVES)
+    _, done, folder = whole.copies[-1]
+    robot = Station(done)
+    Run(folder, whole.plots, robot=robot, resume=True)
+    assert robot.told.count(("life", "started")) == 1 + 2  # in the lives before, and now
+
+
+WATCHED = """
+    plot: p
+    variables: {n: {type: number, initial: 0}}
+    states:
+      a:
+        entry: [{trigger: robot.low, with: {below: 18}, as: {low: low_bat}}, {trigger: robot.work, with: {seconds: 10}}]
+        on: {low_bat: {assign: {n: (+ ?n 1)}}, did: [{to: e, when: (= ?n 2)}, wrong]}
+      wrong:
+      e: {final: true}
+"""
+
+
+def test_an_event_is_activated_again_and_what_holds_then_is_told(tmp_path):
+    alive, copies = tmp_path / "alive", []
+    alive.mkdir()
+
+    def at(seconds, level):
+        def prepare(sequencer):
+            robot = sequencer.dispatcher.component("robot")
+            sequencer._clock.call_at(seconds, lambda: robot.update("low", level))
+            sequencer.listen(lambda _: copies.append(copied(alive, tmp_path / f"c{len(copies)}")))
+
+        return prepare
+
+    Run(alive, [WATCHED], robot=Station(), prepare=at(1, 15))
+    after_the_event = copies[2]
+    run = Run(after_the_event, [WATCHED], robot=Station(), prepare=at(4, 12), resume=True)
+    assert run.end.finished
+
+
+def test_a_query_is_asked_again(tmp_path):
+    whole = crashes(tmp_path, """
+        plot: p
+        states:
+          a: {entry: [{trigger: robot.count}], on: {answered: [{to: b, when: (= ?event.n 7)}]}}
+          b: {entry: [{trigger: robot.work}], on: {did: e}}
+          e: {final: true}
+    """)
+    for what, run in whole.resumed():
+        assert run.outcome() == whole.whole.outcome(), what
+
+
+@pytest.mark.parametrize("name", ["block", "climb"])
+def test_blocking_skills_and_behaviour_trees_are_done_again_if_they_say_so(tmp_path, name):
+    whole = crashes(tmp_path, f"""
+        plot: p
+        states:
+          a: {{entry: [{{trigger: robot.{name}}}], after: {{seconds: 1.5, do: [{{tell: (told)}}]}}, on: {{did: b}}}}
+          b: {{entry: [{{trigger: robot.work}}], on: {{did: e}}}}
+          e: {{final: true}}
+    """)
+    assert whole.whole.end.finished
+    for what, run in whole.resumed():
+        assert (run.end, run.facts, run.robot.done) == (whole.whole.end, whole.whole.facts, whole.whole.robot.done), what
+
+
+def test_a_skill_that_was_not_believed_is_stopped_even_if_the_crash_came_first(tmp_path):
+    whole = crashes(tmp_path, """
+        plot: p
+        states:
+          a: {entry: [{trigger: robot.sees_nonsense}], on: {skill_error: b, seen: wrong}}
+          b: {entry: [{trigger: robot.work}], on: {did: e}}
+          wrong:
+          e: {final: true}
+    """)
+    assert whole.whole.end.finished
+    abandoned = []
+    for what, run in whole.resumed():
+        assert run.outcome() == whole.whole.outcome(), what
+        abandoned.append(run.robot.abandoned)
+    assert abandoned == [[], ["sees_nonsense"], ["sees_nonsense"]]
