@@ -1,4 +1,4 @@
-"""What `dsc view` is given, as records: a trace, or a store. Another kind of file is another branch of `records_of`."""
+"""What `dsc view` is given, as records: a trace, a kept run, or a knowledge store."""
 
 from __future__ import annotations
 
@@ -18,13 +18,17 @@ if TYPE_CHECKING:
 def records_of(path: Path) -> Iterator[RecordLog]:
     """The records in a file, by what the file is; of a store, also those that come while the block lasts.
 
+    Of a store with runs in it, those of its last run; of another one, the changes of what is known.
+
     Raises:
         InputError: there is no such file, or it is neither a trace nor a store.
     """
     if is_store(path):
-        from dsc.viewer.stores import following_store  # noqa: PLC0415  a trace needs no store
+        from dsc.sequencer.run_tables import has_run  # noqa: PLC0415  a trace needs no store
+        from dsc.viewer.kept_runs import following_run  # noqa: PLC0415
+        from dsc.viewer.stores import following_store  # noqa: PLC0415
 
-        with following_store(path) as log:
+        with (following_run if has_run(path) else following_store)(path) as log:
             yield log
     else:
         yield read_trace(path)

@@ -6,20 +6,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from threading import Event, Thread
 from typing import TYPE_CHECKING
 
 from dsc.trace import Record, header
+from dsc.viewer.following import followed
 from dsc.viewer.records import RecordLog
-from knowledge_base.errors import HistoryError, StoreError
 from knowledge_base.exchange.forms import delta_form, schema_form, world_form
 from knowledge_base.store import KnowledgeBase
 
 if TYPE_CHECKING:
     from knowledge_base.facts import Change
-
-LOOK_EVERY_S = 0.2
-"""How often a store is looked at for what its writer has added."""
 
 
 @contextmanager
@@ -50,23 +46,8 @@ def following_store(path: Path) -> Iterator[RecordLog]:
         for change in changes:
             hear(change)
         kb.subscribe(hear)
-        over = Event()
-        looking = Thread(target=_look, args=(kb, log, over), daemon=True)
-        looking.start()
-        try:
+        with followed(log, lambda: kb.refresh() >= 0):
             yield log
-        finally:
-            over.set()
-            looking.join()
-
-
-def _look(kb: KnowledgeBase, log: RecordLog, over: Event) -> None:
-    while not over.wait(LOOK_EVERY_S):
-        try:
-            kb.refresh()
-        except (HistoryError, StoreError):
-            break
-    log.end()
 
 
 def _header(path: Path, changes: list[Change]) -> str:
