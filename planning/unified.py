@@ -70,6 +70,6 @@ def to_unified(
     texts = domain.to_pddl(), world.to_pddl(domain.name, goal=goal, metric=metric)
     try:
         return PDDLReader().parse_problem_string(*texts)
-    except (UPException, NotImplementedError, AssertionError) as error:
+    except (UPException, NotImplementedError, AssertionError, SyntaxError) as error:
         said = str(error) or type(error).__name__
         raise InputError(f"unified-planning cannot read the problem: {said}") from error

@@ -13,6 +13,7 @@ Each component is an instance with values of its own, in `component.parameters`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -84,6 +85,8 @@ class Parameter:
     def _fits(self, value: Value) -> bool:
         kind = "boolean" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
         if kind != self.type or (self.among and value not in self.among):
+            return False
+        if isinstance(value, float) and math.isnan(value):  # it is neither below nor above anything
             return False
         too_low = self.least is not None and not isinstance(value, str) and value < self.least
         too_high = self.most is not None and not isinstance(value, str) and value > self.most

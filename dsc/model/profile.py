@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping
 from typing import Annotated
 
@@ -16,6 +17,8 @@ Path = tuple[str | int, ...]
 
 
 def _value(value: object) -> Value:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"a finite number was expected; found {value!r}")
     if isinstance(value, str | int | float | bool):
         return value
     raise ValueError(f"a number, a text or a truth value was expected; found {value!r}")

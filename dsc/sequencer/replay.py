@@ -52,7 +52,7 @@ class Replay:
 
 
 def replay(
-    path: Path, run: int | None = None, *, library: Library | None = None, schema: Schema | None = None
+    path: Path | str, run: int | None = None, *, library: Library | None = None, schema: Schema | None = None
 ) -> Replay:
     """Make the macrosteps of a run anew from what was recorded, without skills, time or planner.
 
@@ -66,6 +66,7 @@ def replay(
         StoreError: the store cannot be read, or has no such run.
         HistoryError: the knowledge at the start of the run is not kept any more.
     """
+    path = Path(path)
     with archive(path) as runs:
         row = runs.run(run)
         past = Archive(path.resolve(), schema)

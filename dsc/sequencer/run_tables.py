@@ -164,7 +164,9 @@ def archive(path: Path) -> Iterator[RunArchive]:
         yield RunArchive(connection, path)
 
 
-def records_of(path: Path, run: int | None = None, after: int = 0) -> tuple[Mapping[str, Any], tuple[Record, ...]]:
+def records_of(
+    path: Path | str, run: int | None = None, after: int = 0
+) -> tuple[Mapping[str, Any], tuple[Record, ...]]:
     """What a trace file of a kept run would have: its header, and the records so far; also while the run goes on.
 
     Args:
@@ -175,7 +177,7 @@ def records_of(path: Path, run: int | None = None, after: int = 0) -> tuple[Mapp
     Raises:
         StoreError: the file is not there, not a store, or has no such run.
     """
-    with archive(path) as runs:
+    with archive(Path(path)) as runs:
         row = runs.run(run)
         return row.header, tuple(runs.records(row.number, after))
 

@@ -45,6 +45,8 @@ def _rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Fin
         why = _never(rule.when, [one.when for one in earlier])
         if why is None and rule.on is not None and not planned and _settled(rule, rule.on, steps, library):
             why = f"every state that can end with '{rule.on}' answers it itself"
+        if why is None and planned and rule.then not in RESPONSES[rule.place] and not _here(rule, steps, library):
+            why = f"it is for steps of plans alone, which cannot lead to the state '{rule.then}'"
         if why is not None:
             others = "; before it: " + ", ".join(f"'{one.label}'" for one in earlier) if earlier else ""
             yield _warning(plot, ("rules", number), f"the rule '{rule.label}' can never answer: {why}{others}", "rules")
@@ -60,6 +62,12 @@ def _comes_before(earlier: Rule, later: Rule, *, planned: bool) -> bool:
     goes_on = (earlier.place, earlier.then) in {("before", ENTER), ("after", CONTINUE)}
     stays = planned and earlier.then not in RESPONSES[earlier.place]  # it does not travel to plans, others do
     return not (bounded or goes_on or stays)
+
+
+def _here(rule: Rule, steps: dict[str, Step], library: Library) -> bool:
+    """Whether a rule may answer at some state of the plot itself."""
+    mine = (state for name, state in steps.items() if concerns(rule, name, state, library))
+    return any(rule.on is None or rule.on in answerable(state, library) for state in mine)
 
 
 def _settled(rule: Rule, event: str, steps: dict[str, Step], library: Library) -> bool:

@@ -95,6 +95,8 @@ def test_values_for_plots_fit_too(plots, said):
         ("profile: p\ncomponent: {}\n", "sim.yaml:2:1: unknown key 'component'; did you mean 'components'?"),
         ("components: {}\n", "the key 'profile' is missing"),
         ("profile: p\ncomponents: {base: {speed: [1]}}\n", "sim.yaml:2:21: a number, a text or a truth value was expected"),
+        ("profile: p\ncomponents: {base: {speed: .nan}}\n", "sim.yaml:2:21: a finite number was expected; found nan"),
+        ("profile: p\nplots: {wait: {seconds: .inf}}\n", "sim.yaml:2:16: a finite number was expected; found inf"),
         ("profile: p\ncomponents: {base: fast}\n", "sim.yaml:2:14: a mapping of names was expected"),
     ],
 )

@@ -30,7 +30,7 @@ def command(*words):
 @pytest.mark.parametrize("chart", CHARTS.values(), ids=CHARTS)
 def test_a_run_that_is_replayed_comes_to_the_same_configurations_and_knowledge(tmp_path, chart):
     run = Run(tmp_path, [chart])
-    done = replay(run.path)
+    done = replay(str(run.path))
     assert done.divergence is None
     assert done.steps == len(run.steps)
 

@@ -67,6 +67,27 @@ def test_a_rule_that_can_never_answer_is_found_where_it_stands(rules):
     assert "can never answer" in warning
 
 
+PLANNED = "plot: p\nstates:\n  a: {goal: (q), on: {done: e, no_plan: e, gave_up: e}}\n  b: {use: step, on: {done: e}}\n  e: {final: true}\n"
+
+
+@pytest.mark.parametrize(
+    "rule",
+    ["{before: put, do: {then: e}}", "{after: put, do: {use: step, then: e}}", "{on: failed, of: put, do: {then: e}}", "{on: spilt, do: {then: e}}"],
+)  # fmt: skip
+def test_a_rule_for_steps_of_plans_alone_leads_to_no_state(rule):
+    (warning,) = about_rules(rule, holder=PLANNED)
+    assert warning.startswith("p.yaml:7:")
+    assert "for steps of plans alone, which cannot lead to the state 'e'" in warning
+
+
+@pytest.mark.parametrize(
+    "rule",
+    ["{before: put, do: {then: give_up}}", "{on: failed, do: {then: e}}", "{before: [put, b], do: {then: e}}", "{on: gave_up, do: {then: e}}"],
+)  # fmt: skip
+def test_a_rule_that_is_for_a_state_too_may_lead_on(rule):
+    assert about_rules(rule, holder=PLANNED) == []
+
+
 @pytest.mark.parametrize(
     "rules",
     [

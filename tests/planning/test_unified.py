@@ -120,6 +120,9 @@ def test_what_they_cannot_read_is_named() -> None:
     labelled = PlanningDomain.parse("(define (domain d) (:types t) (:functions (label ?t - t) - text))")
     with pytest.raises(InputError, match="no function that is no number, as 'label' is"):
         to_unified(labelled, KnowledgeBase(labelled.schema), "(and)")
+    another = KnowledgeBase(PlanningDomain.parse("(define (domain d) (:predicates (warm)))").schema)
+    with pytest.raises(InputError, match=r"cannot read the problem: .*warm"):
+        to_unified(DOMAIN, another, "(warm)")
 
 
 def test_a_computed_predicate_is_no_pddl() -> None:
