@@ -11,6 +11,7 @@ from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.inputs import require_params, shown
 from knowledge_base.language.asking import asked, queried
+from knowledge_base.language.author import MISSING
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.source import Source, condition_source, query_source
@@ -117,8 +118,7 @@ class ReadyQuestions:
         holds = asked(e, state.schema).holds
 
         def ask(*values: Value) -> bool:
-            given = dict(zip(names, values, strict=True))
-            require_params(given)
+            given = _given(names, values)
             with lock:
                 return holds(state, given)
 
@@ -133,8 +133,7 @@ class ReadyQuestions:
         answers = queried(e, state.schema, names).answers
 
         def query(*values: Value) -> list[Binding]:
-            given = dict(zip(names, values, strict=True))
-            require_params(given)
+            given = _given(names, values)
             with lock:
                 return answers(state, given)
 
@@ -142,9 +141,19 @@ class ReadyQuestions:
 
     def _bound(self, source: Source, names: tuple[str, ...]) -> Callable[..., Any]:
         def judge(values: tuple[Value, ...]) -> None:
-            require_params(dict(zip(names, values, strict=True)))
+            _given(names, tuple(value for value in values if value is not MISSING))
 
         return source.bound(self._state, lock=self._lock, judge=judge)
+
+
+def _given(names: tuple[str, ...], values: tuple[Value, ...]) -> dict[str, Value]:
+    """The values by the parameters' names, judged."""
+    if len(names) != len(values):
+        said = ", ".join(f"?{name}" for name in names) or "none"
+        raise InputError(f"the question takes the values of its parameters ({said}), not {len(values)} values")
+    given = dict(zip(names, values, strict=True))
+    require_params(given)
+    return given
 
 
 _Sources = dict[tuple[str, ...], Source | None]

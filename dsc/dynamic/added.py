@@ -19,6 +19,7 @@ class Added:
 
     def __init__(self, plot: ActionPlot) -> None:
         self._names = {name for name, _, _ in plot.walk()}
+        self._events = {*plot.receives, *plot.emits}
         self._declared = plot.parameters, plot.variables, plot.outputs
         self.variables: dict[str, Variable] = {}
 
@@ -26,6 +27,12 @@ class Added:
         """A name for a state, as near as may be to the one that is wanted."""
         name = _unused(wanted, self._names)
         self._names.add(name)
+        return name
+
+    def event(self, wanted: str) -> str:
+        """A name for an event inside, as near as may be to the one that is wanted."""
+        name = _unused(wanted, self._events)
+        self._events.add(name)
         return name
 
     def variable(self, wanted: str, type_: str, initial: Any = None) -> str:

@@ -4,17 +4,21 @@ A handler that interrupts adds to every state that can rest a way to a state for
 The others stand in regions of their own beside the whole plot, one for each event:
 
     active { plot: ... ended_reached | low_bat: awaited <-> handled }  --> ended
+
+What a handler listens to is activated when that whole is entered, and never again: an activation that is made while its
+condition holds would bring the event at once. The whole says inside what it has heard, by an event of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from dsc.dynamic.added import Added
 from dsc.dynamic.outcomes import Plots
 from dsc.dynamic.redirecting import Way, redirected
+from dsc.dynamic.steps import mentioned_in
 from dsc.events import DONE, FAILURES
-from dsc.model.actions import Internal, Tell
+from dsc.model.actions import Emit, Internal, Tell
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.rules import Handler
 from dsc.model.states import AnyState, CompositeState, FinalState, OrthogonalState, Region, State, SubmachineState
@@ -22,6 +26,7 @@ from dsc.model.transitions import Transition
 from knowledge_base.language.expression import Variable
 
 States = dict[str, AnyState]
+_EVENT = "event."
 BESIDE = "active"
 """Name of the state that holds the plot and its handlers side by side, as long as none of its own is called so."""
 
@@ -42,18 +47,21 @@ def with_handlers(
         UnknownNameError: a handler uses a plot that is not there.
     """
     interrupting = [one for one in written.handlers if one.interrupt]
-    beside = [one for one in written.handlers if not one.interrupt]
-    handling = _Handling(plots, added)
+    listening = {one.on: added.event(f"{one.on}_heard") for one in written.handlers if one.listen is not None}
+    handling = _Handling(plots, added, listening)
     if interrupting:
         states = handling.interrupted(plot.states, interrupting, entrances)
         plot = plot.model_copy(update={"states": states})
-    return handling.beside(plot, beside) if beside else plot
+    if listening or len(interrupting) < len(written.handlers):
+        return handling.around(plot, written.handlers)
+    return plot
 
 
 class _Handling:
-    def __init__(self, plots: Plots, added: Added) -> None:
+    def __init__(self, plots: Plots, added: Added, listening: Mapping[str, str]) -> None:
         self._plots = plots
         self._added = added
+        self._listening = listening
 
     def interrupted(
         self, states: Mapping[str, AnyState], handlers: list[Handler], entrances: Mapping[str, str]
@@ -71,26 +79,31 @@ class _Handling:
         return result
 
     def _interrupted(self, name: str, state: State, handlers: list[Handler], back: str) -> States:
-        on, entry, more = dict(state.on), list(state.entry), dict[str, AnyState]()
+        on, more = dict(state.on), dict[str, AnyState]()
         for handler in handlers:
             handled = self._added.state(f"{name}_{handler.on}_handled")
             more[handled] = self._handled(handler, back)
-            on[handler.on] = (*on.get(handler.on, ()), _way(handler, handled))
-            if handler.listen is not None:
-                entry.append(handler.listen)
-        return {name: state.model_copy(update={"on": on, "entry": tuple(entry)}), **more}
+            heard = self._heard(handler.on)
+            on[heard] = (*on.get(heard, ()), _way(handler, handled))
+        return {name: state.model_copy(update={"on": on}), **more}
 
-    def beside(self, plot: ActionPlot, handlers: list[Handler]) -> ActionPlot:
-        """The plot as one region, and one for each event."""
+    def around(self, plot: ActionPlot, handlers: Iterable[Handler]) -> ActionPlot:
+        """The plot as one region, and one for each event that is handled beside it; the whole listens."""
+        handlers = list(handlers)
+        beside = [handler for handler in handlers if not handler.interrupt]
         reached = {name: self._added.state(f"{name}_reached") for name in _ends(plot)}
         first = initial_of(plot)
         regions = {"plot": Region(states=_inside(plot, reached), initial=reached.get(first, first))}
-        for event in dict.fromkeys(handler.on for handler in handlers):
-            mine = [handler for handler in handlers if handler.on == event]
+        for event in dict.fromkeys(handler.on for handler in beside):
+            mine = [handler for handler in beside if handler.on == event]
             regions[f"on_{event}"] = Region(states=self._awaiting(event, mine))
         over = {name: _told_its_attributes(end) for name, end in _ends(plot).items()}
         on = {reached[name]: (Transition(target=name),) for name in over}
-        around = OrthogonalState(regions=regions, on=on)
+        for event, heard in self._listening.items():
+            mentioned = [mentioned_in(handler) for handler in handlers if handler.on == event]
+            on[event] = (_passed_on(heard, frozenset().union(*mentioned)),)
+        entry = tuple([handler.listen for handler in handlers if handler.listen is not None])
+        around = OrthogonalState(regions=regions, entry=entry, on=on)
         return plot.model_copy(update={"states": {self._added.state(BESIDE): around, **over}, "initial": None})
 
     def _awaiting(self, event: str, handlers: list[Handler]) -> States:
@@ -102,8 +115,10 @@ class _Handling:
                 handled = self._added.state(f"{event}_handled")
                 more[handled] = self._handled(handler, awaited)
             ways.append(_way(handler, handled))
-        listening = tuple(handler.listen for handler in handlers if handler.listen is not None)
-        return {awaited: State(entry=listening, on={event: tuple(ways)}), **more}
+        return {awaited: State(on={self._heard(event): tuple(ways)}), **more}
+
+    def _heard(self, event: str) -> str:
+        return self._listening.get(event, event)
 
     def _handled(self, handler: Handler, back: str) -> AnyState:
         do, onward = handler.do, (Transition(target=back),)
@@ -135,7 +150,13 @@ def _inside(plot: ActionPlot, reached: Mapping[str, str]) -> States:
 
 def _told_its_attributes(end: FinalState) -> FinalState:
     """An end of the plot that hears from the region what it hands on."""
-    return end.model_copy(update={"arguments": {key: Variable(f"event.{key}") for key in end.arguments}})
+    return end.model_copy(update={"arguments": {key: Variable(_EVENT + key) for key in end.arguments}})
+
+
+def _passed_on(heard: str, mentioned: Iterable[str]) -> Transition:
+    """Says inside that the event has come, with those of its attributes that handlers want to know."""
+    known = sorted(name.removeprefix(_EVENT) for name in mentioned if name.startswith(_EVENT))
+    return Transition(target=None, do=(Emit(emit=heard, arguments={key: Variable(_EVENT + key) for key in known}),))
 
 
 def _way(handler: Handler, target: str | None) -> Transition:

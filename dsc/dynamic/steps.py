@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dsc.dynamic.outcomes import Plots
 from dsc.model.actions import Configure, Send, Switch
 from dsc.model.plot import ActionPlot
-from dsc.model.rules import STEP, Command, Rule
+from dsc.model.rules import STEP, Command, Handler, Response, Rule
 from dsc.model.states import DynamicState, SubmachineState
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.effect import mentioned, quantified_in, substitute_effect
@@ -42,10 +42,11 @@ def concerns(rule: Rule, name: str, step: Step, plots: Plots) -> bool:
     return not rule.steps or name in rule.steps or action_of(step, plots) in rule.steps
 
 
-def mentioned_in(rule: Rule) -> frozenset[str]:
-    """The variables that a rule's condition and response read."""
+def mentioned_in(rule: Rule | Handler) -> frozenset[str]:
+    """The variables that the condition and response of a rule or handler read."""
     do = rule.do
-    terms = [*do.arguments.values(), *do.passed.values(), *(term for c in do.command for term in terms_of(c).values())]
+    passed = do.passed.values() if isinstance(do, Response) else ()
+    terms = [*do.arguments.values(), *passed, *(term for c in do.command for term in terms_of(c).values())]
     found = frozenset[str]().union(*map(free_variables, terms))
     found |= frozenset() if rule.when is None else free_variables(rule.when)
     return found if do.tell is None else found | mentioned(do.tell)

@@ -87,14 +87,20 @@ def compact(
 ) -> None:
     """Forget a store's past and make its file smaller; keys of changes are remembered."""
     with writable(store) as kb:
-        before = store.stat().st_size
+        before = _size(store)
         kb.compact(kb.version if keep is None else kb.at(**moment(keep)).version)
-        said = {"oldest": kb.oldest, "version": kb.version, "bytes_before": before, "bytes": store.stat().st_size}
+        said = {"oldest": kb.oldest, "version": kb.version, "bytes_before": before, "bytes": _size(store)}
     if json:
         print_json(said)
         return
     sizes = f"{said['bytes'] / 1000:,.0f} kB, before {before / 1000:,.0f} kB"
     typer.echo(f"versions {said['oldest']} to {said['version']} are kept: {sizes}")
+
+
+def _size(store: Path) -> int:
+    """In bytes, with what SQLite has beside the file and will put into it."""
+    log = store.with_name(store.name + "-wal")
+    return store.stat().st_size + (log.stat().st_size if log.exists() else 0)
 
 
 def _change(

@@ -10,6 +10,8 @@ from knowledge_base.language.joins import Conjunct, Range, Step, candidates
 from knowledge_base.language.terms import same
 from knowledge_base.schema import ROOT_TYPE, Schema
 
+MISSING = object()
+"""Stands for a value that was not given."""
 _INDENT = "    "
 
 
@@ -30,7 +32,7 @@ class Author:
     def __init__(
         self, steps: list[Step], schema: Schema, params: Sequence[str], answers: tuple[str, ...] | None
     ) -> None:
-        self.constants: dict[str, object] = {"same": same}
+        self.constants: dict[str, object] = {"same": same, "missing": MISSING}
         self._steps = dict(enumerate(steps))
         self._schema = schema
         self._params = params
@@ -59,10 +61,10 @@ class Author:
             answer = f"search({', '.join(given)})"
             self._line(0, f"def search({', '.join(given)}):")
             self._search()
-        self._line(0, f"def question({', '.join([*given, '/'] if given else [])}):")
-        if given:
-            odd = " or ".join(f"type({name}) is not str" for name in given)
-            self._line(1, f"if {odd}: judge(({', '.join(given)},))")
+        head = [*(f"{name}=missing" for name in given), *(["/"] if given else []), "*more"]
+        self._line(0, f"def question({', '.join(head)}):")
+        odd = " or ".join([*(f"type({name}) is not str" for name in given), "more"])
+        self._line(1, f"if {odd}: judge(({''.join(f'{name}, ' for name in given)}*more,))")
         self._line(1, "before = stamp.version")
         self._line(1, "if before is not None:")
         self._line(2, "try:")

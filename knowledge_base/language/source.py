@@ -40,7 +40,8 @@ class Source:
     """A function's code, to be made a function for each world.
 
     It takes the values of the parameters in order. Its names are those that `bound` gives it; and, unless it is a bare
-    test, `lock`, and `judge`, which is given all values if one is no plain text.
+    test, `lock`, and `judge`, which is given all values if one is no plain text or `MISSING`, or if
+    there are too many.
     """
 
     code: CodeType

@@ -221,16 +221,19 @@ WARN = """
 """
 
 
-def test_a_handler_listens_to_a_component_as_long_as_the_plot_is_active():
+@pytest.mark.parametrize(("interrupt", "warned"), [("", [20.0]), ("        interrupt: true\n", [20.0])])
+def test_a_handler_listens_to_a_component_as_long_as_the_plot_is_active(interrupt, warned):
+    """The event comes once, when its condition begins to hold: coming back to what went on is no new beginning."""
+
     async def main():
         battery, voice = Battery(), Voice()
-        library = Library([plot(WATCH.replace("        INTERRUPT\n", "")), plot(WARN)])
+        library = Library([plot(WATCH.replace("        INTERRUPT\n", interrupt)), plot(WARN)])
         sequencer = Sequencer(library, KnowledgeBase(Schema()), [battery, voice], LoopClock())
         return await sequencer.run("watch"), voice.said
 
     end, said = run_simulated(main())
     assert end.finished
-    assert said[0] == 20.0
+    assert said == warned
     assert end.problem is None
 
 

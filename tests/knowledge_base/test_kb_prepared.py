@@ -128,6 +128,10 @@ def test_a_prepared_question_says_what_is_wrong(kb) -> None:
         below.ask("shelf")
     with pytest.raises(InputError, match="'\\?place' is a name, a number or a truth value, not None"):
         below.query(None)
+    heavy = kb.prepare("(and (on ?x ?p) (> (weight ?x) ?least))", "p", "least")
+    for ask, values in ((below.query, ()), (below.query, ("shelf", 1)), (heavy.query, ("shelf",)), (kb.prepare("(quiet)").ask, (1,))):
+        with pytest.raises(InputError, match=f"takes the values of its parameters .*, not {len(values)} values"):
+            ask(*values)
     with pytest.raises(SchemaError, match="cannot be a geometry"):
         below.query((1.0, 2.0))
     with pytest.raises(InputError, match="'\\?place' is a name, a number or a truth value, not \\['shelf'\\]"):
