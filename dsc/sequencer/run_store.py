@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output
@@ -23,6 +23,9 @@ from knowledge_base.store import KnowledgeBase
 _STEP = "INSERT INTO steps VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
 _BEGIN = "INSERT INTO runs (plot, arguments, version, header, plots, domain) VALUES (?, ?, ?, ?, ?, ?)"
 _MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE place = (SELECT max(place) FROM steps)"
+
+Boundary = Literal["before commit", "after commit"]
+"""Where a process that dies makes a difference: either nothing of the macrostep was, or nothing has left yet."""
 
 
 class RunStore:
@@ -58,6 +61,7 @@ class RunStore:
         self._domain = domain or {}
         self._run = self._number = self._before = 0
         self._records: list[str] = []
+        self._listeners: list[Callable[[Boundary], None]] = []
         self._short = Shortener(self._put_form)
         self._present = Present(self._short)
         with knowledge.together() as connection:
@@ -73,6 +77,10 @@ class RunStore:
         """A record of the trace, to be kept with the next macrostep."""
         self._records.append(record.to_line())
 
+    def listen(self, listener: Callable[[Boundary], None]) -> None:
+        """Tell `listener` from now on when something is about to be committed, and when it has been."""
+        self._listeners.append(listener)
+
     @contextmanager
     def writing(self) -> Iterator[None]:
         """One transaction: what is committed to the knowledge inside, and what is written with the methods below.
@@ -85,10 +93,12 @@ class RunStore:
                 self._require_right()
                 self._before = self._knowledge.version
                 yield
+                self._tell("before commit")
         except BaseException:
             self.lost = True
             raise
         self.begun = True
+        self._tell("after commit")
 
     def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> int:
         """Make a new run; the knowledge is what is known at its start.
@@ -172,6 +182,10 @@ class RunStore:
         late = [one.what.number for one in kept.pending if isinstance(one.what, LateMessage)]
         self.last_late = max(late, default=0)
         return kept
+
+    def _tell(self, boundary: Boundary) -> None:
+        for listener in self._listeners:
+            listener(boundary)
 
     def _new_records(self) -> str:
         """What was heard since the last time, one record a line."""

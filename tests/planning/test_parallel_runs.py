@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from order_strategies import Planned, planned
 from trace_replay import Replay
 
-from domains.simulation import uniform
+from dsc.chance import uniform
 from dsc import ActionPlot, Component, Outcome, skill
 from dsc.trace import Record
 from knowledge_base.language.printer import to_text
