@@ -1,10 +1,8 @@
-"""One simulated run of the clean-up table with faults and crashes, all drawn from its seed, and what must hold of it."""
+"""One simulated run of the clean-up table with faults and crashes, drawn from its seed, and what must hold of it."""
 
 from __future__ import annotations
 
-import asyncio
 import signal
-import tempfile
 import threading
 from collections import Counter
 from collections.abc import Iterator
@@ -14,26 +12,29 @@ from pathlib import Path
 
 from domains.clean_up_table.deployment import CleanUpTable, deploy, resumed
 from domains.clean_up_table.faults import ITEM_MOVED
-from domains.clean_up_table.items import CRISP_CAN, HAND
+from domains.clean_up_table.items import HAND
 from domains.clean_up_table.places import SURFACES
 from domains.clean_up_table.report import Report
 from domains.clean_up_table.scenario import Scenario, Table
 from domains.clean_up_table.world import World
 from domains.clean_up_table.world_file import LastingWorld, beside
-from dsc.chance import choose, uniform
+from dsc.chance import choose
+from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
-from dsc.sequencer.run_tables import archive, has_run
+from dsc.sequencer.run_tables import has_run
 from dsc.sequencer.sequencer import Sequencer
 from dsc.testing.crashes import Crashes
 from dsc.testing.faults import USUAL, Fault, Faults
 from dsc.testing.invariants import (
+    Invariant,
     KeptRun,
     claims_nothing_false,
     comes_to_an_end,
     executed_once,
+    kept_run,
     knows,
     one_history,
-    violations,
+    replays,
 )
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.store import KnowledgeBase
@@ -47,9 +48,15 @@ MOST_STEPS = 5_000
 """Macrosteps of one life."""
 A_HANG = 120
 """Seconds of real time after which a run is one."""
-DEFAULT_EVERY = 40
+DEFAULT_EVERY = 100
 """One table in so many is the default one; the others are small."""
+REPLAYED_EVERY = 3
+"""One run in so many is replayed, which takes as long as the run."""
+PLAIN = frozenset({Fault.KNOWLEDGE_CHANGED, Fault.ANSWER_LATE, Fault.ANSWER_TWICE})
+"""What does not keep the robot from anything."""
 PREDICATES = ("robot-at", "hand-free", "holding", "inside", "lies-at", "disposed")
+
+_PLACES = {"lies-at", "inside"}
 
 
 class HangError(BaseException):
@@ -109,7 +116,8 @@ class Trial:
         self._seed = seed
         self._chance = chance
         self._planners = planners
-        kinds = USUAL if seed % 2 else {Fault.KNOWLEDGE_CHANGED, Fault.ANSWER_LATE, Fault.ANSWER_TWICE}
+        self._library: Library | None = None
+        kinds = USUAL if seed % 2 else PLAIN
         self._faults = Faults(seed, chance / 4, kinds)
         self._crashes: Crashes[Report | None] = Crashes(folder, seed)
 
@@ -135,12 +143,13 @@ class Trial:
         if not has_run(store):
             table = deploy(scenario(self._seed), self._seed, self._chance, planner, store=store)
         else:
-            self._must("executed twice", store, executed_once(done(store)))
-            with archive(store) as runs:
-                if runs.run().ended is not None:
+            with kept_run(store) as run:  # as it was left by a program that has died
+                self._must(run, "executed twice", executed_once(done(store)))
+                if run.ended is not None:
                     return None
             table = resumed(store, planner)
         with table:
+            self._library = table.executive.library
             for component in table.executive.components:
                 self._crashes.inject(self._faults.inject(component))
             return table.run(prepare=lambda sequencer: self._prepare(table, sequencer))
@@ -159,38 +168,49 @@ class Trial:
         self._crashes.watch(sequencer)
 
     def _judge(self, report: Report | None) -> None:
+        """What is in the files after the last life, against what has become of the world."""
         outcome, store = self.outcome, self._crashes.folder / "run.kb"
         world = LastingWorld.open(beside(store))
         world.close()
         outcome.faults += Counter(f"{one.kind}{' (permanent)' if one.permanent else ''}" for one in world.fired)
-        self._must("no report", store, comes_to_an_end(LONGEST))
-        self._must("executed twice", store, executed_once(world.done), one_history)
-        with KnowledgeBase.open(None, store, read_only=True) as knowledge:
-            facts = list(truth(world, knowledge))
-        self._must("knowledge is not so", store, knows(facts, PREDICATES))
-        for_all = not world.touched() and all(item.seen for item in world.items)
-        self._must("false claim", store, claims_nothing_false(says_all_is_clear, reached=for_all and world.goal_reached))
-        with archive(store) as runs:
-            run = runs.run()
-            outcome.steps = sum(1 for _ in runs.steps(run.number))
-            ended = run.ended
-        if ended is not None:
-            left = "goal reached" if world.goal_reached else "something left"
-            outcome.how = left if ended["problem"] is None else "ended early"
-        if report is not None and report.goal_reached != (world.goal_reached and report.problem is None):
-            outcome.wrong.append(("false claim", f"{report.left} are left and the goal is said to be reached"))
+        with kept_run(store) as run:
+            cleared = all(item.disposed for item in world.items if item.seen)
+            self._must(run, "no report", comes_to_an_end(LONGEST))
+            self._must(run, "executed twice", executed_once(world.done))
+            self._must(run, "another history", one_history)
+            if self._seed % REPLAYED_EVERY == 0:
+                self._must(run, "another history", replays(self._library))
+            self._must(run, "knowledge is not so", knows(truth(world, run.knowledge), PREDICATES))
+            self._must(run, "false claim", claims_nothing_false(says_all_is_clear, reached=cleared))
+            outcome.steps = len(run.steps)
+            if run.ended is not None:
+                left = "goal reached" if world.goal_reached else "something left"
+                outcome.how = left if run.ended["problem"] is None else "ended early"
+        if report is not None and report.goal_reached and not world.goal_reached:
+            outcome.wrong.append(("false claim", "the report says that the goal is reached"))
+        if self._faults.kinds == PLAIN and report is not None:
+            outcome.wrong += [("false claim", wrong) for wrong in dishonest(world, report)]
 
-    def _must(self, promise: str, store: Path, *invariants) -> None:
-        self.outcome.wrong += [(promise, wrong) for wrong in violations(store, invariants)]
+    def _must(self, run: KeptRun, promise: str, invariant: Invariant) -> None:
+        self.outcome.wrong += [(promise, wrong) for wrong in invariant(run)]
 
 
 def scenario(seed: int) -> Scenario:
     """The table of a seed."""
     if seed % DEFAULT_EVERY == 0:
         return Scenario.default()
-    cups, cans = (choose(seed, "table", what, (0, 1, 1, 2)) for what in ("cups", "cans"))
-    crisp_cans = choose(seed, "table", "crisp cans", ((), ("small",), ("large",)))
+    cups, cans = choose(seed, "table", "cups", (0, 1, 1, 2)), choose(seed, "table", "cans", (0, 0, 1, 2))
+    crisp_cans = choose(seed, "table", "crisp cans", ((), (), ("small",), ("large",)))
     return Scenario(table=Table(cups=cups or int(not cans and not crisp_cans), cans=cans, crisp_cans=crisp_cans))
+
+
+def dishonest(world: World, report: Report) -> Iterator[str]:
+    """The report against the world, where nothing but what is permanent keeps the robot from anything."""
+    left = {one.item for one in report.left}
+    if report.problem is not None:
+        yield f"the run ended early: {report.problem}"
+    if left != world.touched():
+        yield f"left are {sorted(left)}, and permanent faults have touched {sorted(world.touched())}"
 
 
 def done(store: Path) -> list[str]:
@@ -203,15 +223,13 @@ def done(store: Path) -> list[str]:
 def moved(world: World, knowledge: KnowledgeBase) -> list[Delta]:
     """What somebody who saw it could say: where an item is now that somebody has moved."""
     names = {name for fault in world.fired if fault.kind == ITEM_MOVED for name in fault.items}
-    items = [world.items[name] for name in sorted(names)]
-    return [
-        Delta(
-            removed=(fact("missing", item.name), *(fact("lies-at", item.name, at) for at in SURFACES if at != item.where)),
-            added=(fact("lies-at", item.name, item.where),),
-        )
-        for item in items
-        if item.where in SURFACES and knowledge.type_of(item.name) is not None
-    ]
+    items = [world.items[name] for name in sorted(names) if knowledge.type_of(name) is not None]
+    return [_lies(item.name, item.where) for item in items if item.where in SURFACES]
+
+
+def _lies(item: str, where: str) -> Delta:
+    elsewhere = (fact("lies-at", item, other) for other in SURFACES if other != where)
+    return Delta(removed=(fact("missing", item), *elsewhere), added=(fact("lies-at", item, where),))
 
 
 def truth(world: World, knowledge: KnowledgeBase) -> Iterator[Fact]:
@@ -231,7 +249,7 @@ def truth(world: World, knowledge: KnowledgeBase) -> Iterator[Fact]:
         if item.disposed:
             yield fact("disposed", item.name)
         if item.name in excused:
-            yield from (one for one in believed.facts if one.predicate in {"lies-at", "inside"} and one.args[0] == item.name)
+            yield from (one for one in believed.facts if one.predicate in _PLACES and one.args[0] == item.name)
         elif item.where == HAND:
             yield fact("holding", item.name)
         elif item.where in SURFACES:
@@ -242,9 +260,7 @@ def truth(world: World, knowledge: KnowledgeBase) -> Iterator[Fact]:
 
 def says_all_is_clear(run: KeptRun) -> bool:
     """Whether the robot has told the operator so."""
-    return any(
-        one.data["chosen"] == "announce_success" for one in run.records if one.type == "decision"
-    )
+    return any(one.data["chosen"] == "announce_success" for one in run.records if one.type == "decision")
 
 
 @contextmanager

@@ -169,8 +169,6 @@ def _wired(
     store: Path | None = None,
     durability: Durability = "process",
 ) -> CleanUpTable:
-    domain = PlanningDomain.from_pddl(HOME / "domain.pddl")
-
     def believed(surface: str) -> list[str]:
         knowledge = executive.knowledge
         lying = [str(found["item"]) for found in knowledge.query("(lies-at ?item ?at)", {"at": surface})]
@@ -180,7 +178,7 @@ def _wired(
 
     components = [Base(world), Arm(world), Camera(world, believed), Voice(world)]
     executive = Executive(
-        domain, plots(), components, None, planner, foresight=Physics(), store=store, durability=durability
+        domain(), plots(), components, None, planner, foresight=Physics(), store=store, durability=durability
     )
     executive.knowledge.apply(initial_knowledge(world), "deployment", key="deployment")
     deployed = CleanUpTable(world, executive)
@@ -194,6 +192,12 @@ def _wired(
 def plots() -> tuple[ActionPlot, ...]:
     """The plots of this domain; read once, since plots never change."""
     return tuple(load_library(HOME / "plots"))
+
+
+@cache
+def domain() -> PlanningDomain:
+    """The planning domain; read once, too."""
+    return PlanningDomain.from_pddl(HOME / "domain.pddl")
 
 
 class _SceneWriter:

@@ -30,7 +30,7 @@ _Result = TypeVar("_Result")
 _Component = TypeVar("_Component", bound=Component)
 
 
-class Killed(SystemExit):  # noqa: N818  asyncio lets nothing else but this out of a loop at once
+class Killed(SystemExit):
     """The program has died here."""
 
 
@@ -96,7 +96,8 @@ class Crashes(Generic[_Result]):
                     return self._heir.result(self.problems)
                 if not self._disk_full:
                     raise
-                self._next()
+                self._leave_behind()
+                self.life += 1
             else:
                 return result if self._heir is None else self._heir.result(self.problems)
 
@@ -106,10 +107,7 @@ class Crashes(Generic[_Result]):
         assert store is not None  # noqa: S101  without one there is nothing to be resumed
 
         def boundary(what: Boundary) -> None:
-            if what == "before commit":
-                happens = self._drawn(what, (KILLED,))
-            else:
-                happens = self._drawn(what, _AFTER_COMMIT)
+            happens = self._drawn(what, (KILLED,) if what == "before commit" else _AFTER_COMMIT)
             if happens == KILLED:
                 self._leave_behind()
                 raise Killed
@@ -153,12 +151,9 @@ class Crashes(Generic[_Result]):
         return what
 
     def _leave_behind(self) -> None:
+        """What the next life finds; nothing happens any more to the program that dies."""
         self._calm = True
         _copy(self.folder, self._root / f"life{self.life + 1}")
-
-    def _next(self) -> None:
-        self._leave_behind()
-        self.life += 1
 
 
 class _Heir(Generic[_Result]):

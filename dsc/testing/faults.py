@@ -15,7 +15,7 @@ from enum import StrEnum
 from typing import Any, NoReturn, TypeVar
 
 from dsc.chance import choose, uniform
-from dsc.components.life import Life
+from dsc.components.life import Life, LifeCycle
 from dsc.engine.steps import Start, Step
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import Component, Outcome, SkillCall
@@ -161,7 +161,7 @@ class _Injected:
             await _never(call)
         if fault is Fault.COMPONENT_DIES:
             life = self._component.life
-            asyncio.get_running_loop().call_later(DEAD, lambda: life.state is Life.FATAL_ERROR and life.become(Life.ALIVE))
+            asyncio.get_running_loop().call_later(DEAD, _revive, life)
             life.become(Life.FATAL_ERROR, "it was to die")
             await _never(call)
 
@@ -182,6 +182,11 @@ class _Injected:
                     call.report(outcome)
 
         return report
+
+
+def _revive(life: LifeCycle) -> None:
+    if life.state is Life.FATAL_ERROR:
+        life.become(Life.ALIVE)
 
 
 async def _never(call: SkillCall) -> NoReturn:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dsc.dynamic.library import Library
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_tables import StepRow, archive
 from dsc.trace import Record
@@ -120,10 +120,22 @@ def claims_nothing_false(claims: Callable[[KeptRun], bool], *, reached: bool) ->
 
 
 def one_history(run: KeptRun) -> Iterable[str]:
-    """Its macrosteps follow one another, and the messages that were taken lead to the same once more."""
+    """Its macrosteps follow one another: nobody else has written any beside."""
     numbers = [step.number for step in run.steps]
     if numbers != list(range(1, len(numbers) + 1)):
         yield f"its macrosteps are numbered {numbers}"
-    divergence = replay(run.path).divergence
-    if divergence is not None:
-        yield f"its replay: {divergence}"
+
+
+def replays(library: Library | None = None) -> Invariant:
+    """The messages that were taken lead to the same once more.
+
+    Args:
+        library: the plots it was begun with, which are read from the store if left out.
+    """
+
+    def invariant(run: KeptRun) -> Iterable[str]:
+        divergence = replay(run.path, library=library).divergence
+        if divergence is not None:
+            yield f"its replay: {divergence}"
+
+    return invariant
