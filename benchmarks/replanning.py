@@ -22,7 +22,7 @@ from knowledge_base.language.printer import to_text
 from planning import Executive, PlanStep
 from planning.domain import PlanningAction
 from planning.engines.race import PlannerRace
-from planning.execution import component, search
+from planning.execution import plotting, search
 from planning.plan import PlanFound, PlanningOutcome
 from planning.strips import Problem
 
@@ -31,7 +31,7 @@ OURS = tuple(part for part in PARTS if part != "engine")
 _WRAPPED = (
     (search, "mending", "mend"), (search, "pose", "pose"), (search, "validate", "validate"),
     (Problem, "to_json", "translate"),
-    (component, "deordered", "de-order"), (component, "plot_from_plan", "generate"),
+    (plotting, "deordered", "de-order"), (plotting, "plot_from_plan", "generate"),
 )  # fmt: skip
 
 

@@ -108,6 +108,9 @@ def run(
     faults: Annotated[
         float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")
     ] = None,
+    profile: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="Which robot, and what its parameters are worth (YAML).")
+    ] = None,
     real_time: Annotated[bool, typer.Option("--real-time", help="Let time pass as on the wall.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
     trace: Annotated[Path | None, typer.Option(help="Write every record to this file (JSON lines).")] = None,
@@ -123,12 +126,16 @@ def run(
     no_wait: Annotated[bool, typer.Option("--no-wait", help="With --view: end with the run, not at Ctrl-C.")] = False,
 ) -> None:
     """Run a ready world. Exit status: 0 goal reached, 1 something is left (the report says what and why)."""
-    from domains.clean_up_table.deployment import deploy, resumed
+    from domains.clean_up_table.deployment import PROFILES, deploy, resumed
     from domains.clean_up_table.scenario import Scenario
+    from dsc.text.profiles import find_profile
     from knowledge_base.errors import InputError, UnknownNameError
 
     if resume is not None:
-        beginning = {"WORLD": world, "--scenario": scenario, "--seed": seed, "--faults": faults, "--store": store}
+        beginning = {
+            "WORLD": world, "--scenario": scenario, "--seed": seed, "--faults": faults, "--store": store,
+            "--profile": profile,
+        }  # fmt: skip
         given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
         if given:
             raise InputError(f"a run is resumed as it was begun: --resume does not go with {', '.join(given)}")
@@ -139,7 +146,8 @@ def run(
         if world not in WORLDS:
             raise UnknownNameError(f"there is no world '{world}'", found=world, valid=WORLDS)
         chosen = Scenario.load(scenario) if scenario is not None else Scenario.default()
-        deployed = deploy(chosen, seed, faults, store=store, durability=durability.value)
+        robot = None if profile is None else find_profile(profile, PROFILES)
+        deployed = deploy(chosen, seed, faults, store=store, durability=durability.value, profile=robot)
     follow = partial(_followed, deployed, simulated=not real_time, quiet=json, trace=trace)
     with deployed:
         if not view:

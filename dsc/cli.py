@@ -46,10 +46,11 @@ def check(
         ),
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of findings.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Warnings count, too.")] = False,
 ) -> None:
-    """Say what is wrong with plots, one finding a line.
+    """Say what is wrong with plots, one finding a line; also what is allowed and hardly meant, as warnings.
 
-    A plot may use the other plots in its folder. Exit status: 0 nothing found, 2 findings.
+    A plot may use the other plots in its folder. Exit status: 0 nothing found, or warnings alone, 2 findings.
     """
     from dsc.text.neighbours import Neighbours
 
@@ -62,7 +63,8 @@ def check(
             typer.echo(f"{finding}" if finding.place else f"{file}: {finding}")
         if not found:
             typer.echo(f"{len(files)} plot{'s' * (len(files) != 1)} checked, nothing found")
-    raise typer.Exit(BAD_INPUT if found else 0)
+    wrong = [finding for _, finding in found if strict or finding.level == "error"]
+    raise typer.Exit(BAD_INPUT if wrong else 0)
 
 
 @app.command()
@@ -168,24 +170,27 @@ def diff(
 
 
 @app.command()
-def schema() -> None:
+def schema(
+    profile: Annotated[bool, typer.Option("--profile", help="That of profiles instead.")] = False,
+) -> None:
     """Print the JSON Schema of plot files, for editors."""
+    from dsc.text.profiles import profile_schema
     from dsc.text.schema import json_schema
 
-    _print_json(json_schema())
+    _print_json(profile_schema() if profile else json_schema())
 
 
 def _findings(file: Path, domain: Path | None, neighbours: Neighbours) -> list[Finding]:
     """What is wrong with one file; what cannot be read at all is one finding."""
     from dsc.errors import Finding
-    from dsc.validation import validate_plot
+    from dsc.validation import review_plot, validate_plot
     from knowledge_base.errors import InputError
 
     known = _schema(file, domain)
     try:
         plot = _load(file)
         library, broken = neighbours.of(file, plot)
-        findings = validate_plot(plot, library, known)
+        findings = validate_plot(plot, library, known) or review_plot(plot, library)
     except InputError as error:
         return [Finding(error, "readable")]
     if any(finding.rule == UNKNOWN_PLOT for finding in findings):
@@ -230,6 +235,7 @@ def _as_data(file: Path, finding: Finding) -> dict[str, Any]:
         "nearest": error.nearest,
         "rule": finding.rule,
         "fix": finding.fix or None,
+        "level": finding.level,
     }
 
 

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from knowledge_base.errors import InputError, Place
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing wrong with a plot: where, which rule of the profile, and what to do."""
+    """One thing wrong with a plot: where, which rule of the profile, and what to do.
+
+    A `warning` is about what is allowed and hardly meant; a plot with warnings runs.
+    """
 
     error: InputError
     rule: str
     fix: str = ""
+    level: Literal["error", "warning"] = "error"
 
     @property
     def place(self) -> Place | None:
@@ -23,7 +28,8 @@ class Finding:
 
     def __str__(self) -> str:
         """One line for people."""
-        return f"{self.error}" + (f" ({self.fix})" if self.fix else "")
+        text = f"{self.error}" + (f" ({self.fix})" if self.fix else "")
+        return text if self.level == "error" else f"{text} [{self.level}]"
 
 
 class PlotError(InputError):

@@ -25,6 +25,7 @@ from typing import Any, ClassVar, Literal, Protocol, TypeVar, cast
 from dsc.components.activations import Activations
 from dsc.components.blocking import in_process, in_thread
 from dsc.components.life import Life, LifeCycle
+from dsc.components.parameters import Parameter, check_relations, known
 from dsc.events import EXECUTIVES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta
@@ -223,6 +224,8 @@ class Component:
         concurrent: whether it can carry out several skills at once. Steps of a plan that use one which cannot never
             overlap; what plots start side by side is their own affair.
         modes: the sub-states it has while Alive, besides `neutral`; if it names none, any may be asked for.
+        declares: its parameters with type, range and who may change them; if it names none, any may be set.
+        relations: conditions between its parameters that always hold.
         needs: mode -> names of the components it needs then; `ALWAYS`: in every mode.
         activations: who has activated its events.
         life: where it is in its life; `self.life.become(Life.FATAL_ERROR, "no power")` when the device is gone.
@@ -232,12 +235,16 @@ class Component:
     domain: ClassVar[Path | str | None] = None
     concurrent: bool = False
     modes: ClassVar[tuple[str, ...]] = ()
+    declares: ClassVar[Mapping[str, Parameter]] = {}
+    relations: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
         self.mode = NEUTRAL
-        self.parameters: dict[str, Any] = {}
+        self.parameters: dict[str, Any] = {
+            name: one.default for name, one in self.declares.items() if one.default is not None
+        }
         self.life = LifeCycle()
         self._starting = False
         self.activations = Activations()
@@ -269,7 +276,16 @@ class Component:
         return cast(SkillBody, getattr(self, skill_name))
 
     async def configure(self, parameter: str, value: object) -> None:
-        """The *param* port: set a named parameter; override to react."""
+        """The *param* port: set a named parameter; override to react.
+
+        Raises:
+            UnknownNameError: the component declares its parameters, and this is none.
+            InputError: the value does not fit what is declared, or a relation.
+        """
+        if self.declares:
+            declared = known(self.name, parameter, self.declares)
+            value = declared.check(f"{self.name}.{parameter}", value)
+            check_relations(self.name, self.relations, {**self.parameters, parameter: value})
         self.parameters[parameter] = value
 
     async def switch(self, mode: str) -> None:

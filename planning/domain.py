@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.exchange.action_text import ActionText
 from knowledge_base.exchange.domain_text import AxiomText, DomainText, parse_domain, read_domain
-from knowledge_base.exchange.domain_writer import domain_to_text
+from knowledge_base.exchange.domain_writer import action_to_text, axiom_to_text, domain_to_text
 from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
 from knowledge_base.language.effect import Add, Delete, effect_leaves
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
@@ -25,7 +25,6 @@ from knowledge_base.language.expression import (
     Variable,
     substitute,
 )
-from knowledge_base.language.printer import to_text, variables_text
 from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.schema import ROOT_TYPE, Schema
 from planning.fragments import merged_text, searched, text_of
@@ -61,10 +60,6 @@ class PlanningAction:
     place: Place | None = field(default=None, compare=False, repr=False)
     duration: Duration | None = None
     timed: Timed | None = None
-
-    def __str__(self) -> str:
-        """What it takes, needs and does, in PDDL."""
-        return f"({self.name} {variables_text(self.parameters)} {to_text(self.precondition)} {to_text(self.effect)})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +165,15 @@ class PlanningDomain:
             computed = next(iter(self.schema.computed))
             raise InputError(f"the predicate '{computed}' is computed by Python, which PDDL cannot say", found=computed)
         return domain_to_text(text_of(self))
+
+    def statements(self) -> dict[str, str]:
+        """What plans rely on, in PDDL on one line each: the actions and derived predicates, by what they are called."""
+        text = text_of(self)
+        found = {f"planning action '{one.name}'": action_to_text(one) for one in text.actions}
+        for axiom in text.axioms:
+            name = f"derived predicate '{axiom.head.name}'"
+            found[name] = f"{found.get(name, '')} {axiom_to_text(axiom)}"
+        return {name: " ".join(one.split()) for name, one in found.items()}
 
     def applicable(self, step: PlanStep, world: World) -> bool:
         """Whether the arguments are of the parameters' types and the precondition holds."""

@@ -97,8 +97,8 @@ class Executive:
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        names = {PlanningComponent.name, *(c.name for c in self.components)}
-        findings = validate_library(self.library, self.domain.schema, skills, names)
+        declared = {PlanningComponent.name: {}, **{c.name: c.declares for c in self.components}}
+        findings = validate_library(self.library, self.domain.schema, skills, declared)
         raise_findings([*findings, *check_implementations(self.library, self.domain)])
         if knowledge is not None:
             self.knowledge = knowledge
@@ -235,8 +235,7 @@ class Executive:
     def _run_store(self, header: Mapping[str, Any]) -> RunStore | None:
         if self._store is None:
             return None
-        actions = {name: str(action) for name, action in self.domain.actions.items()}
-        return RunStore(self.knowledge, self._store, header, actions)
+        return RunStore(self.knowledge, self._store, header, self.domain.statements())
 
     def close(self) -> None:
         """End the planners' processes, if there are any of its own, and give back the store."""

@@ -12,6 +12,7 @@ import pytest
 from domains.clean_up_table import Scenario
 from dsc import load_library, load_plot, parse_plot
 from dsc.text.diagram import draw
+from dsc.text.profiles import parse_profile
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -29,9 +30,10 @@ def test_python_on_a_page_runs_from_top_to_bottom(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_yaml_on_a_page_is_a_plot_or_a_scenario(page):
+def test_yaml_on_a_page_is_a_plot_a_profile_or_a_scenario(page):
     for block in blocks(page, "yaml"):
-        (parse_plot if block.startswith("plot:") else Scenario.parse)(block, str(page))
+        read = {"plot": parse_plot, "profile": parse_profile}.get(block.partition(":")[0], Scenario.parse)
+        read(block, str(page))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -14,16 +14,20 @@ from typing import Any, Self
 from domains.clean_up_table.foresight import Physics
 from domains.clean_up_table.report import Report, summarise
 from domains.clean_up_table.scenario import Scenario
+from domains.clean_up_table.second_robot import PatientCamera, SuctionArm, Tracks
 from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
 from domains.clean_up_table.world import World
 from domains.clean_up_table.world_file import LastingWorld, beside
 from domains.tally import Tally
 from dsc.model.plot import ActionPlot
+from dsc.model.profile import Profile
+from dsc.profiles import adapted, configure
 from dsc.sequencer.run_tables import archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.skills import Component
 from dsc.text.plots import load_library
 from dsc.trace import Listener, Record
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.journal.file import Durability
 from planning.domain import PlanningDomain
 from planning.engines.planner import Planner
@@ -42,12 +46,14 @@ class CleanUpTable:
         executive: the robot program over it.
         tally: counts what happens.
         resumes: whether there is a run to go on with.
+        profile: what the robot was made after; `None` is the usual one.
     """
 
     world: World
     executive: Executive
     tally: Tally = field(default_factory=Tally)
     resumes: bool = False
+    profile: Profile | None = None
 
     def __enter__(self) -> Self:
         """Itself; `close` at the end."""
@@ -83,7 +89,7 @@ class CleanUpTable:
             if self.resumes:
                 end = self.executive.resume(prepare=ready)
             else:
-                end = self.executive.run(MAIN_PLOT, simulated=simulated, prepare=ready, header=self.header())
+                end = self.executive.run(MAIN_PLOT, simulated=simulated, prepare=ready, header=self._kept())
         except KeyboardInterrupt:
             end = RunEnd(finished=False, problem="the operator ended the run")
         return summarise(self.world, self.executive.knowledge, self.tally, end, time.perf_counter() - started)
@@ -93,6 +99,11 @@ class CleanUpTable:
         if more is not None:
             more(sequencer)
 
+    def _kept(self) -> dict[str, Any]:
+        """The header, and what a robot is made after, for who resumes the run."""
+        settings = {} if self.profile is None else {"settings": self.profile.model_dump(by_alias=True)}
+        return {**self.header(), **settings}
+
     def header(self) -> dict[str, Any]:
         """What determines a run, for the first line of its trace."""
         plots = "".join(sorted(plot.digest for plot in self.executive.library))
@@ -100,6 +111,7 @@ class CleanUpTable:
             "run": "clean-up-table",
             "seed": self.world.faults.seed,
             "faults": self.world.faults.chance,
+            **({} if self.profile is None else {"profile": self.profile.digest}),
             "chart": hashlib.sha256(plots.encode()).hexdigest()[:12],
             "domain": hashlib.sha256((HOME / "domain.pddl").read_bytes()).hexdigest()[:12],
         }
@@ -113,6 +125,7 @@ def deploy(
     listener: Listener | None = None,
     store: Path | None = None,
     durability: Durability = "process",
+    profile: Profile | None = None,
 ) -> CleanUpTable:
     """Wire everything for one run; close it when done.
 
@@ -124,18 +137,19 @@ def deploy(
         listener: is told every record of the run.
         store: a file to keep the run in, with the world beside it; one that has no run yet.
         durability: what the run outlives, see `Executive`.
+        profile: which of `ROBOTS` does it, and what its parameters are worth; the one on wheels if left out.
 
     Raises:
-        InputError: the scenario is wrong, or the store has a run already.
+        InputError: the scenario or the profile is wrong, or the store has a run already.
         StoreError: the store cannot be opened, or the world not be written.
     """
     world = (scenario or Scenario.default()).world(seed, faults)
     if store is None:
-        return _wired(world, planner, listener)
+        return _wired(world, planner, listener, profile)
     if has_run(store):
         raise InputError(f"'{store}' has a run already; go on with it by --resume, or take another file")
     lasting = LastingWorld.from_state(world.state())
-    deployed = _wired(lasting, planner, listener, store, durability)
+    deployed = _wired(lasting, planner, listener, profile, store, durability)
     try:
         lasting.create(beside(store))
     except BaseException:
@@ -156,8 +170,9 @@ def resumed(
         StoreError: the store or its world is not there, or cannot be read.
     """
     with archive(store) as runs:
-        unfinished(runs)
-    deployed = _wired(LastingWorld.open(beside(store)), planner, listener, store, durability)
+        said = unfinished(runs).header.get("settings")
+    profile = None if said is None else Profile.model_validate(said)
+    deployed = _wired(LastingWorld.open(beside(store)), planner, listener, profile, store, durability)
     deployed.resumes = True
     return deployed
 
@@ -166,6 +181,7 @@ def _wired(
     world: World,
     planner: Planner | None,
     listener: Listener | None,
+    profile: Profile | None,
     store: Path | None = None,
     durability: Durability = "process",
 ) -> CleanUpTable:
@@ -176,16 +192,46 @@ def _wired(
             lying += [str(found["inner"]) for found in knowledge.query("(inside ?inner ?item)", {"item": item})]
         return lying
 
-    components = [Base(world), Arm(world), Camera(world, believed), Voice(world)]
+    components = robot(profile)(world, believed)
+    configure(components, profile)
     executive = Executive(
-        domain(), plots(), components, None, planner, foresight=Physics(), store=store, durability=durability
-    )
+        domain(), adapted(plots(), profile), components, None, planner,
+        foresight=Physics(), store=store, durability=durability,
+    )  # fmt: skip
     executive.knowledge.apply(initial_knowledge(world), "deployment", key="deployment")
-    deployed = CleanUpTable(world, executive)
+    deployed = CleanUpTable(world, executive, profile=profile)
     executive.listen(deployed.tally)
     if listener is not None:
         executive.listen(listener)
     return deployed
+
+
+Believed = Callable[[str], list[str]]
+"""The items that the robot believes to lie on a surface."""
+
+
+def on_wheels(world: World, believed: Believed) -> list[Component]:
+    """A base on wheels, an arm with a hand."""
+    return [Base(world), Arm(world), Camera(world, believed), Voice(world)]
+
+
+def on_tracks(world: World, believed: Believed) -> list[Component]:
+    """A base on tracks, an arm that holds by suction; see `second_robot`."""
+    return [Tracks(world), SuctionArm(world), PatientCamera(world, believed), Voice(world)]
+
+
+ROBOTS = {"on_wheels": on_wheels, "on_tracks": on_tracks}
+"""The robots that can do it, by the names that profiles have for them."""
+PROFILES = HOME / "profiles"
+
+
+def robot(profile: Profile | None) -> Callable[[World, Believed], list[Component]]:
+    """What makes the components of the robot that a profile names; raises `UnknownNameError`."""
+    name = "on_wheels" if profile is None or profile.robot is None else profile.robot
+    if name not in ROBOTS:
+        place = None if profile is None else profile.place("robot")
+        raise UnknownNameError(f"there is no robot '{name}'", place=place, found=name, valid=ROBOTS)
+    return ROBOTS[name]
 
 
 @cache

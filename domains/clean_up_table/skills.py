@@ -6,10 +6,12 @@ changes nothing. It hands over what the robot observes, never the world's truth.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
 
 from domains.clean_up_table.observations import initial_knowledge, learned
 from domains.clean_up_table.places import PLACES, distance
+from dsc.components.parameters import Parameter
 from dsc.skills import Component, Outcome, SkillCall, skill
 
 if TYPE_CHECKING:
@@ -21,23 +23,29 @@ if TYPE_CHECKING:
 
 __all__ = ["Arm", "Base", "Camera", "Voice", "initial_knowledge"]
 
-SPEED = 0.5  # metres a second
-STARTING = 1.0  # seconds until the base moves
-GRASPING, PUTTING, STACKING, THROWING = 4.0, 3.0, 5.0, 3.0  # seconds
-RECOGNISING, LOOKING = 2.0, 1.5  # seconds
-CHARACTERS_A_SECOND = 15.0
 
-_ITEM_AT = {"item": "item", "surface": "surface"}
-_ITEM_IN = {"item": "item", "carrier": "item", "surface": "surface"}
-_CARRIER_AT = {"carrier": "item", "surface": "surface"}
-_ONCE: AfterCrash = "same_id"  # the world does each id once
-_NOT_POSSIBLE: dict[str, str | None] = {"reason": None}
+def seconds(default: float) -> Parameter:
+    """How long something takes; the integrator knows the robot, plots cannot make it faster."""
+    return Parameter("number", default=default, least=0.1, most=60.0, changed_by="profile")
+
+
+ITEM_AT = {"item": "item", "surface": "surface"}
+ITEM_IN = {"item": "item", "carrier": "item", "surface": "surface"}
+CARRIER_AT = {"carrier": "item", "surface": "surface"}
+NOT_POSSIBLE: dict[str, str | None] = {"reason": None}
+ONCE: AfterCrash = "same_id"
+"""The world does each id once."""
 
 
 class Base(Component):
     """The mobile base."""
 
     name = "base"
+    declares: ClassVar[Mapping[str, Parameter]] = {
+        "navigation": Parameter("text", default="planned", among=("planned", "reactive")),
+        "speed": Parameter("number", default=0.5, least=0.05, most=1.5),  # metres a second
+        "starting": seconds(1.0),  # until it moves
+    }
 
     def __init__(self, world: World, name: str | None = None) -> None:
         super().__init__(name)
@@ -48,22 +56,29 @@ class Base(Component):
             "arrived": {"to": "place"},
             "no_path": {"to": "place"},
             "slipped": {"item": "item", "surface": "surface", "to": "place"},
-            "not_possible": _NOT_POSSIBLE,
+            "not_possible": NOT_POSSIBLE,
         },
         types={"to": "place"},
-        after_crash=_ONCE,
+        after_crash=ONCE,
     )
     async def drive(self, call: SkillCall, to: str) -> Outcome:
         """Drive to a place; a held item may slip, and then robot and item are at the floor."""
         metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
-        await call.clock.sleep(STARTING + metres / SPEED)
-        return _outcome(self.world.drive(call.action_id, to))
+        await call.clock.sleep(self.parameters["starting"] + metres / self.parameters["speed"])
+        return outcome_of(self.world.drive(call.action_id, to))
 
 
 class Arm(Component):
     """The arm with its one hand."""
 
     name = "arm"
+    declares: ClassVar[Mapping[str, Parameter]] = {
+        "approach": Parameter("text", default="above", among=("above", "side")),
+        "grasping": seconds(4.0),
+        "putting": seconds(3.0),
+        "stacking": seconds(5.0),
+        "throwing": seconds(3.0),
+    }
 
     def __init__(self, world: World, name: str | None = None) -> None:
         super().__init__(name)
@@ -71,69 +86,69 @@ class Arm(Component):
 
     @skill(
         outcomes={
-            "picked_up": _ITEM_AT,
-            "grasp_failed": _ITEM_AT,
-            "no_ik": _ITEM_AT,
-            "gone": _ITEM_AT,
-            "not_possible": _NOT_POSSIBLE,
+            "picked_up": ITEM_AT,
+            "grasp_failed": ITEM_AT,
+            "no_ik": ITEM_AT,
+            "gone": ITEM_AT,
+            "not_possible": NOT_POSSIBLE,
         },
-        types=_ITEM_AT,
-        after_crash=_ONCE,
+        types=ITEM_AT,
+        after_crash=ONCE,
     )
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Pick an item, with everything in it, up from a surface."""
-        await call.clock.sleep(GRASPING)
-        return _outcome(self.world.pick_up(call.action_id, item, surface))
+        await call.clock.sleep(self.parameters["grasping"])
+        return outcome_of(self.world.pick_up(call.action_id, item, surface))
 
-    @skill(outcomes={"put_down": _ITEM_AT, "not_possible": _NOT_POSSIBLE}, types=_ITEM_AT, after_crash=_ONCE)
+    @skill(outcomes={"put_down": ITEM_AT, "not_possible": NOT_POSSIBLE}, types=ITEM_AT, after_crash=ONCE)
     async def put_down(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Put the held item on a surface."""
-        await call.clock.sleep(PUTTING)
-        return _outcome(self.world.put_down(call.action_id, item, surface))
+        await call.clock.sleep(self.parameters["putting"])
+        return outcome_of(self.world.put_down(call.action_id, item, surface))
 
     @skill(
         outcomes={
-            "stacked": _ITEM_IN,
-            "stack_fell": {**_ITEM_IN, "items": None},
-            "gone": _ITEM_AT,
-            "not_possible": _NOT_POSSIBLE,
+            "stacked": ITEM_IN,
+            "stack_fell": {**ITEM_IN, "items": None},
+            "gone": ITEM_AT,
+            "not_possible": NOT_POSSIBLE,
         },
-        types=_ITEM_IN,
-        after_crash=_ONCE,
+        types=ITEM_IN,
+        after_crash=ONCE,
     )
     async def stack(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Put the held item into a carrier on a surface; `gone` names the carrier."""
-        await call.clock.sleep(STACKING)
-        return _outcome(self.world.stack(call.action_id, item, carrier, surface))
+        await call.clock.sleep(self.parameters["stacking"])
+        return outcome_of(self.world.stack(call.action_id, item, carrier, surface))
 
     @skill(
         outcomes={
-            "taken_out": _ITEM_IN,
-            "grasp_failed": _ITEM_IN,
-            "no_ik": _ITEM_IN,
-            "gone": _ITEM_AT,
-            "not_possible": _NOT_POSSIBLE,
+            "taken_out": ITEM_IN,
+            "grasp_failed": ITEM_IN,
+            "no_ik": ITEM_IN,
+            "gone": ITEM_AT,
+            "not_possible": NOT_POSSIBLE,
         },
-        types=_ITEM_IN,
-        after_crash=_ONCE,
+        types=ITEM_IN,
+        after_crash=ONCE,
     )
     async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Take an item out of its carrier on a surface; `gone` names the carrier."""
-        await call.clock.sleep(GRASPING)
-        return _outcome(self.world.take_out(call.action_id, item, carrier, surface))
+        await call.clock.sleep(self.parameters["grasping"])
+        return outcome_of(self.world.take_out(call.action_id, item, carrier, surface))
 
     @skill(
         outcomes={
             "thrown_away": {"item": "item", "destination": "destination"},
-            "not_possible": _NOT_POSSIBLE,
+            "not_possible": NOT_POSSIBLE,
         },
         types={"item": "item", "destination": "destination"},
-        after_crash=_ONCE,
+        after_crash=ONCE,
     )
     async def throw_away(self, call: SkillCall, item: str, destination: str) -> Outcome:
         """Throw the held item, with everything in it, into its destination."""
-        await call.clock.sleep(THROWING)
-        return _outcome(self.world.throw_away(call.action_id, item, destination))
+        await call.clock.sleep(self.parameters["throwing"])
+        return outcome_of(self.world.throw_away(call.action_id, item, destination))
 
 
 class Camera(Component):
@@ -146,6 +161,7 @@ class Camera(Component):
     """
 
     name = "camera"
+    declares: ClassVar[Mapping[str, Parameter]] = {"recognising": seconds(2.0), "looking": seconds(1.5)}
 
     def __init__(
         self, world: World, believed: Callable[[str], Iterable[str]], name: str | None = None
@@ -158,43 +174,47 @@ class Camera(Component):
         outcomes={
             "recognised": {"surface": "surface", "count": None},
             "nothing_found": {"surface": "surface"},
-            "not_possible": _NOT_POSSIBLE,
+            "not_possible": NOT_POSSIBLE,
         },
         types={"surface": "surface"},
-        after_crash=_ONCE,
+        after_crash=ONCE,
     )
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
         """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
-        await call.clock.sleep(RECOGNISING)
-        return _outcome(self.world.recognise(call.action_id, surface), self.believed)
+        await call.clock.sleep(self.parameters["recognising"])
+        return outcome_of(self.world.recognise(call.action_id, surface), self.believed)
 
     @skill(
-        outcomes={"looked": _CARRIER_AT, "gone": _ITEM_AT, "not_possible": _NOT_POSSIBLE},
-        types=_CARRIER_AT,
-        after_crash=_ONCE,
+        outcomes={"looked": CARRIER_AT, "gone": ITEM_AT, "not_possible": NOT_POSSIBLE},
+        types=CARRIER_AT,
+        after_crash=ONCE,
     )
     async def look_into(self, call: SkillCall, carrier: str, surface: str) -> Outcome:
         """Look into a carrier on a surface, giving up one unit of its room; `gone` names the carrier."""
-        await call.clock.sleep(LOOKING)
-        return _outcome(self.world.look_into(call.action_id, carrier, surface))
+        await call.clock.sleep(self.parameters["looking"])
+        return outcome_of(self.world.look_into(call.action_id, carrier, surface))
 
 
 class Voice(Component):
     """The loudspeaker."""
 
     name = "voice"
+    declares: ClassVar[Mapping[str, Parameter]] = {
+        "pace": Parameter("number", default=15.0, least=1.0, most=100.0),  # characters a second
+    }
 
     def __init__(self, world: World, name: str | None = None) -> None:
         super().__init__(name)
         self.world = world
 
-    @skill(outcomes={"said": {"text": None}}, after_crash=_ONCE)
+    @skill(outcomes={"said": {"text": None}}, after_crash=ONCE)
     async def say(self, call: SkillCall, text: str) -> Outcome:
         """Tell the operator something."""
-        await call.clock.sleep(1.0 + len(text) / CHARACTERS_A_SECOND)
-        return _outcome(self.world.say(call.action_id, text))
+        await call.clock.sleep(1.0 + len(text) / self.parameters["pace"])
+        return outcome_of(self.world.say(call.action_id, text))
 
 
-def _outcome(result: Result, believed: Callable[[str], Iterable[str]] = lambda _surface: ()) -> Outcome:
+def outcome_of(result: Result, believed: Callable[[str], Iterable[str]] = lambda _surface: ()) -> Outcome:
+    """What a skill ends with when the world has answered; `believed` is asked for what a look should have shown."""
     attributes = {k: list(v) if isinstance(v, tuple) else v for k, v in result.attributes.items()}
     return Outcome(result.outcome, attributes, learned(result, believed))

@@ -64,7 +64,8 @@ class PlotComponent(Component):
                 f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
             )
         check_arguments(signatures[skill_name], arguments)
-        sequencer = Sequencer(self._library, self._knowledge(), self._components, LoopClock())
+        part_of = f"{call.action_id}/"
+        sequencer = Sequencer(self._library, self._knowledge(), self._components, LoopClock(), part_of=part_of)
         end = await sequencer.run(skill_name, arguments)
         if not end.finished or end.problem is not None:
             raise RuntimeError(end.problem or "it did not reach its end")

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from dsc.dynamic.rules import expand_rules
+from dsc.dynamic.expansion import expand
 from dsc.dynamic.substitution import stand_in
 from dsc.engine.compiler import compile_plot
 from dsc.engine.tables import CompiledPlot
@@ -69,8 +69,8 @@ class Library:
         return Library(other if own.name == name else own for own in self)
 
     def expanded(self, plot: ActionPlot) -> ActionPlot:
-        """The plot with its rules as states and transitions; raises `UnknownNameError`."""
-        return expand_rules(plot, self)
+        """The plot with its rules and handlers as states and transitions; see `expand`."""
+        return expand(plot, self)
 
     def implementing(self, planning_action: str) -> tuple[ActionPlot, ...]:
         """The plots that carry out a planning action, in the order of the library."""

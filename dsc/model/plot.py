@@ -11,7 +11,8 @@ from typing import Any, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-from dsc.model.language import LOCATED, ConditionField, EffectField, Frozen, TermField
+from dsc.model.language import LOCATED, ConditionField, Frozen, TermField
+from dsc.model.rules import Handler, Reaction, Rule
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -56,45 +57,6 @@ class Variable(Frozen):
         return {"type": value} if isinstance(value, str) else value
 
 
-class Response(Frozen):
-    """What a rule does about an outcome event.
-
-    Attributes:
-        tell: change the knowledge base first.
-        use, arguments: then run this plot as a recovery; whatever it ends with, `then` follows.
-        then: `retry` the step (its candidates are chosen anew), `continue` as if the step were done,
-            `replan`, `give_up`, or the name of a state of the same plot.
-        limit: how often this rule may answer for one state while its plot is active.
-    """
-
-    tell: EffectField | None = None
-    use: str | None = None
-    arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
-    then: str = "retry"
-    limit: int | None = Field(default=None, ge=1, strict=True)
-
-
-class Rule(Frozen):
-    """A contingency rule: the plot that holds a state answers that state's outcome event (S1.4).
-
-    Attributes:
-        on: the outcome event.
-        when: condition over the event's attributes and the knowledge base.
-        of: only for these states; empty means any.
-        do: the response.
-    """
-
-    on: str
-    when: ConditionField | None = None
-    of: tuple[str, ...] = ()
-    do: Response
-
-    @property
-    def label(self) -> str:
-        """What people call it: the event and the response, e.g. `grasp_failed: reposition, retry`."""
-        return f"{self.on}: " + ", ".join(part for part in (self.do.use, self.do.then) if part)
-
-
 class ActionPlot(Frozen):
     """An action plot.
 
@@ -113,6 +75,7 @@ class ActionPlot(Frozen):
         states: the top-level states by name; names are unique in the whole plot.
         initial: the state to enter first; the first one if left out.
         rules: contingency rules, in order of priority.
+        handlers: event handlers, in order of priority.
         generated: whether it was made from a plan.
         profile: `dsc`, or `scxml` for charts that use what only SCXML has: transitions across borders, history,
             events matched by prefix, internal actions in entry and exit.
@@ -132,6 +95,7 @@ class ActionPlot(Frozen):
     initial: str | None = None
     states: dict[str, AnyState] = Field(min_length=1)
     rules: tuple[Rule, ...] = ()
+    handlers: tuple[Handler, ...] = ()
     generated: bool = Field(default=False, strict=True)
     profile: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
@@ -214,7 +178,8 @@ class ActionPlot(Frozen):
 
     def uses(self) -> frozenset[str]:
         """Names of the plots it refers to."""
-        named: set[str] = {rule.do.use for rule in self.rules if rule.do.use}
+        reactions: list[Reaction] = [*(rule.do for rule in self.rules), *(one.do for one in self.handlers)]
+        named: set[str] = {one.use for one in reactions if one.use}
         for _, state, _ in self.walk():
             if isinstance(state, SubmachineState) and not state.use.startswith("?"):
                 named.add(state.use)

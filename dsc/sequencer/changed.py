@@ -12,8 +12,8 @@ from knowledge_base.errors import Place
 
 
 def require_unchanged(runs: RunArchive, run: RunRow, library: Library, domain: Mapping[str, str]) -> None:
-    """Raise `ChangedError` if any plot, or any planning action, is not as it was."""
-    found = [*_changed_plots(runs, run, library), *_changed_actions(run.domain, domain)]
+    """Raise `ChangedError` if any plot, or anything else that they rely on, is not as it was."""
+    found = [*_changed_plots(runs, run, library), *_changed_statements(run.domain, domain)]
     if found:
         raise ChangedError(found, place=Place(str(runs.path)))
 
@@ -38,10 +38,10 @@ def _changed_plots(runs: RunArchive, run: RunRow, library: Library) -> Iterator[
             yield f"the plot '{plot.name}' is new"
 
 
-def _changed_actions(before: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:
+def _changed_statements(before: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:
     for name, text in before.items():
         if name not in now:
-            yield f"the planning action '{name}' is missing"
+            yield f"the {name} is missing"
         elif now[name] != text:
-            yield f"the planning action '{name}' was '{text}', now it is '{now[name]}'"
-    yield from (f"the planning action '{name}' is new" for name in now if name not in before)
+            yield f"the {name} was '{text}', now it is '{now[name]}'"
+    yield from (f"the {name} is new" for name in now if name not in before)

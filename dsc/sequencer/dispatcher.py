@@ -43,6 +43,12 @@ DEFAULT_WITHIN = 300.0
 class Dispatcher:
     """Starts, configures and cancels; `post` receives the answers, in the order in which they come.
 
+    Args:
+        components: the skills.
+        clock: run time.
+        post: see above.
+        part_of: stands before the action ids that components see.
+
     Attributes:
         telling: what components are told.
         timers: what is due later.
@@ -53,7 +59,9 @@ class Dispatcher:
         components: Iterable[Component],
         clock: LoopClock,
         post: Callable[[SkillMessage | TimerMessage | SendLater], None],
+        part_of: str = "",
     ) -> None:
+        self._part_of = part_of
         self._components = {component.name: component for component in components}
         self._roster = Roster(self._components)
         self._given_up: list[str] = []
@@ -92,6 +100,9 @@ class Dispatcher:
     def _within(self, start: Start) -> float:
         """Seconds that it may take; an event lasts as long as the state that activated it."""
         return start.within or (math.inf if self._is_event(start) else DEFAULT_WITHIN)
+
+    def _id(self, start: Start) -> str:
+        return self._part_of + start.action_id
 
     def _is_event(self, start: Start) -> bool:
         signature = self.component(start.component).skills().get(start.skill)
@@ -134,7 +145,7 @@ class Dispatcher:
         self._running.pop(start.action_id, None)
         component = self._components.get(start.component)
         if component is not None and type(component).forget is not Component.forget:
-            task = asyncio.get_running_loop().create_task(_forgotten(component, start.action_id))
+            task = asyncio.get_running_loop().create_task(_forgotten(component, self._id(start)))
             self._ending.add(task)
             task.add_done_callback(self._ending.discard)
 
@@ -161,7 +172,7 @@ class Dispatcher:
         component = self.component(start.component)
         try:
             async with asyncio.timeout(CLOSING):
-                await component.abandon(start.action_id, start.skill, encoded(start.arguments))
+                await component.abandon(self._id(start), start.skill, encoded(start.arguments))
         except Exception as error:  # whatever a component does wrong must not end the program
             why = f"{type(error).__name__}: {error}"
             raise InputError(f"{start.component}.{start.skill} may still go on: {why}") from error
@@ -224,14 +235,14 @@ class Dispatcher:
 
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
         deadline = clock.now() + self._within(start)
-        call = SkillCall(start.action_id, clock, report, deadline, self._given_up.append)
+        call = SkillCall(self._id(start), clock, report, deadline, self._given_up.append)
         bound = self._clock.timeout_at(deadline)
         try:
             async with bound:
                 await self.telling.taken(component)
                 support = await self._roster.ready(component)
                 if earlier is not None:
-                    status = await asked_after(component, start)
+                    status = await asked_after(component, start, self._id(start))
                     if isinstance(status, Ended):
                         return declared(component, start, status.outcome)
                     if status is Status.RUNNING or not self._is_event(start):  # else it is activated anew

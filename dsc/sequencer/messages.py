@@ -14,11 +14,19 @@ from knowledge_base.facts import Delta
 
 @dataclass(frozen=True, slots=True)
 class SkillMessage:
-    """A component's answer for an activation; `final` if the skill has ended with it."""
+    """A component's answer for an activation.
+
+    Attributes:
+        start: of the skill.
+        outcome: what it said.
+        final: whether the skill has ended with it.
+        goes_on: whether it has not, and only counts as ended: it has to be stopped.
+    """
 
     start: Start
     outcome: Outcome
     final: bool
+    goes_on: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,7 +100,8 @@ class Reactor:
         try:
             self.knowledge.overlay().apply(message.outcome.observed)
         except InputError as error:
-            return SkillMessage(message.start, broken(message.start, str(error)), final=True)
+            outcome = broken(message.start, str(error))
+            return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)
         return message
 
     def leave(self) -> tuple[Output, ...]:

@@ -21,7 +21,6 @@ from dsc.engine.steps import (
     StartTimer,
     SwitchMode,
 )
-from dsc.events import SKILL_ERROR
 from dsc.sequencer.messages import LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import (
@@ -119,9 +118,8 @@ class Present:
         match message:
             case SkillMessage(start=start, final=False):
                 connection.executemany(_REPORTED, [(place,) for place in self._places.get(_key(start), ())])
-            case SkillMessage(start=start, outcome=outcome):
-                # One that was not believed may go on until it is stopped, after the commit.
-                (self._cancel if outcome.event == SKILL_ERROR else self._forget)(connection, _key(start))
+            case SkillMessage(start=start, goes_on=goes_on):
+                (self._cancel if goes_on else self._forget)(connection, _key(start))
             case TimerMessage(timer=timer):
                 self._forget(connection, _key(timer))
             case LateMessage() | SendLater():

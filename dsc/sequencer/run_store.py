@@ -35,7 +35,7 @@ class RunStore:
         knowledge: the knowledge base of the run, opened at `path`.
         path: its file.
         header: what the run's program wants to find again, plain data.
-        domain: the planning actions as text, by name.
+        domain: what the plots rely on that is no plot, as text by what it is called ("planning action 'go'").
 
     Attributes:
         begun: whether a run is kept here.

@@ -48,7 +48,7 @@ class RunRow:
         version: that of the knowledge at the beginning.
         header: what else its program said of it.
         plots: the hashes of all plots of its library by name.
-        domain: the planning actions, as text by name.
+        domain: what else plots rely on, as text by what it is called.
         ended: how it came to its end (`finished`, `problem`); `None` while it has not.
     """
 

@@ -58,6 +58,7 @@ class Sequencer:
         open_ended: whether events may still come from outside when nothing is going on; if not, such a
             run ends with a problem instead of waiting for ever.
         store: keeps the run, so that it can be taken up again after a crash; its knowledge is `knowledge`.
+        part_of: stands before the action ids that components see; an id of another run, if this one is part of it.
 
     Attributes:
         library, knowledge, trace, store: as given.
@@ -74,6 +75,7 @@ class Sequencer:
         *,
         open_ended: bool = False,
         store: RunStore | None = None,
+        part_of: str = "",
     ) -> None:
         self.library = library
         self.knowledge = knowledge
@@ -84,7 +86,7 @@ class Sequencer:
         if store is not None:
             self.trace.listen(store.hear)
         self._inbox: asyncio.Queue[Message] = asyncio.Queue()
-        self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait)
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait, part_of)
         self._open_ended = open_ended
         self._coming = Coming(clock, self._inbox.put_nowait)
         self._last_late = store.last_late if store is not None else 0
@@ -244,18 +246,15 @@ class Sequencer:
         self._carry_out(output)
 
     def _take(self, message: Message) -> None:
-        believed = self._reactor.believed(message)
+        message = self._reactor.believed(message)
         if self.store is None:
-            output = self._reactor.react(believed)
+            output = self._reactor.react(message)
         else:
             with self.store.writing():
-                output = self._reactor.react(believed)
-                self._keep_step(believed, output)
-        if isinstance(message, SkillMessage):
-            if message.final:
-                self.dispatcher.settle(message.start)
-            elif believed is not message:
-                self.dispatcher.stop(message.start)
+                output = self._reactor.react(message)
+                self._keep_step(message, output)
+        if isinstance(message, SkillMessage) and message.final:
+            (self.dispatcher.stop if message.goes_on else self.dispatcher.settle)(message.start)
         self._carry_out(output)
 
     def _leave(self) -> None:

@@ -56,13 +56,13 @@ class PastClock:
         return self._clock.hold()
 
 
-async def asked_after(component: Component, start: Start) -> Status | Ended:
+async def asked_after(component: Component, start: Start, action_id: str) -> Status | Ended:
     """What became of the action; unless it has ended, it is to be executed, with the same id.
 
     Raises:
         UncertainActionError: it may have happened, nobody knows, and it must not happen twice.
     """
-    status = await component.status(start.action_id, start.skill, start.arguments)
+    status = await component.status(action_id, start.skill, start.arguments)
     signature = component.skills().get(start.skill)
     if status is Status.UNKNOWN and signature is not None and signature.after_crash == "sense":
         raise UncertainActionError(f"the run was broken off, and whether {start.action_id} happened is not known")

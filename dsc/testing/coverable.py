@@ -64,7 +64,9 @@ def items_of(plot: ActionPlot) -> Iterator[Item]:
                 goal = "(stays)" if transition.target is None else f"-> {transition.target}"
                 text = f"'{name}' never took {trigger} {goal}"
                 yield Item(("transition", name, at), text, here, plot.place(here))
-    for number, rule in enumerate(plot.rules):
-        if rule.label not in [earlier.label for earlier in plot.rules[:number]]:
-            here = ("rules", number)
-            yield Item(("rule", rule.label, ()), f"rule '{rule.label}' never answered", here, plot.place(here))
+    reactions = {"rules": [rule.label for rule in plot.rules], "handlers": [one.label for one in plot.handlers]}
+    for group, labels in reactions.items():
+        for number, label in enumerate(labels):
+            if label not in labels[:number]:
+                here = (group, number)
+                yield Item(("rule", label, ()), f"rule '{label}' never answered", here, plot.place(here))

@@ -33,6 +33,7 @@ class Vocabulary:
             if plot.profile == "scxml":
                 self.triggers = None
             self.rules.update(rule.label for rule in plot.rules)
+            self.rules.update(handler.label for handler in plot.handlers)
             for name, state, _ in plot.walk():
                 self.states.add(name)
                 self._add(state)

@@ -10,7 +10,8 @@ from dsc.model.plot import ActionPlot
 from dsc.text.diagram import draw
 
 _PARTS = (
-    "parameters", "variables", "outputs", "receives", "emits", "rules", "when", "implements", "effects", "initial",
+    "parameters", "variables", "outputs", "receives", "emits", "rules", "handlers", "when", "implements", "effects",
+    "initial",
 )  # fmt: skip
 _INSIDE = ("states", "regions")
 

@@ -48,12 +48,14 @@ def plot_to_yaml(plot: ActionPlot) -> str:
 
 _ORDER = (
     "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs",
-    "receives", "emits", "seconds", "set", "switch", "send", "to", "pass", "when", "of", "trigger", "use", "dynamic",
-    "assign", "tell", "emit", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit", "rule",
-    "choice", "select", "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on",
-    "after", "every", "always", "exit", "on_break", "rules",
+    "receives", "emits", "seconds", "set", "switch", "send", "to", "pass", "before", "when", "of", "interrupt",
+    "listen", "trigger", "use", "dynamic", "assign", "tell", "emit", "command", "with", "as", "within", "goal",
+    "budget", "clear", "do", "then", "limit", "rule", "choice", "select", "cases", "else", "entry", "at_least",
+    "initial", "final", "states", "regions", "on", "after", "every", "always", "exit", "on_break", "rules", "handlers",
 )
-_SINGLE = frozenset({"entry", "exit", "on_break", "after", "every", "always", "event", "clear"})
+_SINGLE = frozenset({
+    "entry", "exit", "on_break", "before", "after", "every", "always", "event", "clear", "command",
+})  # fmt: skip
 _NAMES = {
     "on": "event", "states": "state", "connectors": "state", "regions": "region", "cases": "transition",
     "parameters": "declaration", "variables": "declaration", "outputs": "declaration",

@@ -6,7 +6,9 @@ from typing import Any
 
 from dsc.model.plot import ActionPlot
 
-_SINGLE = frozenset({"entry", "exit", "on_break", "after", "every", "always", "choice", "clear"})
+_SINGLE = frozenset({
+    "entry", "exit", "on_break", "before", "after", "of", "every", "always", "choice", "clear", "command",
+})  # fmt: skip
 """Lists of which the only element may stand alone; the transitions of an event are such lists too."""
 _BY_NAME = frozenset({"Transition", "Parameter", "Variable"})
 """Values that may be written as their target or type alone."""

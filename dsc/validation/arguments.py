@@ -8,22 +8,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import Step, concerns, contents_of
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Parameter, Path, initial_of
-from dsc.model.states import DynamicState, HistoryState, SubmachineState
+from dsc.model.rules import Reaction, Rule
+from dsc.model.states import HistoryState, SubmachineState
 from dsc.model.transitions import Source, Transition
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-
-Holder = SubmachineState | DynamicState
-"""A state whose content is a plot."""
 
 
 def check_arguments(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """Findings about the arguments of used plots."""
     entrances = _Entrances(plot, library, nesting)
     for name, state, path in nesting.states:
-        if isinstance(state, Holder):
+        if isinstance(state, Step):
             yield from _known(plot, state, set(state.arguments), (*path, "with"), library)
             for need in _needs(state, library):
                 yield from _given(plot, name, path, need, entrances)
@@ -31,30 +30,54 @@ def check_arguments(plot: ActionPlot, library: Library, nesting: Nesting) -> Ite
             if transition.passed:
                 yield from _passed(plot, transition, (*path, *inside), library, nesting)
     for number, rule in enumerate(plot.rules):
-        if rule.do.use is not None:
-            used, here = library.plot(rule.do.use), ("rules", number, "do", "with")
-            yield from _unknown(plot, used, set(rule.do.arguments), here)
-            for name in _needed(used.parameters):
-                if name not in rule.do.arguments:
-                    yield _missing(plot, _Need(used.name, name), here)
+        yield from _used(plot, rule.do, ("rules", number, "do"), library)
+        yield from _passed_by_rule(plot, rule, ("rules", number, "do", "pass"), library, nesting)
+    for number, handler in enumerate(plot.handlers):
+        yield from _used(plot, handler.do, ("handlers", number, "do"), library)
 
 
-def contents(state: Holder, library: Library) -> list[ActionPlot]:
-    """The plots that may become the content of a state, as far as that is known."""
-    if isinstance(state, DynamicState):
-        return [library.plot(name) for name in state.dynamic]
-    return [] if state.use.startswith("?") else [library.plot(state.use)]
+def _used(plot: ActionPlot, do: Reaction, path: Path, library: Library) -> Iterator[Finding]:
+    if do.use is None:
+        return
+    used, here = library.plot(do.use), (*path, "with")
+    yield from _unknown(plot, used, set(do.arguments), here)
+    for name in _needed(used.parameters):
+        if name not in do.arguments:
+            yield _missing(plot, _Need(used.name, name), here)
+
+
+def _passed_by_rule(
+    plot: ActionPlot, rule: Rule, path: Path, library: Library, nesting: Nesting
+) -> Iterator[Finding]:
+    """Some step that the rule is for takes what it passes; others are not handed it."""
+    if not rule.do.passed:
+        return
+    steps = [(name, state) for name, state, _ in nesting.states if isinstance(state, Step)]
+    if rule.then in nesting.names:
+        entered = [state for name, state in steps if name == rule.then]
+    else:
+        entered = [state for name, state in steps if concerns(rule, name, state, library)]
+    used = [one for state in entered for one in contents_of(state, library)]
+    if rule.then not in nesting.names:  # steps of plans
+        used += [one for one in library if one.implements and (not rule.steps or one.implements in rule.steps)]
+    taken = {name for one in used for name in one.parameters}
+    for name in sorted(set(rule.do.passed) - taken):
+        error = UnknownNameError(
+            f"no plot that is entered then has a parameter '{name}'",
+            place=plot.place((*path, name)), found=name, valid=taken,
+        )  # fmt: skip
+        yield Finding(error, "known parameter")
 
 
 # -- names ---------------------------------------------------------------------------------------------------
 
 
-def _known(plot: ActionPlot, state: Holder, given: set[str], path: Path, library: Library) -> Iterator[Finding]:
+def _known(plot: ActionPlot, state: Step, given: set[str], path: Path, library: Library) -> Iterator[Finding]:
     if isinstance(state, SubmachineState):
-        for used in contents(state, library):
+        for used in contents_of(state, library):
             yield from _unknown(plot, used, given, path)
         return
-    taken = {name for candidate in contents(state, library) for name in candidate.parameters}
+    taken = {name for candidate in contents_of(state, library) for name in candidate.parameters}
     for name in sorted(given - taken):
         error = UnknownNameError(
             f"no candidate has a parameter '{name}'",
@@ -76,7 +99,7 @@ def _passed(
     plot: ActionPlot, transition: Transition, path: Path, library: Library, nesting: Nesting
 ) -> Iterator[Finding]:
     target = None if transition.target is None else nesting.state(transition.target)
-    if isinstance(target, Holder):
+    if isinstance(target, Step):
         yield from _known(plot, target, set(transition.passed), (*path, "pass"), library)
         return
     where = "nowhere" if transition.target is None else f"to '{transition.target}', which holds no plot"
@@ -107,9 +130,9 @@ def _needed(parameters: Mapping[str, Parameter]) -> Iterable[str]:
     return (name for name, parameter in parameters.items() if parameter.default is None)
 
 
-def _needs(state: Holder, library: Library) -> Iterator[_Need]:
+def _needs(state: Step, library: Library) -> Iterator[_Need]:
     """What `with` leaves open."""
-    for used in contents(state, library):
+    for used in contents_of(state, library):
         for name in _needed(used.parameters):
             if name not in state.arguments:
                 yield _Need(used.name, name)

@@ -2,29 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 
+from dsc.components.parameters import Parameter, Who, known
 from dsc.errors import Finding
 from dsc.model.actions import Configure, ExternalAction, Internal, Send, Switch
-from dsc.model.plot import ActionPlot
+from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import State
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.expression import Constant
+
+Components = Collection[str] | Mapping[str, Mapping[str, Parameter]]
+"""The names of components, or also what they declare about their parameters; nothing means that any may be set."""
 
 
-def check_components(plot: ActionPlot, components: Collection[str]) -> Iterator[Finding]:
-    """Findings about `set`, `send` and `switch` actions towards components that are not there."""
+def check_components(plot: ActionPlot, components: Components) -> Iterator[Finding]:
+    """Findings about `set`, `send` and `switch` actions towards components that are not there or do not take them."""
+    for action, path, who in _actions(plot):
+        name = _addressed(action)
+        if name is not None and name not in components:
+            message = f"there is no component '{name}'"
+            error = UnknownNameError(message, place=plot.place(path), found=name, valid=components)
+            yield Finding(error, "known component")
+        elif isinstance(action, Configure) and isinstance(components, Mapping):
+            yield from _setting(plot, action, path, who, components)
+
+
+def _setting(
+    plot: ActionPlot, action: Configure, path: Path, who: Who, components: Mapping[str, Mapping[str, Parameter]]
+) -> Iterator[Finding]:
+    component, _, parameter = action.set.partition(".")
+    if not components[component]:
+        return
+    try:
+        declared = known(component, parameter, components[component])
+        if isinstance(action.to, Constant):
+            declared.check(action.set, action.to.value)
+    except InputError as error:
+        error.place = plot.place((*path, "to" if not isinstance(error, UnknownNameError) else "set"))
+        yield Finding(error, "component parameter")
+        return
+    if not declared.may_be_changed_by(who):
+        message = f"'{action.set}' is not changed by {who}, but by {declared.changed_by}"
+        refused = SchemaError(message, place=plot.place((*path, "set")), found=action.set)
+        yield Finding(refused, "component parameter", "say it in a profile, or let `changed_by` allow it")
+
+
+def _actions(plot: ActionPlot) -> Iterator[tuple[ExternalAction | Internal, Path, Who]]:
     for _, state, path in plot.walk():
-        if not isinstance(state, State):
-            continue
-        for key, actions in state.blocks():
-            for position, action in enumerate(actions):
-                name = _addressed(action)
-                if name is not None and name not in components:
-                    error = UnknownNameError(
-                        f"there is no component '{name}'",
-                        place=plot.place((*path, key, position)), found=name, valid=components,
-                    )  # fmt: skip
-                    yield Finding(error, "known component")
+        for key, actions in state.blocks() if isinstance(state, State) else ():
+            yield from ((action, (*path, key, position), "plots") for position, action in enumerate(actions))
+    for group, reactions in (("rules", [r.do for r in plot.rules]), ("handlers", [h.do for h in plot.handlers])):
+        for number, do in enumerate(reactions):
+            here = (group, number, "do", "command")
+            yield from ((command, (*here, position), "rules") for position, command in enumerate(do.command))
 
 
 def _addressed(action: ExternalAction | Internal) -> str | None:

@@ -15,7 +15,7 @@ from knowledge_base.errors import SchemaError
 def check_connectors(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
     """Findings about choices and selections."""
     connectors = {name: path for name, state, path in nesting.states if isinstance(state, Connector)}
-    circle = _circle({name: _targets(nesting, path) for name, path in connectors.items()})
+    circle = circle_of({name: _targets(nesting, path) for name, path in connectors.items()})
     for name, path in connectors.items():
         yield from _branches(plot, name, path, nesting)
         if name in circle:
@@ -43,8 +43,12 @@ def _targets(nesting: Nesting, path: Path) -> list[str]:
     return [target for _, _, transition in nesting.leaving(path) for target in transition.targets]
 
 
-def _circle(ways: Mapping[str, list[str]]) -> frozenset[str]:
-    """The connectors of one circle; a second one is found when the first is mended."""
+def circle_of(ways: Mapping[str, list[str]]) -> frozenset[str]:
+    """The connectors of one circle; a second one is found when the first is mended.
+
+    Args:
+        ways: connector -> where it leads.
+    """
     try:
         TopologicalSorter(ways).prepare()
     except CycleError as error:

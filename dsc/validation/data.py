@@ -7,17 +7,20 @@ from functools import cached_property
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import Outcomes, answerable, outputs_of
+from dsc.dynamic.steps import Step, concerns, terms_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Send, Switch, Tell, Trigger, Withdraw
 from dsc.model.connectors import Connector, SelectState
-from dsc.model.plot import ActionPlot, Parameter, Path, Rule, Variable
+from dsc.model.plot import ActionPlot, Parameter, Path, Variable
+from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, State, SubmachineState
 from dsc.model.transitions import TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.attributes import Skills, attributes_of
 from dsc.validation.nesting import Nesting
+from dsc.validation.rule_scope import RuleScope, Types
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.binding import unbound_error
 from knowledge_base.language.check import check, check_effect, check_term
@@ -27,8 +30,6 @@ from knowledge_base.schema import Schema
 
 FREE_TYPES = frozenset({"number", "text", "symbol", "boolean", "condition", "plot"})
 """Types of parameters and variables besides those of the schema."""
-
-Types = Mapping[str, str | None]
 
 
 def check_data(
@@ -50,8 +51,7 @@ class _Data:
         self._assigned = {**plot.variables, **plot.outputs}
         declared: dict[str, Parameter | Variable] = {**plot.parameters, **self._assigned}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
-        self._sources = [outcomes for _, state, _ in nesting.states if (outcomes := answerable(state, library))]
-        self._sources += [other.emits for other in library if other.implements]
+        self._rules = RuleScope(plot, library, skills, nesting, self._type)
 
     def findings(self) -> Iterator[Finding]:
         yield from self._declarations()
@@ -69,31 +69,55 @@ class _Data:
             else:
                 yield from self._internal(state.do, None, (*path, "do"))
         for number, rule in enumerate(self._plot.rules):
-            path = ("rules", number)
-            event = self._rule_event(rule.on)
-            if event is None:
-                yield self._unknown_event(rule.on, (*path, "on"))
-                continue
-            # Rules travel to generated plots, where the holder's variables do not exist.
-            if rule.when is not None:
-                yield from self._condition(rule.when, event, (*path, "when"))
-            if rule.do.tell is not None:
-                yield from self._effect(rule.do.tell, event, (*path, "do", "tell"))
-            yield from self._only(rule.do.arguments, event, (*path, "do", "with"))
-            if rule.do.then == "continue":
-                yield from self._continued(rule, event, (*path, "do", "then"))
+            yield from self._rule(rule, ("rules", number))
+        for number, handler in enumerate(self._plot.handlers):
+            yield from self._handler(handler, ("handlers", number))
+
+    def _rule(self, rule: Rule, path: Path) -> Iterator[Finding]:
+        # Rules travel to generated plots, where the holder's variables do not exist.
+        scope = self._rules.of(rule)
+        if scope is None:
+            yield self._rules.never(rule, path)
+            return
+        if rule.when is not None:
+            yield from self._condition(rule.when, scope, (*path, "when"))
+        yield from self._reaction(rule.do, scope, (*path, "do"))
+        yield from self._only(rule.do.passed, scope, (*path, "do", "pass"))
+        if rule.on is not None and rule.then == CONTINUE:
+            yield from self._continued(rule, scope, (*path, "do", "then"))
+
+    def _handler(self, handler: Handler, path: Path) -> Iterator[Finding]:
+        yield from self._rules.check(handler, path)
+        attributes = self._rules.attributes(handler)
+        read = frozenset(mentioned(handler.do.tell)) if handler.do.tell is not None else frozenset()
+        for part in (handler.when, *handler.do.arguments.values()):
+            read |= frozenset() if part is None else free_variables(part)
+        unknown = {name: None for name in read if name.startswith("event.")} if attributes is None else attributes
+        scope = {**self._types, **unknown}
+        if handler.when is not None:
+            yield from self._condition(handler.when, scope, (*path, "when"))
+        yield from self._reaction(handler.do, scope, (*path, "do"))
+        if handler.listen is not None:
+            yield from self._external(handler.listen, (*path, "listen"))
+
+    def _reaction(self, do: Reaction, scope: Types, path: Path) -> Iterator[Finding]:
+        if do.tell is not None:
+            yield from self._effect(do.tell, scope, (*path, "tell"))
+        yield from self._only(do.arguments, scope, (*path, "with"))
+        for position, command in enumerate(do.command):
+            yield from self._only(terms_of(command), scope, (*path, "command", position))
 
     def _continued(self, rule: Rule, event: Types, path: Path) -> Iterator[Finding]:
         """What goes on as if a state were done has the rule's event, not the outputs that `done` would bring."""
         for name, state, outcomes in self._handing_back:
-            if rule.on in outcomes and (not rule.of or name in rule.of):
+            if rule.on in outcomes and concerns(rule, name, state, self._library):
                 for transition in state.on.get(DONE, ()):
                     yield from self._transition(transition, event, path)
 
     @cached_property
-    def _handing_back(self) -> list[tuple[str, State, Outcomes]]:
+    def _handing_back(self) -> list[tuple[str, Step, Outcomes]]:
         """The states that bring outputs when they are done, with their outcomes."""
-        states = ((name, state) for name, state, _ in self._nesting.states if isinstance(state, State))
+        states = ((name, state) for name, state, _ in self._nesting.states if isinstance(state, Step))
         return [(n, s, answerable(s, self._library)) for n, s in states if outputs_of(s, self._library)]
 
     # -- parts of a plot ---------------------------------------------------------------------------------
@@ -271,25 +295,6 @@ class _Data:
         if found is None:
             return None
         return {f"event.{name}": self._type(kind) if kind else None for name, kind in found.items()}
-
-    def _rule_event(self, event: str) -> Types | None:
-        """The attributes a rule's event has wherever it can come from, also from steps of a plan."""
-        found: dict[str, str | None] = {}
-        known = False
-        for outcomes in self._sources:
-            if event in outcomes:
-                known = True
-                for name, kind in (outcomes[event] or {}).items():
-                    found[f"event.{name}"] = self._type(kind)
-        return found if known else None
-
-    def _unknown_event(self, event: str, path: Path) -> Finding:
-        valid = {name for _, state, _ in self._nesting.states for name in answerable(state, self._library)}
-        valid |= {name for plot in self._library if plot.implements for name in plot.emits}
-        error = UnknownNameError(
-            f"no state of this plot can end with '{event}'", place=self._plot.place(path), found=event, valid=valid
-        )
-        return Finding(error, "rule event")
 
     def _type(self, name: str) -> str | None:
         if name in {"number", "text", "boolean"}:

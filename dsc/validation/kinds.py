@@ -5,16 +5,17 @@ Only what can never fit is found: a name may be any thing, and a variable of a t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import Step, contents_of
 from dsc.errors import Finding
 from dsc.model.actions import Assign, Emit, ExternalAction, Internal, Trigger, flat
 from dsc.model.connectors import SelectState, case_value
 from dsc.model.plot import ActionPlot, Path
+from dsc.model.rules import Reaction
 from dsc.model.states import FinalState, State
 from dsc.model.transitions import TimedTransition, Transition
-from dsc.validation.arguments import Holder, contents
 from dsc.validation.attributes import Attributes, Skills, attributes_of
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError
@@ -61,14 +62,18 @@ class _Kinds:
                 if transition.passed or transition.effect or isinstance(transition, TimedTransition):
                     scope = self._scope(state, event) if isinstance(state, State) else self._own
                     yield from self._transition(transition, scope, (*path, *inside))
-        for number, rule in enumerate(self._plot.rules):
-            if rule.do.use is not None:
-                used = self._library.plot(rule.do.use)
-                yield from self._given(used, rule.do.arguments, self._own, ("rules", number, "do", "with"))
+        yield from self._reactions("rules", [rule.do for rule in self._plot.rules])
+        yield from self._reactions("handlers", [handler.do for handler in self._plot.handlers])
+
+    def _reactions(self, group: str, reactions: Sequence[Reaction]) -> Iterator[Finding]:
+        for number, do in enumerate(reactions):
+            if do.use is not None:
+                used = self._library.plot(do.use)
+                yield from self._given(used, do.arguments, self._own, (group, number, "do", "with"))
 
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
-        if isinstance(state, Holder) and state.arguments:
-            for used in contents(state, self._library):
+        if isinstance(state, Step) and state.arguments:
+            for used in contents_of(state, self._library):
                 yield from self._given(used, state.arguments, self._own, (*path, "with"))
         for key, actions in state.blocks() if state.entry or state.exit or state.on_break else ():
             for position, action in enumerate(actions):
@@ -89,7 +94,7 @@ class _Kinds:
             yield from self._fits(transition.seconds, "number", self._own, (*path, "seconds"))
         if transition.passed and transition.target is not None:
             target = self._nesting.state(transition.target)
-            for used in contents(target, self._library) if isinstance(target, Holder) else ():
+            for used in contents_of(target, self._library) if isinstance(target, Step) else ():
                 yield from self._given(used, transition.passed, scope, (*path, "pass"))
         for action in flat(transition.effect):
             yield from self._action(action, scope, path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from itertools import chain, islice
 
 from dsc.dynamic.library import Library
@@ -10,7 +10,7 @@ from dsc.errors import Finding, PlotError
 from dsc.model.plot import ActionPlot
 from dsc.skills import SkillSignature
 from dsc.validation.arguments import check_arguments
-from dsc.validation.components import check_components
+from dsc.validation.components import Components, check_components
 from dsc.validation.data import check_data
 from dsc.validation.kinds import check_kinds
 from dsc.validation.nesting import Nesting
@@ -29,7 +29,7 @@ def validate_library(
     library: Library,
     schema: Schema | None,
     skills: Iterable[SkillSignature] | None,
-    components: Collection[str] | None = None,
+    components: Components | None = None,
 ) -> list[Finding]:
     """All findings about all plots; see `validate_plot`."""
     known = None if skills is None else list(skills)
@@ -41,7 +41,7 @@ def validate_plot(
     library: Library,
     schema: Schema | None = None,
     skills: Iterable[SkillSignature] | None = None,
-    components: Collection[str] | None = None,
+    components: Components | None = None,
 ) -> list[Finding]:
     """What is wrong with a plot, at most `MAX_FINDINGS`; empty if nothing is.
 
@@ -50,7 +50,8 @@ def validate_plot(
         library: where the plots it uses are found.
         schema: to check conditions and types against; without it, they are not checked.
         skills: the skills that are deployed; without them, triggers are not checked.
-        components: names of the components that are deployed; without them, `set` and `switch` are not checked.
+        components: names of the components that are deployed, or also what they declare about their parameters;
+            without them, `set` and `switch` are not checked.
     """
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
     nesting = Nesting(plot)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import Step
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path, Scope, initial_of
 from dsc.model.states import AnyState, CompositeState, DynamicState, OrthogonalState, SubmachineState
-from dsc.validation.arguments import Holder
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, SchemaError
 
@@ -19,7 +19,7 @@ def check_reach(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterato
     Connectors are reached and lead on as states do.
     SCXML has no rule that all states can be reached, and a generated plot has its ends whether they are needed or not.
     """
-    holders = [(state, path) for _, state, path in nesting.states if isinstance(state, Holder)]
+    holders = [(state, path) for _, state, path in nesting.states if isinstance(state, Step)]
     yield from _circle(plot, _used(holders), library)
     yield from _empty_choices(plot, holders)
     if plot.profile == "dsc" and not plot.generated:
@@ -32,15 +32,15 @@ def _unreached(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator
     except InputError:  # rules that cannot be carried out have a finding of their own
         return
     ways = nesting if expanded is plot else Nesting(expanded)
-    written = set(nesting.names.values())
-    responses = {rule.do.then for rule in plot.rules}  # the steps of plans may end with what no state here does
-    for path in _unreached_in(expanded, (), ways, responses):
-        if path in written:
-            error = SchemaError(f"nothing leads to the state '{path[-1]}'", place=plot.place(path), found=str(path[-1]))
+    responses = {rule.then for rule in plot.rules}  # the steps of plans may end with what no state here does
+    for name in _unreached_in(expanded, (), ways, responses):
+        if name in nesting.names:
+            place = plot.place(nesting.names[name])
+            error = SchemaError(f"nothing leads to the state '{name}'", place=place, found=name)
             yield Finding(error, "reachable", "add a transition to it, or make it `initial`")
 
 
-def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]) -> Iterator[Path]:
+def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]) -> Iterator[str]:
     """The states that nothing leads to, without what is inside them; a transition stays in its scope (S0.3)."""
     reached: set[str] = set()
     waiting = [initial_of(scope), *responses]
@@ -53,7 +53,7 @@ def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]
     for name, state in scope.states.items():
         path = (*around, "states", name)
         if name not in reached:
-            yield path
+            yield name
         elif isinstance(state, CompositeState):
             yield from _unreached_in(state, path, ways, responses)
         elif isinstance(state, OrthogonalState):
@@ -61,7 +61,7 @@ def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]
                 yield from _unreached_in(region, (*path, "regions", key), ways, responses)
 
 
-def _empty_choices(plot: ActionPlot, holders: list[tuple[Holder, Path]]) -> Iterator[Finding]:
+def _empty_choices(plot: ActionPlot, holders: list[tuple[Step, Path]]) -> Iterator[Finding]:
     for state, path in holders:
         if isinstance(state, DynamicState) and not state.dynamic and state.goal is None:
             place = plot.place((*path, "dynamic"))

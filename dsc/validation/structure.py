@@ -21,11 +21,9 @@ from dsc.validation.connectors import check_connectors
 from dsc.validation.history import check_history
 from dsc.validation.nesting import Nesting
 from dsc.validation.profile import check_profile
+from dsc.validation.rules import check_rules, unknown_plot
 from dsc.validation.timing import check_timing
 from knowledge_base.errors import SchemaError, UnknownNameError
-
-RESPONSES = frozenset({"retry", "continue", "replan", "give_up"})
-"""What a rule may do besides going to a named state."""
 
 
 def check_structure(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
@@ -53,7 +51,7 @@ def _shape(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Fin
         yield from _uses(plot, state, path, library)
         if plot.profile == "dsc":
             yield from _dead_end(plot, name, state, path, nesting)
-    yield from _rules(plot, set(nesting.names), library)
+    yield from check_rules(plot, library, nesting)
 
 
 def _tables(plot: ActionPlot) -> Iterator[Finding]:
@@ -107,40 +105,19 @@ def _uses(plot: ActionPlot, state: AnyState, path: Path, library: Library) -> It
     if isinstance(state, SubmachineState) and state.use.startswith("?"):
         if state.use[1:] not in plot.variables and state.use[1:] not in plot.parameters:
             valid = {f"?{name}" for name in (*plot.variables, *plot.parameters)}
-            yield _unknown(plot, (*path, "use"), state.use, valid, "variable")
+            error = UnknownNameError(
+                f"there is no variable '{state.use}'", place=plot.place((*path, "use")), found=state.use, valid=valid
+            )
+            yield Finding(error, "known plot")
     elif isinstance(state, SubmachineState) and state.use not in library:
-        yield _unknown(plot, (*path, "use"), state.use, {other.name for other in library})
+        yield unknown_plot(plot, (*path, "use"), state.use, library)
     elif isinstance(state, DynamicState):
         for number, name in enumerate(state.dynamic):
             if name not in library:
-                yield _unknown(plot, (*path, "dynamic", number), name, {other.name for other in library})
-
-
-def _unknown(plot: ActionPlot, path: Path, name: str, valid: set[str], what: str = "plot") -> Finding:
-    error = UnknownNameError(f"there is no {what} '{name}'", place=plot.place(path), found=name, valid=valid)
-    return Finding(error, "known plot")
+                yield unknown_plot(plot, (*path, "dynamic", number), name, library)
 
 
 def _dead_end(plot: ActionPlot, name: str, state: AnyState, path: Path, nesting: Nesting) -> Iterator[Finding]:
     if isinstance(state, State) and not any(map(nesting.leaving, nesting.way(path))):
         error = SchemaError(f"no transition leaves the state '{name}'", place=plot.place(path))
         yield Finding(error, "no dead end", "wire what it ends with, or make it `final: true`")
-
-
-def _rules(plot: ActionPlot, names: set[str], library: Library) -> Iterator[Finding]:
-    for number, rule in enumerate(plot.rules):
-        path: Path = ("rules", number)
-        if rule.do.use is not None and rule.do.use not in library:
-            yield _unknown(plot, (*path, "do", "use"), rule.do.use, {other.name for other in library})
-        if rule.do.then not in RESPONSES | names:
-            error = UnknownNameError(
-                f"a rule cannot '{rule.do.then}'", place=plot.place((*path, "do", "then")),
-                found=rule.do.then, valid=RESPONSES | names,
-            )  # fmt: skip
-            yield Finding(error, "rule response")
-        for name in rule.of:
-            if name not in names:
-                missing = UnknownNameError(
-                    f"there is no state '{name}'", place=plot.place((*path, "of")), found=name, valid=names
-                )
-                yield Finding(missing, "rule")

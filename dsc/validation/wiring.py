@@ -9,10 +9,13 @@ from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import answerable, outcomes_of
+from dsc.dynamic.steps import Step, concerns
 from dsc.errors import Finding
 from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, TIMERS
 from dsc.model.actions import Trigger
+from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path
+from dsc.model.rules import RESPONSES
 from dsc.model.states import (
     AnyState,
     FinalState,
@@ -21,8 +24,8 @@ from dsc.model.states import (
 )
 from dsc.validation.attributes import Skills
 from dsc.validation.completion import check_completion
+from dsc.validation.connectors import circle_of
 from dsc.validation.nesting import Nesting
-from dsc.validation.structure import RESPONSES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
 
@@ -37,6 +40,7 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Ne
     traffic = _traffic(plot, library, skills, nesting)
     yield from _declared_events(plot)
     yield from _rule_targets(plot, library)
+    yield from _left_out_in_a_circle(plot, expanded)
     for name, state, path in nesting.states:
         if isinstance(state, FinalState):
             yield from _final(plot, state, path)
@@ -73,19 +77,29 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
-    leading = [(number, rule) for number, rule in enumerate(plot.rules) if rule.do.then not in RESPONSES]
-    every = (scope.states for scope in plot.scopes()) if leading else ()
-    scopes = [(siblings, [(name, answerable(s, library)) for name, s in siblings.items()]) for siblings in every]
-    for number, rule in leading:
-        for siblings, ends in scopes:
-            for name, outcomes in ends:
-                answers = rule.on in outcomes and (not rule.of or name in rule.of)
-                if answers and rule.do.then not in siblings:
+    leading = [(n, rule) for n, rule in enumerate(plot.rules) if rule.then not in RESPONSES[rule.place]]
+    for scope in plot.scopes() if leading else ():
+        steps = [(name, state) for name, state in scope.states.items() if isinstance(state, Step)]
+        for number, rule in leading:
+            for name, state in steps:
+                answers = rule.on is None or rule.on in answerable(state, library)
+                if answers and concerns(rule, name, state, library) and rule.then not in scope.states:
                     error = SchemaError(
-                        f"the rule's way from '{name}' to '{rule.do.then}' crosses a border",
-                        place=plot.place(("rules", number, "do", "then")), found=rule.do.then, valid=siblings,
+                        f"the rule's way from '{name}' to '{rule.then}' crosses a border",
+                        place=plot.place(("rules", number, "do", "then")), found=rule.then, valid=scope.states,
                     )  # fmt: skip
                     yield Finding(error, "no border crossing", "say with `of` for which states the rule is")
+
+
+def _left_out_in_a_circle(plot: ActionPlot, expanded: ActionPlot) -> Iterator[Finding]:
+    """Rules that leave out steps leave one in, in every circle of steps."""
+    if not any(rule.before for rule in plot.rules):
+        return
+    connectors = ((name, state) for name, state, _ in expanded.walk() if isinstance(state, Connector))
+    ways = {name: [way.target or "" for _, way in state.transitions()] for name, state in connectors}
+    if circle_of(ways):
+        error = SchemaError("these rules may leave out all steps of a circle, for ever", place=plot.place(("rules",)))
+        yield Finding(error, "connectors lead on", "let `then` lead to a state where a run can rest")
 
 
 def _handled(states: Iterable[AnyState]) -> dict[str, bool]:
@@ -163,7 +177,7 @@ class _Traffic:
 def _traffic(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> _Traffic:
     anywhere = {*(RESERVED - TIMERS), *plot.receives}
     inside: defaultdict[Path, set[str]] = defaultdict(set)
-    heard: set[str] = set()
+    heard: set[str] = {handler.on for handler in plot.handlers}
     for _, state, path in nesting.states:
         for _, _, transition in nesting.leaving(path):
             anywhere.update(transition.emitted)

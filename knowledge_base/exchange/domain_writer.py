@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from knowledge_base.errors import InputError
 from knowledge_base.exchange.action_text import ACTION, DURATIVE_ACTION, ActionText
-from knowledge_base.exchange.domain_text import DeclarationText, DomainText
+from knowledge_base.exchange.domain_text import AxiomText, DeclarationText, DomainText
 from knowledge_base.language.effect import NO_EFFECT, AllOf, Effect
 from knowledge_base.language.expression import TRUE, And, Constant, Expression, TypedVariable
 from knowledge_base.language.printer import to_text
@@ -36,8 +36,8 @@ def domain_to_text(domain: DomainText) -> str:
         _section(":constants", [_name(one) for one in domain.constants]),
         _section(":predicates", [_declaration(one) for one in domain.predicates]),
         _section(":functions", [f"{_declaration(one)} - {one.result or 'number'}" for one in domain.functions]),
-        *(f"  (:derived {_declaration(axiom.head)}\n    {to_text(axiom.condition)})" for axiom in domain.axioms),
-        *map(_action, domain.actions),
+        *map(axiom_to_text, domain.axioms),
+        *map(action_to_text, domain.actions),
     ]
     return "\n".join([f"(define (domain {domain.name})", *filter(None, sections)]) + ")\n"
 
@@ -77,7 +77,8 @@ def _parameter(parameter: TypedVariable) -> str:
     return f"?{parameter.name} - {_types(parameter.types)}"
 
 
-def _action(action: ActionText) -> str:
+def action_to_text(action: ActionText) -> str:
+    """One action as it stands in the file."""
     durative = action.duration is not None and action.timed is not None
     lines = [f"  ({DURATIVE_ACTION if durative else ACTION} {action.name}"]
     lines.append(f":parameters ({' '.join(map(_parameter, action.parameters))})")
@@ -89,6 +90,11 @@ def _action(action: ActionText) -> str:
         lines.append(f":precondition {to_text(action.precondition)}")
         lines.append(f":effect {to_text(action.effect)}")
     return "\n    ".join(lines) + ")"
+
+
+def axiom_to_text(axiom: AxiomText) -> str:
+    """One rule for a derived predicate as it stands in the file."""
+    return f"  (:derived {_declaration(axiom.head)}\n    {to_text(axiom.condition)})"
 
 
 def _duration(duration: Duration) -> str:

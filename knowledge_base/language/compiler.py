@@ -227,15 +227,18 @@ def _found(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]
     def test(world: World, bindings: Bindings) -> bool:
         if first_test is not None and not first_test(world, bindings):  # most searches of conditions end here
             return False
-        for stage, found in _ends(plan, world, bindings):
-            last = stage.last
-            if last is None:
-                if next(found, None) is not None:
-                    return True
-                continue
-            for candidate in found:
-                if next(last(world, candidate), None) is not None:
-                    return True
+        try:
+            for stage, found in _ends(plan, world, bindings):
+                last = stage.last
+                if last is None:
+                    if next(found, None) is not None:
+                        return True
+                    continue
+                for candidate in found:
+                    if next(last(world, candidate), None) is not None:
+                        return True
+        except InputError:  # a later candidate may decide, although this one cannot be computed
+            return next(_candidates(plan, world, bindings), None) is not None
         return False
 
     return test
@@ -254,18 +257,36 @@ def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str
 
 
 def _candidates(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[Bindings]:
-    for stage, found in _ends(plan, world, bindings):
-        if stage.last is None:
+    """What is found; an error about candidates that cannot be computed comes after all others."""
+    failed: list[InputError] = []
+    for stage, found in _ends(plan, world, bindings, failed):
+        for candidate in _computable(found, failed):
+            if stage.last is None:
+                yield candidate
+            else:
+                yield from _computable(stage.last(world, candidate), failed)
+    if failed:
+        raise failed[0]
+
+
+def _computable(found: Iterator[Bindings], failed: list[InputError]) -> Iterator[Bindings]:
+    """What can be computed of `found`: a filter goes on after an error in its test, a generator is over."""
+    while True:
+        try:
             yield from found
+        except InputError as error:
+            failed.append(error)
         else:
-            for candidate in found:
-                yield from stage.last(world, candidate)
+            return
 
 
-def _ends(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[tuple[Stage, Iterator[Bindings]]]:
+def _ends(
+    plan: SearchPlan, world: World, bindings: Bindings, failed: list[InputError] | None = None
+) -> Iterator[tuple[Stage, Iterator[Bindings]]]:
     """The stages with at most one look-up left, and the candidates that passed all tests, to be gone through at once.
 
     The plan's first test was passed. Backtracking with a stack of its own, so that long conjunctions do not recurse.
+    On the way errors are put into `failed` and their candidates left out, if it is given.
     """
     stack: list[tuple[Stage, Iterator[Bindings]]] = [(plan.tested, iter((bindings,)))]
     while stack:
@@ -273,11 +294,19 @@ def _ends(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[tuple[
         if stage.last is not None or not stage.choices:
             stack.pop()
             yield stage, found
-        elif (candidate := next(found, None)) is None:
-            stack.pop()
-        else:
+            continue
+        try:
+            candidate = next(found, None)
+            if candidate is None:
+                stack.pop()
+                continue
             i, lookup = smallest(stage.choices, world, candidate)
             after, found = plan.after(stage, i), lookup(world, candidate)
+        except InputError as error:
+            if failed is None:
+                raise
+            failed.append(error)
+        else:
             stack.append((after, found if after.test is None else filter(partial(after.test, world), found)))
 
 

@@ -14,6 +14,7 @@ from knowledge_base.language.expression import (
     Term,
     TypedVariable,
     free_variables,
+    quantified,
     substitute,
     substitute_term,
     unshadowed,
@@ -76,8 +77,8 @@ EFFECT_KEYWORDS = ("and", "not", "forall", "when", *ASSIGNMENTS)
 """The words that open an effect and are not predicates."""
 
 
-def substitute_effect(effect: Effect, bindings: Mapping[str, Value]) -> Effect:
-    """The effect with values in place of the variables that `bindings` names; inner variables shadow them."""
+def substitute_effect(effect: Effect, bindings: Mapping[str, Value | Term]) -> Effect:
+    """The effect with values or terms in place of the variables that `bindings` names; inner variables shadow them."""
     if isinstance(effect, AllOf):
         return AllOf(tuple(substitute_effect(part, bindings) for part in effect.parts))
     if isinstance(effect, ForEach):
@@ -89,6 +90,17 @@ def substitute_effect(effect: Effect, bindings: Mapping[str, Value]) -> Effect:
         return Assign(effect.operator, call, substitute_term(effect.value, bindings))
     atom = Atom(effect.atom.predicate, tuple(substitute_term(arg, bindings) for arg in effect.atom.args))
     return type(effect)(atom)
+
+
+def quantified_in(effect: Effect) -> frozenset[str]:
+    """The names of the variables that quantifiers in the effect bind."""
+    if isinstance(effect, AllOf):
+        return frozenset[str]().union(*map(quantified_in, effect.parts))
+    if isinstance(effect, ForEach):
+        return quantified_in(effect.effect) | {variable.name for variable in effect.variables}
+    if isinstance(effect, When):
+        return quantified(effect.condition) | quantified_in(effect.effect)
+    return frozenset()
 
 
 def mentioned(part: Expression | Term | Effect) -> frozenset[str]:

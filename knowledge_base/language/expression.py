@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place
 from knowledge_base.facts import Value
 from knowledge_base.spelling import is_plain_name
+
+Bound = TypeVar("Bound")
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,10 +198,11 @@ def variable_place(e: Expression | Term, name: str) -> Place | None:
     return next((place for place in found if place is not None), None)
 
 
-def substitute(e: Expression, bindings: Mapping[str, Value]) -> Expression:
-    """`e` with the free variables in `bindings` replaced by constants; quantified ones shadow.
+def substitute(e: Expression, bindings: Mapping[str, Value | Term]) -> Expression:
+    """`e` with the free variables in `bindings` replaced by values or terms; quantified ones shadow.
 
-    Names in `bindings` that do not occur free in `e` are ignored. Places are kept.
+    Names in `bindings` that do not occur free in `e` are ignored. Places are kept. A variable in a term must not meet
+    a quantifier of its name in `e`, see `quantified`.
     """
     match e:
         case Atom():
@@ -215,22 +219,29 @@ def substitute(e: Expression, bindings: Mapping[str, Value]) -> Expression:
             return replace(e, left=substitute_term(left, bindings), right=substitute_term(right, bindings))
 
 
-def substitute_term(term: Term, bindings: Mapping[str, Value]) -> Term:
-    """`term` with the variables in `bindings` replaced by constants."""
+def substitute_term(term: Term, bindings: Mapping[str, Value | Term]) -> Term:
+    """`term` with the variables in `bindings` replaced by values or terms."""
     match term:
         case Variable(name) if name in bindings:
-            return Constant(bindings[name], place=term.place)
+            value = bindings[name]
+            return value if isinstance(value, Term) else Constant(value, place=term.place)
         case Call(_, args) | Arithmetic(_, args):
             return replace(term, args=_all(args, bindings))
         case _:
             return term
 
 
-def unshadowed(variables: tuple[TypedVariable, ...], bindings: Mapping[str, Value]) -> dict[str, Value]:
+def quantified(e: Expression) -> frozenset[str]:
+    """The names of the variables that quantifiers in `e` bind."""
+    inner = frozenset[str]().union(*(quantified(part) for part in parts_of(e) if isinstance(part, Expression)))
+    return inner | {v.name for v in e.variables} if isinstance(e, Exists | Forall) else inner
+
+
+def unshadowed(variables: tuple[TypedVariable, ...], bindings: Mapping[str, Bound]) -> dict[str, Bound]:
     """The bindings that are still visible inside a quantifier over `variables`."""
     own = {v.name for v in variables}
     return {name: value for name, value in bindings.items() if name not in own}
 
 
-def _all(args: tuple[Term, ...], bindings: Mapping[str, Value]) -> tuple[Term, ...]:
+def _all(args: tuple[Term, ...], bindings: Mapping[str, Value | Term]) -> tuple[Term, ...]:
     return tuple(substitute_term(a, bindings) for a in args)

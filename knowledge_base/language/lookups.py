@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import Atom, Term, TypedVariable, Variable, free_variables
 from knowledge_base.language.terms import Argument, Bindings, compile_argument
@@ -148,11 +149,17 @@ def things(variable: TypedVariable) -> Search:
 
 
 def alternatives(branches: Sequence[Search]) -> Search:
-    """All that one of the branches finds, branch by branch."""
+    """All that one of the branches finds, branch by branch; an error of one comes after all others."""
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
+        failed: InputError | None = None
         for branch in branches:
-            yield from branch(world, bindings)
+            try:
+                yield from branch(world, bindings)
+            except InputError as error:
+                failed = failed or error
+        if failed is not None:
+            raise failed
 
     return search
 

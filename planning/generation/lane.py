@@ -5,17 +5,19 @@ r"""One control flow of a generated plot: steps one after the other, waiting for
 
 `after_n` waits until the step's effects are observed. `before_n` waits for steps of other flows: they set the variables
 `done_n` and `begun_n`, so that nobody has to ask again and again. Then it looks at what the step needs, so that no step
-begins on a wrong premise. Where there is nobody to wait for, `after_n` does that as well.
+begins on a wrong premise. Where there is nobody to wait for, `after_n` does that as well. A step that
+rules may leave out has `step_n_skipped` besides: like `after_n`, without waiting for what the step would have changed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dsc.dynamic.rules import REPLAN
+from dsc.dynamic.responses import skipped
 from dsc.events import GAVE_UP
+from dsc.model.rules import REPLAN
 from knowledge_base.language.expression import And, Comparison, Constant, Expression, Not, Variable
 from knowledge_base.language.printer import to_text
 from planning.generation.steps import CarriedStep
@@ -47,12 +49,19 @@ class Writer:
         order: which of them wait for which.
         lanes: how they are spread.
         plan: name under which the planner's component hears which step begins; nobody hears of a plot without it.
+        left_out: the steps that rules may leave out.
     """
 
     def __init__(
-        self, steps: Sequence[CarriedStep], order: PartialOrder, lanes: Sequence[Lane], plan: str | None
+        self,
+        steps: Sequence[CarriedStep],
+        order: PartialOrder,
+        lanes: Sequence[Lane],
+        plan: str | None,
+        left_out: Collection[int] = (),
     ) -> None:
         self._steps = dict(enumerate(steps, start=1))
+        self._left_out = left_out
         self._plan = plan
         lane_of = {number: lane for lane in lanes for number in lane.numbers}
         self._waits: dict[int, list[tuple[str, int]]] = {number: [] for number in self._steps}
@@ -73,7 +82,9 @@ class Writer:
         states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
         for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
             states[f"step_{number}"] = self._step(number, lane)
-            states[f"after_{number}"] = self._after(number, following, lane)
+            states[f"after_{number}"] = self._after(number, following, lane, self._steps[number].expected)
+            if number in self._left_out:
+                states[skipped(f"step_{number}")] = self._after(number, following, lane, ())
             if following is not None and self._waits[following]:
                 states[f"before_{following}"] = self._before(following, lane)
         for end in (REPLAN, GAVE_UP):
@@ -102,15 +113,17 @@ class Writer:
             state["after"] = {"seconds": step.seconds, **self._replan(lane, f"too slow: {step.text}")}
         return state
 
-    def _after(self, number: int, following: int | None, lane: Lane) -> dict[str, Any]:
+    def _after(
+        self, number: int, following: int | None, lane: Lane, expected: tuple[Expression, ...]
+    ) -> dict[str, Any]:
         step, flag = self._steps[number], f"{_DONE}_{number}"
         told = {"assign": {flag: True}} if flag in self._flags else {}
         if following is not None and self._waits[following]:
-            onward = [_guarded({"to": f"before_{following}", **told}, step.expected)]
+            onward = [_guarded({"to": f"before_{following}", **told}, expected)]
         else:
-            onward = self._onward(following, lane, step.expected, told)
+            onward = self._onward(following, lane, expected, told)
         state: dict[str, Any] = {"always": onward}
-        if step.expected:
+        if expected:
             state["after"] = {"seconds": step.confirm, **self._replan(lane, f"not observed: {step.text}")}
         return state
 

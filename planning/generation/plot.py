@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dsc.dynamic.rules import REPLAN
 from dsc.events import FAILURES, GAVE_UP
-from dsc.model.plot import ActionPlot, Rule
-from dsc.validation.structure import RESPONSES
+from dsc.model.plot import ActionPlot
+from dsc.model.rules import CONTINUE, REPLAN, RESPONSES, Rule
 from planning.generation.lane import FINISHED, Lane, Writer
 from planning.generation.steps import CarriedStep, Carrier, sketched
 from planning.generation.usage import Usage
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
     from dsc.dynamic.library import Library
     from planning.domain import PlanningDomain
-    from planning.plan import Plan
+    from planning.plan import Plan, PlanStep
 
 WORK = "work"
 """Name of the state that holds the regions."""
@@ -61,12 +60,13 @@ def plot_from_plan(
     if order is None:
         order = scheduled(plan) if plan.schedule else in_sequence(plan)
     domain = derivation(domain).domain  # the knowledge base knows no derived predicates
-    rules = [rule for rule in rules if not rule.of and rule.do.then in RESPONSES]  # others are about their plot alone
+    rules = [own for rule in rules if (own := _inherited(rule, plan)) is not None]
     writing = None if library is None else Carrier(domain, library, rules)
     steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
     order = order.restricted(_clashes([step.usage for step in steps], order, shared))
     lanes = _lanes(order, steps)
-    writer = Writer(steps, order, lanes, None if library is None else name)
+    left_out = [n for n, step in enumerate(plan.steps, start=1) if any(_leaves_out(rule, step) for rule in rules)]
+    writer = Writer(steps, order, lanes, None if library is None else name, left_out)
     ends = {FINISHED: {"final": True}}
     if len(lanes) == 1:
         states = {**writer.states(lanes[0]), **ends}
@@ -80,10 +80,29 @@ def plot_from_plan(
             "variables": {"reason": {"type": "text", "initial": "unknown"}, **writer.variables},
             "emits": {REPLAN: {"reason": "text"}, GAVE_UP: {"reason": "text"}},
             "states": states,
-            "rules": [rule for rule in rules if any(rule.on in step.outcomes | FAILURES for step in steps)],
+            "rules": [
+                rule for rule in rules
+                if rule.on is None or any(rule.on in step.outcomes | FAILURES for step in steps)
+            ],
             "generated": True,
         }
     )
+
+
+def _inherited(rule: Rule, plan: Plan) -> Rule | None:
+    """The rule as far as it is about steps of this plan; names of states are about the plot alone that has them."""
+    if rule.then not in RESPONSES[rule.place]:
+        return None
+    if not rule.steps:
+        return rule
+    done = {step.action for step in plan.steps}
+    key = "of" if rule.on is not None else rule.place
+    named = tuple(name for name in rule.steps if name in done)
+    return rule.model_copy(update={key: named}) if named else None
+
+
+def _leaves_out(rule: Rule, step: PlanStep) -> bool:
+    return step.action in rule.before and rule.then == CONTINUE
 
 
 def _clashes(

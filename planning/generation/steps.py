@@ -8,7 +8,8 @@ from itertools import chain
 from typing import Any
 
 from dsc.dynamic.library import Library
-from dsc.model.plot import ActionPlot, Rule
+from dsc.model.plot import ActionPlot
+from dsc.model.rules import Rule
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.effect import Add, AllOf, Delete, Effect, substitute_effect

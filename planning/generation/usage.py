@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.events import FAILURES
 from dsc.model.actions import Configure, Switch, Trigger, flat
-from dsc.model.plot import ActionPlot, Rule
+from dsc.model.plot import ActionPlot
+from dsc.model.rules import Rule
 from dsc.model.states import DynamicState, State, SubmachineState
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
 from knowledge_base.facts import Value
@@ -35,24 +36,33 @@ class Usage:
 
 
 def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] = ()) -> Usage:
-    """What the plots may use, and the recoveries that the rules have for their outcomes.
+    """What the plots may use, and what the rules have for their outcomes or put before and after them.
 
     Raises:
         UnknownNameError: a plot uses one that is not there.
     """
     found: dict[str, ActionPlot] = {}
-    waiting, rules = list(plots), tuple(rules)
-    emitted = FAILURES.union(*(plot.emits for plot in waiting))
-    waiting += [library.plot(rule.do.use) for rule in rules if rule.do.use and rule.on in emitted]
+    waiting = list(plots)
+    applied = _applied(rules, waiting)
+    waiting += [library.plot(rule.do.use) for rule in applied if rule.do.use]
     while waiting:
         plot = waiting.pop()
         if plot.name not in found:
             found[plot.name] = plot
             waiting += [library.plot(name) for name in sorted(plot.uses())]
     actions = [action for plot in found.values() for action in _actions(plot)]
+    actions += [one for rule in applied for one in rule.do.command if isinstance(one, Configure | Switch)]
     names = {_component(action) for action in actions}
     limits = [action.within or DEFAULT_WITHIN for action in actions if isinstance(action, Trigger)]
     return Usage(frozenset(names), any(map(_is_open, found.values())), sum(limits))
+
+
+def _applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
+    """The rules that may have something to do with a step over these plots."""
+    emitted = FAILURES.union(*(plot.emits for plot in plots))
+    actions = {plot.implements for plot in plots}
+    named = [rule for rule in rules if not rule.steps or actions.intersection(rule.steps)]
+    return [rule for rule in named if rule.on is None or rule.on in emitted]
 
 
 def fitting(plots: Iterable[ActionPlot], bindings: Mapping[str, Value]) -> tuple[ActionPlot, ...]:

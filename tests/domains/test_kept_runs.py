@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 from kept_lives import SCENARIO, told
 
-from domains.clean_up_table.deployment import deploy, resumed
+from domains.clean_up_table.deployment import PROFILES, deploy, resumed
 from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.world_file import LastingWorld
 from dsc.sequencer.replay import replay
+from dsc.text.profiles import find_profile
 from knowledge_base.errors import InputError, StoreError
 
 DSC = Path(sys.executable).with_name("dsc")
@@ -142,3 +143,22 @@ def test_a_mistake_is_one_line(words, message):
     assert (status, out) == (2, "")
     assert message in error
     assert error.count("\n") == 1
+
+
+def test_another_robot_is_the_same_one_after_the_crash(planner, tmp_path):
+    (alive := tmp_path / "alive").mkdir()
+    copies, profile = [], find_profile("on_tracks", PROFILES)
+
+    def boundary(_):
+        if len(copies) < 30:
+            copies.append(copied(alive, tmp_path / f"copy{len(copies)}") if len(copies) in (15, 29) else None)
+
+    with deploy(Scenario.parse(SCENARIO), 3, 0.2, planner, store=alive / "run.kb", profile=profile) as table:
+        report = replace(table.run(prepare=lambda run: run.listen(boundary)), wall_s=0)
+        world = table.world.state()
+    for path in filter(None, copies):
+        with resumed(path, planner) as table:
+            assert table.profile.digest == profile.digest
+            assert replace(table.run(), wall_s=0) == report
+            assert table.world.state() == world
+        assert told(path) == told(alive / "run.kb")

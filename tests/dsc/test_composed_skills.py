@@ -224,3 +224,22 @@ def test_the_wrapped_plot_and_the_wrapping_one_are_sound():
     library = Library([plot(CAREFULLY), plot(FETCH)])
     for one in library:
         assert validate_plot(one, library, None, Arm().skills().values(), {"arm"}) == []
+
+
+def test_no_two_actions_of_plots_that_are_skills_have_one_id():
+    ids = []
+
+    class Counting(Arm):
+        def execute(self, skill_name, call, arguments):
+            ids.append(call.action_id)
+            return super().execute(skill_name, call, arguments)
+
+    text = """
+        plot: p
+        states:
+          a: {entry: {trigger: helper.fetch, with: {item: cup7}}, on: {fetched: b, lost: b, completed: b}}
+          b: {entry: {trigger: helper.fetch, with: {item: cup8}}, on: {fetched: e, lost: e, completed: e}}
+          e: {final: true}
+    """
+    assert Ran(text, arm=helper(Counting(), FETCH)).end.finished
+    assert len(ids) == len(set(ids)) == 2

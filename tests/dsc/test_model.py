@@ -13,7 +13,8 @@ from pydantic import ValidationError
 
 from dsc.model.actions import Assign, Configure, Emit, Switch, Trigger
 from dsc.model.connectors import ChoiceState, SelectState
-from dsc.model.plot import ActionPlot, Rule, initial_of
+from dsc.model.plot import ActionPlot, initial_of
+from dsc.model.rules import Rule
 from dsc.model.states import (
     CompositeState,
     DynamicState,

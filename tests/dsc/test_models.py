@@ -8,6 +8,7 @@ from domains.clean_up_table.deployment import deploy
 from domains.clean_up_table.deployment import plots as table_plots
 from dsc.dynamic.library import Library
 from dsc.models import MODELS, described
+from dsc.text.plots import parse_plot
 from knowledge_base import KnowledgeBase
 
 
@@ -34,6 +35,30 @@ def test_who_offers_what_may_fail_like_that_and_which_plot_answers(kb) -> None:
     assert named(kb, failing, "c") == {"component:arm"}
     assert "plot:clean_up_table" in named(kb, '(answers ?p "grasp_failed" ?how)', "p")
     assert kb.ask('(forall (?s - skill) (imply (emits ?s "grasp_failed") (exists (?p - action-plot) (triggers ?p ?s))))')
+
+
+def test_which_rule_answers_what_and_what_it_leads_to(kb) -> None:
+    answering = '(and (reacts-to ?r "slipped") (stands-in ?r plot:clean_up_table) (leads-to ?r ?next))'
+    (answer,) = kb.query(answering)
+    assert answer["next"] == "replan"
+    assert kb.ask("(runs ?r plot:pick_up_from_above)", {"r": answer["r"]})
+
+
+def test_insertions_and_handlers_are_known_too() -> None:
+    plots = [parse_plot(text) for text in (PATROL, "{plot: wipe, states: {e: {final: true}}}")]
+    kb = KnowledgeBase(MODELS)
+    kb.apply(described(Library(plots)), author="design")
+    assert named(kb, '(and (rule ?r) (concerns ?r "look") (runs ?r plot:wipe))', "r") == {"rule:patrol.1"}
+    assert named(kb, '(and (handler ?h) (reacts-to ?h "low"))', "h") == {"handler:patrol.1"}
+    assert kb.ask("(and (triggers plot:patrol skill:battery.low) (uses plot:patrol plot:wipe))")
+
+
+PATROL = """
+plot: patrol
+states: {look: {use: wipe, on: {done: e}}, e: {final: true}}
+rules: [{before: look, do: {use: wipe}}]
+handlers: [{on: low, listen: {trigger: battery.low}, do: {use: wipe}}]
+"""
 
 
 def test_everything_that_a_plot_uses_is_there(kb) -> None:

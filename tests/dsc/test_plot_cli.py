@@ -73,7 +73,7 @@ def test_findings_as_data(tmp_path: Path) -> None:
     assert findings(file) == [
         {
             "file": str(file), "line": 4, "column": 28, "message": "there is no state 'ovre'",
-            "found": "ovre", "nearest": "over", "rule": "target", "fix": None,
+            "found": "ovre", "nearest": "over", "rule": "target", "fix": None, "level": "error",
         }
     ]  # fmt: skip
 

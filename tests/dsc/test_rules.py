@@ -6,7 +6,7 @@ import pytest
 from dsc_charts import Run, modes, plot
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.rules import DEFAULT_RETRIES
+from dsc.dynamic.responses import DEFAULT_RETRIES
 from dsc.engine.situation import Decision
 from dsc.engine.steps import SetParameter
 from dsc.model.actions import Tell

@@ -263,13 +263,18 @@ def test_a_changed_chart_is_refused_with_the_difference(tmp_path, chart, more, d
     assert Run(folder, [TWICE], done=done, resume=True).end == crashes.whole.end
 
 
+def action(name):
+    return f"planning action '{name}'"
+
+
 def test_a_changed_domain_is_refused_with_the_difference(tmp_path):
     with KnowledgeBase.open(SCHEMA, tmp_path / "run.kb") as kb:
-        store = RunStore(kb, tmp_path / "run.kb", domain={"go": "(go)", "come": "(come)", "stay": "(stay)"})
+        store = RunStore(kb, tmp_path / "run.kb", domain={action("go"): "(go)", action("come"): "(come)", action("stay"): "(stay)"})
         with store.writing():
             store.begin("p", {}, Library())
+        now = {action("go"): "(went)", action("come"): "(come)", action("eat"): "(eat)"}
         with pytest.raises(ChangedError) as found:
-            RunStore(kb, tmp_path / "run.kb", domain={"go": "(went)", "come": "(come)", "eat": "(eat)"}).take_up(Library())
+            RunStore(kb, tmp_path / "run.kb", domain=now).take_up(Library())
     assert found.value.differences == (
         "the planning action 'go' was '(go)', now it is '(went)'",
         "the planning action 'stay' is missing",

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from dsc_charts import plot
 
+from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
 from dsc.model.plot import ActionPlot
@@ -38,6 +39,7 @@ class Arm(Component):
 
 
 SKILLS = list(Arm().skills().values())
+COMPONENTS = {"arm": {}, "base": {}, "lift": {"pace": Parameter("number", default=1, least=0, most=2), "port": Parameter("text", changed_by="profile")}}
 HELPERS = [
     plot("""
         plot: grasp
@@ -80,7 +82,7 @@ RINGS = [
 
 def findings_of(text, schema=SCHEMA, skills=SKILLS):
     made = parse_plot(text, "p.yaml")
-    return validate_plot(made, Library([made, *HELPERS, *RINGS]), schema, skills, {"arm", "base"})
+    return validate_plot(made, Library([made, *HELPERS, *RINGS]), schema, skills, COMPONENTS)
 
 
 S = "plot: p\nstates:\n"
@@ -455,6 +457,22 @@ WRONG = [
         + "variables: {w: place}\nrules:\n  - on: nobody\n    do: {then: continue}\n",
         9, "?event.where", "",
     ),
+    # -- rules that insert, handlers
+    ("rule response", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    do: {then: retry}\n", 11, "cannot 'retry' before a step", ""),
+    ("rule", ITEM + "  abc:\n" + GRASP + WIRED + E + "rules:\n  - after: [pick-upp]\n    do: {use: wait}\n", 10, "mean 'pick-up'", ""),
+    ("arguments are taken", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - after: a\n    do: {use: wait, pass: {speed: 2}}\n", 11, "whose response is 'continue'", "retry"),
+    ("known parameter", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    do: {pass: {sped: 2}}\n", 11, "mean 'speed'", ""),
+    ("condition", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    when: (on ?step.itm table)\n    do: {use: wait}\n", 11, "mean '?step.item'", ""),
+    ("known component", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    do: {command: [{switch: amr, to: rest}]}\n", 11, "mean 'arm'", ""),
+    ("rule event", ITEM + "  a:\n" + GRASP + "    on: {done: b, failed: e, lost: e}\n  b: {use: wait, on: {done: e}}\n" + E + "rules:\n  - on: lost\n    of: b\n    do: {then: e}\n", 11, "'b' cannot end with 'lost'", ""),
+    ("known event", S + "  a: {on: {done: e}}\n" + E + "handlers:\n  - on: low\n    do: {use: wait}\n", 6, "nothing here fires the event 'low'", "listen"),
+    ("handler", S + "  a: {on: {done: e, x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    interrupt: true\n    do: {tell: (free)}\n", 7, "interrupts nothing", "use"),
+    ("profile", H + "  a: {on: {x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    do: {use: wait}\n", 7, "handlers are for plots of profile dsc", "transitions"),
+    ("connectors lead on", S + "  a: {use: wait, on: {done: b}, after: {seconds: 9, to: e}}\n  b: {use: wait, on: {done: a}}\n" + E
+     + "rules:\n  - {before: [a, b], when: (free), do: {then: continue}}\n", 6, "all steps of a circle", "`then`"),
+    # -- parameters of components
+    ("component parameter", S + "  a:\n    entry:\n      set: lift.pace\n      to: 3\n    on: {done: e}\n" + E, 6, "from 0 to 2; found 3", ""),
+    ("component parameter", S + "  a:\n    entry:\n      set: lift.port\n      to: x\n    on: {done: e}\n" + E, 5, "not changed by plots", "changed_by"),
     # -- rules are transitions too
     (
         "no border crossing",
@@ -479,7 +497,8 @@ def test_a_wrong_plot_gets_one_finding_with_place_rule_and_remedy(rule, text, li
 
 def test_every_rule_of_the_validator_is_tested():
     sources = Path(__file__).parents[2] / "dsc" / "validation"
-    text = "".join(file.read_text() for file in sources.glob("*.py"))
+    warning = {"review.py", "candidates.py"}  # for which there is test_review
+    text = "".join(file.read_text() for file in sources.glob("*.py") if file.name not in warning)
     rules = set(re.findall(r'Finding\([^"]*?, "([a-z ]+)"', text, re.DOTALL))
     assert rules == {case[0] for case in WRONG}
 

@@ -129,11 +129,25 @@ def test_a_changed_planning_action_is_refused_with_the_difference(whole, planner
         robot.resume()
     (difference,) = found.value.differences
     assert difference == (
-        "the planning action 'switch-on' was '(switch-on (?lamp - lamp) (works ?lamp) (on ?lamp))', "
-        "now it is '(switch-on (?lamp - lamp) (and) (on ?lamp))'"
+        "the planning action 'switch-on' was "
+        "'(:action switch-on :parameters (?lamp - lamp) :precondition (works ?lamp) :effect (on ?lamp))', "
+        "now it is '(:action switch-on :parameters (?lamp - lamp) :precondition (and) :effect (on ?lamp))'"
     )
     with executive(planner, copy) as robot:
         assert robot.resume().finished
+
+
+def test_how_long_an_action_takes_and_what_is_derived_belong_to_the_domain():
+    text = """
+    (define (domain d) (:types lamp) (:predicates (on ?l - lamp) (dark))
+      (:derived (dark) (forall (?l - lamp) (not (on ?l))))
+      (:durative-action light :parameters (?l - lamp) :duration (= ?duration 2) :condition (and) :effect (at end (on ?l))))
+    """
+    before = PlanningDomain.parse(text).statements()
+    longer = PlanningDomain.parse(text.replace("duration 2", "duration 3")).statements()
+    other = PlanningDomain.parse(text.replace("forall", "exists")).statements()
+    assert [name for name in before if before[name] != longer[name]] == ["planning action 'light'"]
+    assert [name for name in before if before[name] != other[name]] == ["derived predicate 'dark'"]
 
 
 def test_only_what_was_begun_in_a_store_can_be_resumed(planner, tmp_path):

@@ -399,7 +399,7 @@ states:
       gave_up: {{to: lit, emit: ended, with: {{how: ?event.reason}}}}
     after: {{seconds: 900, to: help}}
   help: {{always: step_1}}
-  step_1: {{always: lit}}
+  step_1: {{use: light, with: {{lamp: a}}, on: {{done: lit, nothing: lit, gave_up: lit}}}}
   lit: {{final: true}}
 rules:
   - {{on: bulb_blown, {rule}}}

@@ -104,6 +104,41 @@ rules:
     assert [t.target for t in step.on["stuck"]] == ["replan"]
 
 
+CLEAN = parse_plot("""
+plot: clean
+parameters: {parcel: parcel}
+states: {c: {entry: {trigger: brush.sweep, within: 7}, on: {done: e}}, e: {final: true}}
+""")
+INSERTING = parse_plot("""
+plot: holder
+states: {s: {goal: (free), on: {done: e, no_plan: e, gave_up: e}}, e: {final: true}}
+rules:
+  - {before: [take, s], when: (in ?step.parcel store), do: {use: clean, with: {parcel: ?step.parcel}}}
+  - {before: go, when: (robot-in ?step.to), do: {then: continue}}
+  - {after: fly, do: {use: clean}}
+  - {before: s, do: {then: give_up}}
+""")
+
+
+def test_it_inherits_what_is_inserted_before_its_steps_and_which_are_left_out():
+    library = Library([GO, TAKE, CLEAN, INSERTING])
+    plot = made(INSERTING.rules, library)
+    assert [rule.label for rule in plot.rules] == ["before take: clean", "before go: continue"]
+    expanded = library.expanded(plot)
+    go, take = expanded.state("step_1_before_1"), expanded.state("step_2_before_0")
+    assert [(to_text(way.guard), way.target) for way in go.choice[:-1]] == [("(robot-in store)", "step_1_skipped")]
+    assert to_text(take.choice[0].guard) == "(in box store)"
+    assert expanded.state(take.choice[0].target).arguments["parcel"].value == "box"
+    assert not expanded.state("step_1_skipped").after
+    assert "step_2_skipped" not in {name for name, _, _ in expanded.walk()}
+
+
+def test_a_step_takes_hold_of_what_is_inserted_before_it():
+    library = Library([GO, TAKE, CLEAN, INSERTING])
+    assert made(INSERTING.rules, library).state("step_2").after[0].seconds.value == 2 * (300 + 7)
+    assert made((), library).state("step_2").after[0].seconds.value == 2 * 300
+
+
 def test_an_action_without_a_plot_is_an_error_that_names_the_nearest():
     with pytest.raises(UnknownNameError, match="no plot implements the planning action 'take'"):
         made(library=Library([GO]))

@@ -21,7 +21,7 @@ from dsc.model.states import (
 from dsc.text.diagram.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card
 from dsc.text.diagram.crossing import join, way_to
 from dsc.text.diagram.edges import Bundle, bundles, initial_bundle
-from dsc.text.diagram.header import header, rules_note
+from dsc.text.diagram.header import handler_text, header, rule_text, rules_note
 from dsc.text.diagram.layout import Box, BoxKind, Text, TextStyle
 from dsc.text.diagram.nesting import Nesting
 from dsc.text.diagram.scope import Inside, Span, arranged, widened
@@ -54,9 +54,11 @@ def build(plot: ActionPlot, library: Library | None, *, rules: bool, sideways: b
 def _notes(plot: ActionPlot, *, shown: bool) -> Box | None:
     """The rules that no edge shows: all that were not carried out, and those for what will be planned."""
     planned = any(isinstance(state, DynamicState) and state.goal is not None for _, state, _ in plot.walk())
-    if not plot.rules or (shown and not planned):
-        return None
-    return rules_note(plot.rules, "rules, also for the steps of plans" if planned else "rules")
+    rows = [rule_text(rule) for rule in plot.rules] if planned or not shown else []
+    rows += [handler_text(handler) for handler in plot.handlers] if not shown else []
+    about = "rules and handlers" if plot.handlers and not shown else "rules"
+    about += ", also for the steps of plans" if planned and plot.rules else ""
+    return rules_note(rows, about) if rows else None
 
 
 def _frame(plot: ActionPlot, inside: Inside, notes: Box | None) -> Box:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from dsc.model.plot import ActionPlot, Parameter, Rule, Variable
-from dsc.text.diagram.captions import content_text
+from dsc.model.plot import ActionPlot, Parameter, Variable
+from dsc.model.rules import Handler, Rule
+from dsc.text.diagram.captions import action_text, content_text
 from dsc.text.diagram.layout import Box, BoxKind, Text, TextStyle
 from dsc.text.diagram.measure import LINE_HEIGHT, pack, shorten, text_width
 from knowledge_base.language.printer import to_text
@@ -73,9 +74,8 @@ def _events(declared: Mapping[str, Mapping[str, str] | None]) -> str:
     )
 
 
-def rules_note(rules: tuple[Rule, ...], about: str) -> Box:
-    """A box that lists rules, for those that no edge shows."""
-    rows = [rule_text(rule) for rule in rules]
+def rules_note(rows: Sequence[str], about: str) -> Box:
+    """A box that lists rules and handlers, for those that no edge shows."""
     texts = [Text(12.0, 20.0, about, TextStyle.ABOUT)]
     texts += [
         Text(12.0, 22.0 + LINE_HEIGHT * number, shorten(row, TextStyle.RULE, 480.0), TextStyle.RULE)
@@ -90,8 +90,22 @@ def rule_text(rule: Rule) -> str:
     """A rule on one line."""
     response = rule.do
     steps = [content_text(response.use, response.arguments)] if response.use else []
+    steps = [*(action_text(command) for command in response.command), *steps]
     steps += ["tell"] if response.tell is not None else []
-    of = f" of {', '.join(rule.of)}" if rule.of else ""
+    passed = f" with {', '.join(response.passed)}" if response.passed else ""
     limit = f" (at most {response.limit} times)" if response.limit else ""
     guard = f" [{to_text(rule.when)}]" if rule.when is not None else ""
-    return f"{rule.on}{of} → {', '.join([*steps, response.then.replace('_', ' ')])}{limit}{guard}"
+    about = rule.on or f"{rule.place} {', '.join(rule.steps)}"
+    of = f" of {', '.join(rule.of)}" if rule.of else ""
+    return f"{about}{of} → {', '.join([*steps, rule.then.replace('_', ' ')])}{passed}{limit}{guard}"
+
+
+def handler_text(handler: Handler) -> str:
+    """A handler on one line."""
+    do = handler.do
+    steps = [action_text(command) for command in do.command]
+    steps += [content_text(do.use, do.arguments)] if do.use else []
+    steps += ["tell"] if do.tell is not None else []
+    kind = "interrupted by" if handler.interrupt else "beside it"
+    guard = f" [{to_text(handler.when)}]" if handler.when is not None else ""
+    return f"{kind} {handler.on} → {', '.join(steps)}{guard}"

@@ -28,7 +28,7 @@ from dsc.text.diagram.captions import (
     labelled_by_value,
     seconds_text,
 )
-from dsc.text.diagram.header import facts, rule_text, signature
+from dsc.text.diagram.header import facts, handler_text, rule_text, signature
 from knowledge_base.language.printer import to_text
 
 _SOFT, _RULE = "dim", "magenta"
@@ -44,6 +44,10 @@ def plot_tree(plot: ActionPlot) -> Tree:
         rules = tree.add(_line(("rules", "bold")))
         for rule in plot.rules:
             rules.add(_line((rule_text(rule), _RULE)))
+    if plot.handlers:
+        handlers = tree.add(_line(("handlers", "bold")))
+        for handler in plot.handlers:
+            handlers.add(_line((handler_text(handler), _RULE)))
     return tree
 
 

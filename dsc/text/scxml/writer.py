@@ -33,6 +33,7 @@ def to_scxml(plot: ActionPlot) -> str:
         NotExpressibleError: the plot uses something that SCXML has nothing for.
     """
     for what, there in (("parameters", plot.parameters), ("outputs", plot.outputs), ("rules", plot.rules),
+                        ("handlers", plot.handlers),
                         ("outcome events", plot.emits), ("condition", plot.when),
                         ("planning action", plot.implements)):  # fmt: skip
         if there:

@@ -1,0 +1,131 @@
+"""Another robot for the same table: a base on tracks, an arm that holds by suction, a camera that looks twice.
+
+Its skills have the names and outcomes that the plots know, and get there in other ways; one skill is its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from domains.clean_up_table.places import PLACES, distance
+from domains.clean_up_table.skills import ITEM_AT, ITEM_IN, NOT_POSSIBLE, ONCE, Arm, Base, Camera, outcome_of, seconds
+from dsc.components.parameters import Parameter
+from dsc.skills import Outcome, SkillCall, skill
+
+if TYPE_CHECKING:
+    from domains.clean_up_table.results import Result
+
+
+class Tracks(Base):
+    """A base on tracks: slow, turns on the spot first, and waits for a blocked way itself before it says so."""
+
+    declares: ClassVar[Mapping[str, Parameter]] = {
+        **Base.declares,
+        "speed": Parameter("number", default=0.2, least=0.05, most=0.4),
+        "turning": seconds(3.0),
+        "patience": seconds(8.0),
+    }
+
+    @skill(
+        outcomes={
+            "arrived": {"to": "place"},
+            "no_path": {"to": "place"},
+            "slipped": {"item": "item", "surface": "surface", "to": "place"},
+            "not_possible": NOT_POSSIBLE,
+        },
+        types={"to": "place"},
+        after_crash=ONCE,
+    )
+    async def drive(self, call: SkillCall, to: str) -> Outcome:
+        """Turn, drive to a place, and if the way is blocked wait and try once more."""
+        metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
+        await call.clock.sleep(self.parameters["turning"] + metres / self.parameters["speed"])
+        result = self.world.drive(call.action_id, to)
+        if result.outcome == "no_path":
+            await call.clock.sleep(self.parameters["patience"])
+            result = self.world.drive(_again(call), to)
+        return outcome_of(result)
+
+
+class SuctionArm(Arm):
+    """An arm that holds by suction: it pumps first, and when nothing holds puts its cup elsewhere on the item once."""
+
+    declares: ClassVar[Mapping[str, Parameter]] = {
+        **Arm.declares,
+        "vacuum": Parameter("number", least=20.0, most=80.0, changed_by="profile"),  # kPa below the air around
+        "lifts": Parameter("number", default=1.0, least=0.1, most=2.0, changed_by="profile"),  # kilograms
+    }
+    relations = ("(<= ?lifts (* 0.025 ?vacuum))",)
+
+    @skill(
+        outcomes={
+            "picked_up": ITEM_AT,
+            "grasp_failed": ITEM_AT,
+            "no_ik": ITEM_AT,
+            "gone": ITEM_AT,
+            "not_possible": NOT_POSSIBLE,
+        },
+        types=ITEM_AT,
+        after_crash=ONCE,
+    )
+    async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
+        """Pick an item, with everything in it, up from a surface."""
+        return await self._held(call, lambda action_id: self.world.pick_up(action_id, item, surface))
+
+    @skill(
+        outcomes={
+            "taken_out": ITEM_IN,
+            "grasp_failed": ITEM_IN,
+            "no_ik": ITEM_IN,
+            "gone": ITEM_AT,
+            "not_possible": NOT_POSSIBLE,
+        },
+        types=ITEM_IN,
+        after_crash=ONCE,
+    )
+    async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
+        """Take an item out of its carrier on a surface; `gone` names the carrier."""
+        return await self._held(call, lambda action_id: self.world.take_out(action_id, item, carrier, surface))
+
+    @skill(outcomes={"vented": {}}, after_crash="repeat")
+    async def vent(self, call: SkillCall) -> Outcome:
+        """Let air into the cup, which empties the pump; nothing is held then."""
+        await call.clock.sleep(0.5)
+        return Outcome("vented")
+
+    async def _held(self, call: SkillCall, grasp: Callable[[str], Result]) -> Outcome:
+        pumping = self.parameters["vacuum"] / 20.0
+        await call.clock.sleep(pumping + self.parameters["grasping"])
+        result = grasp(call.action_id)
+        if result.outcome == "grasp_failed":
+            await call.clock.sleep(pumping)
+            result = grasp(_again(call))
+        return outcome_of(result)
+
+
+class PatientCamera(Camera):
+    """A camera that looks a second time before it says that nothing is there."""
+
+    @skill(
+        outcomes={
+            "recognised": {"surface": "surface", "count": None},
+            "nothing_found": {"surface": "surface"},
+            "not_possible": NOT_POSSIBLE,
+        },
+        types={"surface": "surface"},
+        after_crash=ONCE,
+    )
+    async def recognise(self, call: SkillCall, surface: str) -> Outcome:
+        """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
+        await call.clock.sleep(self.parameters["recognising"])
+        result = self.world.recognise(call.action_id, surface)
+        if result.outcome == "nothing_found":
+            await call.clock.sleep(self.parameters["recognising"])
+            result = self.world.recognise(_again(call), surface)
+        return outcome_of(result, self.believed)
+
+
+def _again(call: SkillCall) -> str:
+    """The id of a second attempt within one call: what happens to it is another draw."""
+    return f"{call.action_id}/again"

@@ -1,0 +1,36 @@
+"""The same state with its transitions leading elsewhere."""
+
+from __future__ import annotations
+
+from typing import Protocol, TypeVar
+
+from dsc.model.connectors import ChoiceState, SelectState
+from dsc.model.states import AnyState, State
+from dsc.model.transitions import Transition
+
+Way = TypeVar("Way", bound=Transition)
+
+
+class Redirect(Protocol):
+    """Gives a transition as it shall be; timed ones stay timed."""
+
+    def __call__(self, way: Way, /) -> Way:
+        """The transition in its place."""
+        ...
+
+
+def redirected(state: AnyState, redirect: Redirect) -> AnyState:
+    """The state with other ways out."""
+    if isinstance(state, State):
+        return state.model_copy(update={
+            "on": {event: tuple(map(redirect, ways)) for event, ways in state.on.items()},
+            "after": tuple(map(redirect, state.after)),
+            "every": tuple(map(redirect, state.every)),
+            "always": tuple(map(redirect, state.always)),
+        })  # fmt: skip
+    if isinstance(state, ChoiceState):
+        return state.model_copy(update={"choice": tuple(map(redirect, state.choice))})
+    if isinstance(state, SelectState):
+        cases = {key: redirect(case) for key, case in state.cases.items()}
+        return state.model_copy(update={"cases": cases, "otherwise": redirect(state.otherwise)})
+    return state

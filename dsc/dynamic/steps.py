@@ -1,0 +1,112 @@
+"""What rules call a step, and its arguments in what a rule says: `?step.item` (S1.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from dsc.dynamic.outcomes import Plots
+from dsc.model.actions import Configure, Send, Switch
+from dsc.model.plot import ActionPlot
+from dsc.model.rules import STEP, Command, Rule
+from dsc.model.states import DynamicState, SubmachineState
+from knowledge_base.errors import SchemaError
+from knowledge_base.language.effect import mentioned, quantified_in, substitute_effect
+from knowledge_base.language.expression import Term, free_variables, quantified, substitute, substitute_term
+
+Step = SubmachineState | DynamicState
+"""A state that holds another plot."""
+Terms = Mapping[str, Term]
+
+
+def contents_of(step: Step, plots: Plots) -> list[ActionPlot]:
+    """The plots that may become the content of a step, as far as that is known.
+
+    Raises:
+        UnknownNameError: it names a plot that is not there.
+    """
+    if isinstance(step, DynamicState):
+        return [plots.plot(name) for name in step.dynamic]
+    return [] if step.use.startswith("?") else [plots.plot(step.use)]
+
+
+def action_of(step: Step, plots: Plots) -> str | None:
+    """The planning action that all plots implement which the step may hold; `None` if there is no such action."""
+    if isinstance(step, DynamicState) and step.goal is not None:
+        return None
+    actions = {plot.implements for plot in contents_of(step, plots)}
+    return actions.pop() if len(actions) == 1 else None
+
+
+def concerns(rule: Rule, name: str, step: Step, plots: Plots) -> bool:
+    """Whether a rule is for that step, as far as steps are named in it."""
+    return not rule.steps or name in rule.steps or action_of(step, plots) in rule.steps
+
+
+def mentioned_in(rule: Rule) -> frozenset[str]:
+    """The variables that a rule's condition and response read."""
+    do = rule.do
+    terms = [*do.arguments.values(), *do.passed.values(), *(term for c in do.command for term in terms_of(c).values())]
+    found = frozenset[str]().union(*map(free_variables, terms))
+    found |= frozenset() if rule.when is None else free_variables(rule.when)
+    return found if do.tell is None else found | mentioned(do.tell)
+
+
+def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
+    """The rule with the step's arguments in place of `?step.item`.
+
+    Raises:
+        SchemaError: an argument is a variable of the plot that the rule uses for something else.
+    """
+    read = mentioned_in(rule)
+    arguments = {STEP + name: term for name, term in step.arguments.items() if STEP + name in read}
+    if not arguments:
+        return rule
+    _refuse_capture(rule, arguments, plot)
+    do = rule.do
+    return rule.model_copy(update={
+        "when": None if rule.when is None else substitute(rule.when, arguments),
+        "do": do.model_copy(update={
+            "tell": None if do.tell is None else substitute_effect(do.tell, arguments),
+            "command": tuple(_command(one, arguments) for one in do.command),
+            "arguments": filled(do.arguments, arguments),
+            "passed": filled(do.passed, arguments),
+        }),
+    })  # fmt: skip
+
+
+def filled(terms: Terms, values: Mapping[str, Term]) -> dict[str, Term]:
+    """The terms with others in place of variables."""
+    return {name: substitute_term(term, values) for name, term in terms.items()}
+
+
+def terms_of(command: Command) -> Terms:
+    """The values that a command hands to its component."""
+    match command:
+        case Configure(to=value):
+            return {"to": value}
+        case Send(arguments=arguments):
+            return arguments
+        case Switch():
+            return {}
+
+
+def _command(command: Command, values: Mapping[str, Term]) -> Command:
+    match command:
+        case Configure(to=value):
+            return command.model_copy(update={"to": substitute_term(value, values)})
+        case Send(arguments=arguments):
+            return command.model_copy(update={"arguments": filled(arguments, values)})
+        case Switch():
+            return command
+
+
+def _refuse_capture(rule: Rule, arguments: Terms, plot: ActionPlot) -> None:
+    own = frozenset() if rule.when is None else quantified(rule.when)
+    own |= frozenset() if rule.do.tell is None else quantified_in(rule.do.tell)
+    for name, term in arguments.items():
+        for hidden in sorted(own & free_variables(term)):
+            number = plot.rules.index(rule)
+            raise SchemaError(
+                f"'?{name}' is the plot's '?{hidden}', and the rule means another '?{hidden}' by that name",
+                place=plot.place(("rules", number)), found=hidden,
+            )  # fmt: skip

@@ -1,0 +1,110 @@
+"""A profile brought to the components and plots that it is about, everything checked before anything changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dsc.components.parameters import check_relations, known
+from dsc.model.plot import ActionPlot, Parameter
+from dsc.model.profile import Profile
+from dsc.skills import Component
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.facts import Value
+from knowledge_base.language.expression import Constant
+
+
+def configure(components: Iterable[Component], profile: Profile | None = None) -> None:
+    """Give the components' parameters the values that the profile says.
+
+    Args:
+        components: of one robot; each instance has values of its own.
+        profile: with none, everything is as its builder says.
+
+    Raises:
+        UnknownNameError: there is no such component or parameter.
+        SchemaError: a value is of another type or out of range, the builder allows nobody to change it, a relation does
+            not hold, or a parameter that has to be bound has no value. The message has the place and the range.
+    """
+    by_name = {component.name: component for component in components}
+    settings = {} if profile is None else profile.components
+    for name in settings:
+        if name not in by_name:
+            raise _unknown(profile, "components", "component", name, by_name)
+    values = {name: _configured(component, profile) for name, component in by_name.items()}
+    for name, component in by_name.items():
+        component.parameters.update(values[name])
+
+
+def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tuple[ActionPlot, ...]:
+    """The plots with the profile's values as defaults of their parameters.
+
+    Raises:
+        UnknownNameError: there is no such plot or parameter.
+        SchemaError: a value is of another type than the parameter.
+    """
+    plots = tuple(plots)
+    if profile is None or not profile.plots:
+        return plots
+    names = [plot.name for plot in plots]
+    for name in profile.plots:
+        if name not in names:
+            raise _unknown(profile, "plots", "plot", name, names)
+    return tuple(_adapted(plot, profile) for plot in plots)
+
+
+def _configured(component: Component, profile: Profile | None) -> dict[str, Value]:
+    settings = {} if profile is None else profile.components.get(component.name, {})
+    for parameter, value in settings.items():
+        try:
+            declared = known(component.name, parameter, component.declares)
+            declared.check(f"{component.name}.{parameter}", value)
+            if not declared.may_be_changed_by("profile"):
+                raise SchemaError(f"'{component.name}.{parameter}' is fixed by its builder", found=parameter)
+        except InputError as error:
+            error.place = None if profile is None else profile.place("components", component.name, parameter)
+            raise
+    values = {**component.parameters, **settings}
+    for parameter in component.declares:
+        if parameter not in values:
+            raise SchemaError(
+                f"'{component.name}.{parameter}' has no value: its builder leaves it to a profile",
+                place=None if profile is None else profile.place("components", component.name), found=parameter,
+            )  # fmt: skip
+    try:
+        check_relations(component.name, component.relations, values)
+    except InputError as error:
+        error.place = None if profile is None else profile.place("components", component.name)
+        raise
+    return settings
+
+
+def _adapted(plot: ActionPlot, profile: Profile) -> ActionPlot:
+    settings = profile.plots.get(plot.name, {})
+    if not settings:
+        return plot
+    changed = dict(plot.parameters)
+    for name, value in settings.items():
+        if name not in plot.parameters:
+            error = UnknownNameError(f"plot '{plot.name}' has no parameter '{name}'", found=name, valid=plot.parameters)
+            error.place = profile.place("plots", plot.name, name)
+            raise error
+        changed[name] = _with_default(plot, name, value, profile)
+    return plot.model_copy(update={"parameters": changed})
+
+
+def _with_default(plot: ActionPlot, name: str, value: Value, profile: Profile) -> Parameter:
+    parameter = plot.parameters[name]
+    kind = "boolean" if isinstance(value, bool) else "word" if isinstance(value, str) else "number"
+    wanted = parameter.type if parameter.type in {"number", "boolean"} else "word"
+    if kind != wanted:
+        raise SchemaError(
+            f"'{name}' of plot '{plot.name}' is a {parameter.type}; found {value}",
+            place=profile.place("plots", plot.name, name), found=str(value),
+        )  # fmt: skip
+    return parameter.model_copy(update={"default": Constant(value)})
+
+
+def _unknown(profile: Profile | None, group: str, kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:
+    error = UnknownNameError(f"there is no {kind} '{name}'", found=name, valid=valid)
+    error.place = None if profile is None else profile.place(group, name)
+    return error

@@ -1,0 +1,129 @@
+"""What rules and handlers can read: their event's attributes, wherever it can come from, and a step's arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+from dsc.dynamic.library import Library
+from dsc.dynamic.outcomes import Outcomes, answerable
+from dsc.dynamic.steps import Step, concerns, contents_of
+from dsc.errors import Finding
+from dsc.model.plot import ActionPlot, Path
+from dsc.model.rules import STEP, Handler, Rule
+from dsc.model.states import DynamicState
+from dsc.validation.attributes import Skills
+from dsc.validation.nesting import Nesting
+from knowledge_base.errors import UnknownNameError
+
+Types = Mapping[str, str | None]
+
+
+class RuleScope:
+    """Of the rules and handlers of one plot.
+
+    Args:
+        plot, library, skills, nesting: as elsewhere in the validator.
+        type_: what is known about a value of a declared type.
+    """
+
+    def __init__(
+        self, plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting, type_: Callable[[str], str | None]
+    ) -> None:
+        self._plot, self._library, self._skills = plot, library, skills or {}
+        self._type = type_
+        self._steps = {name: state for name, state, _ in nesting.states if isinstance(state, Step)}
+        planned = any(isinstance(state, DynamicState) and state.goal is not None for state in self._steps.values())
+        self._implementing = [other for other in library if other.implements] if planned else []
+        ways = (way for _, _, path in nesting.states for _, _, way in nesting.leaving(path))
+        self._fired = {event for way in ways for event in way.emitted}
+
+    def of(self, rule: Rule) -> Types | None:
+        """Names and types; `None` if what the rule answers never happens where it is for."""
+        steps = self._arguments(rule)
+        if rule.on is None:
+            return steps
+        sources = [outcomes[rule.on] or {} for outcomes in self._sources(rule) if rule.on in outcomes]
+        event = {f"event.{name}": self._type(kind) for one in sources for name, kind in one.items()}
+        return {**event, **steps} if sources else None
+
+    def never(self, rule: Rule, path: Path) -> Finding:
+        """The finding about a rule whose event never happens where it is for."""
+        valid = {event for outcomes in self._sources(rule) for event in outcomes}
+        what = " or ".join(f"'{name}'" for name in rule.of) or "no state of this plot"
+        verb = "cannot" if rule.of else "can"
+        error = UnknownNameError(
+            f"{what} {verb} end with '{rule.on}'", place=self._plot.place((*path, "on")), found=rule.on, valid=valid
+        )
+        return Finding(error, "rule event")
+
+    def attributes(self, handler: Handler) -> Types | None:
+        """The attributes of a handler's event; `None` if they are not known."""
+        if handler.on in self._plot.receives:
+            declared = self._plot.receives[handler.on] or {}
+            return {f"event.{name}": self._type(kind) for name, kind in declared.items()}
+        listen = handler.listen
+        if listen is None or listen.trigger not in self._skills:
+            return None
+        outcomes = self._skills[listen.trigger].outcomes
+        found = (outcomes[event] for event in outcomes if listen.names.get(event, event) == handler.on)
+        attributes = next(found, None)
+        return None if attributes is None else {
+            f"event.{name}": self._type(kind) if kind else None for name, kind in attributes.items()
+        }  # fmt: skip
+
+    def check(self, handler: Handler, path: Path) -> Iterator[Finding]:
+        """Findings about where a handler's event comes from."""
+        known = {*self._plot.receives, *self._fired}
+        listen = handler.listen
+        if listen is None:
+            if handler.on not in known:
+                error = UnknownNameError(
+                    f"nothing here fires the event '{handler.on}'",
+                    place=self._plot.place((*path, "on")), found=handler.on, valid=known,
+                )  # fmt: skip
+                fix = "events from outside are declared under `receives`, those of components come by `listen`"
+                yield Finding(error, "known event", fix)
+        elif self._skills:
+            yield from self._listened(handler, path)
+
+    def _listened(self, handler: Handler, path: Path) -> Iterator[Finding]:
+        listen = handler.listen
+        assert listen is not None  # noqa: S101  # the caller has looked
+        place = self._plot.place((*path, "listen", "trigger"))
+        signature = self._skills.get(listen.trigger)
+        if signature is None:
+            message = f"no component offers the skill '{listen.trigger}'"
+            unknown = UnknownNameError(message, place=place, found=listen.trigger, valid=self._skills)
+            yield Finding(unknown, "known skill")
+            return
+        brought = [listen.names.get(event, event) for event in signature.outcomes]
+        if handler.on not in brought:
+            message = f"'{listen.trigger}' does not bring the event '{handler.on}'"
+            other = UnknownNameError(message, place=place, found=handler.on, valid=brought)
+            yield Finding(other, "known event")
+
+    def _sources(self, rule: Rule) -> Iterator[Outcomes]:
+        for name, state in self._steps.items():
+            if concerns(rule, name, state, self._library):
+                yield answerable(state, self._library)
+        for plot in self._implementing:
+            if not rule.of or plot.implements in rule.of:
+                yield plot.emits
+
+    def _arguments(self, rule: Rule) -> Types:
+        """What all steps have that the rule names."""
+        found: dict[str, str | None] | None = None
+        for arguments in self._given(rule):
+            found = arguments if found is None else {n: t for n, t in found.items() if n in arguments}
+        return {STEP + name: kind for name, kind in (found or {}).items()}
+
+    def _given(self, rule: Rule) -> Iterator[dict[str, str | None]]:
+        if not rule.steps:
+            return
+        for name, state in self._steps.items():
+            if concerns(rule, name, state, self._library):
+                types = {n: p.type for plot in contents_of(state, self._library) for n, p in plot.parameters.items()}
+                yield {n: self._type(types[n]) if n in types else None for n in state.arguments}
+        for plot in self._implementing:
+            if plot.implements in rule.steps:
+                yield {name: self._type(one.type) for name, one in plot.parameters.items()}

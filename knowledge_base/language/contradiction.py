@@ -1,0 +1,184 @@
+"""Whether conditions can hold together at all, as far as their form tells, whatever the world is like.
+
+The answer "no" is certain; where nothing is found against it, the answer is "perhaps". What is looked at: an atom and
+its negation, comparisons of one term with constants, and what `and`, `or`, `imply` and `not` make of those. A
+quantified condition is one atom; `(not (forall ...))` and the `(exists (... not ...))` that it means are the same.
+"""
+
+from __future__ import annotations
+
+import math
+import operator as operators
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from knowledge_base.facts import Value
+from knowledge_base.language.expression import (
+    And,
+    Comparison,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+)
+from knowledge_base.language.printer import to_text
+
+MOST_CASES = 512
+"""Ways in which a part of a condition can hold that are looked at; with more, the answer is "perhaps"."""
+
+MOST_TOGETHER = 64
+"""Things that have to hold or not in one such way; with more, the answer is "perhaps", too."""
+
+_OPPOSITE = {"=": "!=", "!=": "=", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
+_MIRRORED = {"=": "=", "!=": "!=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
+
+
+def contradictory(*conditions: Expression) -> bool:
+    """Whether these conditions certainly never hold together."""
+    try:
+        return not _cases(_normal(And(conditions), holds=True))
+    except _TooManyError:
+        return False
+
+
+def implied(condition: Expression, by: Expression) -> bool:
+    """Whether `condition` certainly holds whenever `by` does."""
+    return contradictory(by, Not(condition))
+
+
+def complete(conditions: Iterable[Expression]) -> bool:
+    """Whether certainly always one of the conditions holds."""
+    return contradictory(*map(Not, conditions))
+
+
+def subjects(condition: Expression) -> frozenset[str]:
+    """What a condition is about: its atoms, and the terms that it compares with constants, as text."""
+    return frozenset(literal.about for literal in _literals(_normal(condition, holds=True)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Literal:
+    """One thing that holds or not.
+
+    Attributes:
+        about: an atom, or a compared term.
+        operator: how the term is compared; an atom is compared with a truth value.
+        value: with what.
+    """
+
+    about: str
+    operator: str
+    value: Value
+
+
+_Case = tuple[_Literal, ...]
+
+
+def _normal(e: Expression, *, holds: bool) -> Expression:
+    """The condition, or its opposite, with `not` only in front of atoms and quantifiers, and `exists` alone."""
+    match e:
+        case Not(body):
+            found = _normal(body, holds=not holds)
+        case And(parts) | Or(parts):
+            kind = And if isinstance(e, And) is holds else Or
+            found = kind(tuple(_normal(part, holds=holds) for part in parts))
+        case Imply(premise, conclusion):
+            found = _normal(Or((Not(premise), conclusion)), holds=holds)
+        case Comparison(operator, left, right):
+            found = _ordered(operator if holds else _OPPOSITE[operator], left, right)
+        case Forall(variables, body):
+            found = _normal(Exists(variables, Not(body)), holds=not holds)
+        case _:
+            inner = replace(e, body=_normal(e.body, holds=True)) if isinstance(e, Exists) else e
+            found = inner if holds else Not(inner)
+    return found
+
+
+def _ordered(operator: str, left: Term, right: Term) -> Comparison:
+    """With the constant on the right, other terms in a fixed order."""
+    swapped = isinstance(left, Constant) or (not isinstance(right, Constant) and to_text(right) < to_text(left))
+    return Comparison(_MIRRORED[operator], right, left) if swapped else Comparison(operator, left, right)
+
+
+class _TooManyError(Exception):
+    """There are more than `MOST_CASES`, or longer ones than `MOST_TOGETHER`."""
+
+
+def _cases(e: Expression) -> list[_Case]:
+    """The ways in which a condition can hold, each a conjunction; those that cannot be are left out at once."""
+    match e:
+        case And(parts):
+            cases: list[_Case] = [()]
+            for part in parts:
+                others = _cases(part)
+                longest = max(map(len, cases), default=0) + max(map(len, others), default=0)
+                if len(cases) * len(others) > MOST_CASES or longest > MOST_TOGETHER:
+                    raise _TooManyError
+                both = ((*case, *other) for case in cases for other in others)
+                cases = [case for case in both if _possible(case)]
+            return cases
+        case Or(parts):
+            return [case for part in parts for case in _cases(part)]
+        case _:
+            return [(_literal(e),)]
+
+
+def _literals(e: Expression) -> Iterator[_Literal]:
+    if isinstance(e, And | Or):
+        for part in e.parts:
+            yield from _literals(part)
+    else:
+        yield _literal(e)
+
+
+def _literal(e: Expression) -> _Literal:
+    match e:
+        case Comparison(operator, left, Constant(value)):
+            return _Literal(to_text(left), operator, value)
+        case Comparison("=" | "!=" as operator, left, right):
+            return _Literal(f"(= {to_text(left)} {to_text(right)})", "=", operator == "=")
+        case Comparison("<" | ">=" as operator, left, right):
+            return _Literal(f"(< {to_text(left)} {to_text(right)})", "=", operator == "<")
+        case Comparison(operator, left, right):
+            return _Literal(f"(> {to_text(left)} {to_text(right)})", "=", operator == ">")
+        case Not(body):
+            return _Literal(to_text(body), "=", value=False)
+        case _:
+            return _Literal(to_text(e), "=", value=True)
+
+
+def _possible(case: _Case) -> bool:
+    about: dict[str, list[_Literal]] = {}
+    for literal in case:
+        about.setdefault(literal.about, []).append(literal)
+    return all(map(_some_value, about.values()))
+
+
+def _some_value(literals: list[_Literal]) -> bool:
+    """Whether some value compares in all these ways."""
+    equal = [one.value for one in literals if one.operator == "="]
+    if equal:
+        return all(_compares(equal[0], one) for one in literals)
+    bounds = [(one.operator, one.value) for one in literals if isinstance(one.value, int | float)]
+    least = max((value for operator, value in bounds if operator in {">", ">="}), default=-math.inf)
+    most = min((value for operator, value in bounds if operator in {"<", "<="}), default=math.inf)
+    return least < most or (least == most and all(_compares(least, one) for one in literals))
+
+
+def _compares(value: Value, literal: _Literal) -> bool:
+    other = literal.value
+    if literal.operator in {"=", "!="}:
+        same = value == other and isinstance(value, bool) is isinstance(other, bool)
+        return same is (literal.operator == "=")
+    if isinstance(value, str) or isinstance(other, str):
+        return False
+    return _ORDERS[literal.operator](value, other)
+
+
+_ORDERS: Mapping[str, Callable[[float, float], bool]] = {
+    "<": operators.lt, "<=": operators.le, ">": operators.gt, ">=": operators.ge,
+}  # fmt: skip

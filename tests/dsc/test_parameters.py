@@ -1,0 +1,116 @@
+"""Parameters with roles: the builder's range, the integrator's value, who may change them at run time (S1.11)."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from typing import ClassVar
+
+import pytest
+
+from dsc import Component, Library, parse_plot, validate_plot
+from dsc.components.parameters import Parameter
+from knowledge_base import InputError
+
+
+class Base(Component):
+    name = "base"
+    declares: ClassVar = {
+        "speed": Parameter("number", default=0.5, least=0.1, most=1.5),
+        "mode": Parameter("text", default="calm", among=("calm", "brisk")),
+        "port": Parameter("text", changed_by="profile"),
+        "wheels": Parameter("number", default=4, changed_by="nobody"),
+        "light": Parameter("boolean", default=False, changed_by="rules"),
+        "cycle": Parameter("number", default=2.0, least=0),
+    }
+    relations = ("(<= ?speed (* 0.5 ?cycle))",)
+
+
+def test_each_instance_begins_with_what_its_builder_says_and_has_values_of_its_own():
+    front, rear = Base("front"), Base("rear")
+    asyncio.run(front.configure("speed", 1.0))
+    assert (front.parameters["speed"], rear.parameters["speed"]) == (1.0, 0.5)
+    assert "port" not in rear.parameters
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "said"),
+    [
+        ("speed", 2.0, "'base.speed' is from 0.1 to 1.5; found 2"),
+        ("speed", "fast", "'base.speed' is from 0.1 to 1.5; found fast"),
+        ("speed", True, "found true"),
+        ("mode", "brisc", "'base.mode' is one of calm, brisk; found brisc; did you mean 'brisk'?"),
+        ("cycle", -1, "'base.cycle' is 0 or more"),
+        ("port", 3, "'base.port' is a text"),
+        ("sped", 1, "component 'base' has no parameter 'sped'; did you mean 'speed'?"),
+        ("speed", 1.4, "component 'base' needs (<= ?speed (* 0.5 ?cycle)), but cycle is 2, speed is 1.4"),
+        ("light", [1], "'base.light' is a boolean"),
+    ],
+)
+def test_what_does_not_fit_is_refused_and_changes_nothing(parameter, value, said):
+    base = Base()
+    before = dict(base.parameters)
+    with pytest.raises(InputError, match=re.escape(said)):
+        asyncio.run(base.configure(parameter, value))
+    assert base.parameters == before
+
+
+def test_a_component_that_declares_nothing_takes_anything():
+    plain = Component("plain")
+    asyncio.run(plain.configure("anything", [1, 2]))
+    assert plain.parameters == {"anything": [1, 2]}
+
+
+HOLDER = """plot: p
+states:
+  a:
+    entry: {set: base.%s}
+    on: {done: e}
+  e: {final: true}
+"""
+ANSWERING = """plot: p
+states:
+  a: {use: q, on: {done: e}}
+  e: {final: true}
+rules:
+  - on: lost
+    do: {command: {set: base.%s}, then: e}
+"""
+INNER = parse_plot("plot: q\nemits: {lost: }\nstates: {b: {on: {done: {to: f, emit: lost}}}, f: {final: true}}")
+
+
+def findings_of(text, setting):
+    plot = parse_plot(text % setting, "p.yaml")
+    return [str(one) for one in validate_plot(plot, Library([plot, INNER]), None, [], {"base": Base.declares})]
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("speed, to: 3", "p.yaml:4:30: 'base.speed' is from 0.1 to 1.5; found 3"),
+        ("sped, to: 1", "p.yaml:4:13: component 'base' has no parameter 'sped'; did you mean 'speed'?"),
+        ("wheels, to: 3", "'base.wheels' is not changed by plots, but by nobody"),
+        ("port, to: tty", "'base.port' is not changed by plots, but by profile"),
+        ("light, to: true", "'base.light' is not changed by plots, but by rules"),
+    ],
+)
+def test_what_a_plot_may_not_set_is_found_before_it_runs(setting, said):
+    (finding,) = findings_of(HOLDER, setting)
+    assert said in finding
+
+
+@pytest.mark.parametrize("setting", ["speed, to: 1", "speed, to: ?x", "mode, to: brisk"])
+def test_what_a_plot_may_set(setting):
+    assert [one for one in findings_of(HOLDER, setting) if "?x" not in one] == []
+
+
+def test_what_rules_may_set_and_what_not():
+    assert findings_of(ANSWERING, "light, to: true") == []
+    (finding,) = findings_of(ANSWERING, "port, to: tty")
+    assert "p.yaml:7:" in finding
+    assert "not changed by rules, but by profile" in finding
+
+
+def test_names_of_components_alone_say_nothing_about_their_parameters():
+    plot = parse_plot(HOLDER % "speed, to: 3")
+    assert validate_plot(plot, Library([plot]), None, [], {"base"}) == []

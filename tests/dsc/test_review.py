@@ -1,0 +1,229 @@
+"""Warnings: what can never happen, candidates that overlap or leave gaps; and nothing about what is meant so."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from dsc_charts import plot
+from typer.testing import CliRunner
+
+from dsc.cli import app
+from dsc.dynamic.library import Library
+from dsc.text.neighbours import Neighbours
+from dsc.text.plots import load_plot, parse_plot
+from dsc.validation import review_plot, validate_plot
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = sorted(file for room in ("domains", "planning") for file in (ROOT / room).glob("**/plots/*.yaml"))
+
+STEP = plot("""
+    plot: step
+    parameters: {item: {type: item, default: cup}}
+    emits: {failed: {item: item}, lost: }
+    receives: {bad: , worse: , ok: }
+    states:
+      s: {on: {bad: {to: e, emit: failed, with: {item: ?item}}, worse: {to: e, emit: lost}, ok: e}}
+      e: {final: true}
+""")
+HOLDER = "plot: p\nstates:\n  a: {use: step, on: {done: e}}\n  b: {use: step, on: {done: e}}\n  e: {final: true}\ninitial: a\n"
+
+
+def candidate(name, when=None, **more):
+    form = {"plot": name, "parameters": {"n": {"type": "number", "default": 0}}, "states": {"e": {"final": True}}}
+    return parse_plot(json.dumps({**form, **({"when": when} if when else {}), **more}), f"{name}.yaml")
+
+
+def warnings_of(text, *others):
+    made = parse_plot(text, "p.yaml")
+    found = review_plot(made, Library([made, STEP, *others]))
+    assert all(finding.level == "warning" for finding in found)
+    return [str(finding) for finding in found]
+
+
+def about_rules(*rules, holder=HOLDER):
+    return warnings_of(holder + "rules:\n" + "".join(f"  - {rule}\n" for rule in rules))
+
+
+# -- rules -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "rules",
+    [
+        ["{on: lost, do: {then: e}}", "{on: lost, do: {then: retry}}"],
+        ["{on: lost, do: {then: continue}}", "{on: lost, of: a, do: {then: retry}}"],
+        ["{on: failed, when: (p ?event.item), do: {then: e}}", "{on: failed, when: (and (q) (p ?event.item)), do: {then: retry}}"],
+        ["{on: failed, when: (< (f) 4), do: {then: e}}", "{on: failed, when: (>= (f) 4), do: {then: give_up}}", "{on: failed, do: {then: retry}}"],
+        ["{before: a, do: {then: e}}", "{before: a, when: (q), do: {use: step}}"],
+        ["{on: lost, when: (and (p) (not (p))), do: {then: e}}"],
+    ],
+)  # fmt: skip
+def test_a_rule_that_can_never_answer_is_found_where_it_stands(rules):
+    (warning,) = about_rules(*rules)
+    assert warning.startswith(f"p.yaml:{7 + len(rules)}:")
+    assert "can never answer" in warning
+
+
+@pytest.mark.parametrize(
+    "rules",
+    [
+        ["{on: lost, do: {then: retry}}", "{on: lost, do: {then: e}}"],  # after three times
+        ["{on: lost, do: {use: step, then: e, limit: 1}}", "{on: lost, do: {then: e}}"],
+        ["{on: lost, of: a, do: {then: e}}", "{on: lost, do: {then: retry}}"],
+        ["{on: lost, of: a, do: {then: e}}", "{on: lost, of: b, do: {then: retry}}"],
+        ["{on: lost, when: (p), do: {then: e}}", "{on: lost, do: {then: retry}}"],
+        ["{on: failed, when: (< (f) 4), do: {then: e}}", "{on: failed, when: (<= (f) 4), do: {then: e}}"],
+        ["{before: a, do: {use: step}}", "{before: a, do: {use: step}}"],  # all are asked, one behind the other
+        ["{before: a, do: {then: e}}", "{after: a, do: {use: step}}"],
+    ],
+)
+def test_a_rule_that_may_answer_is_no_warning(rules):
+    assert about_rules(*rules) == []
+
+
+def test_a_rule_for_what_every_state_answers_itself_can_never_answer():
+    holder = HOLDER.replace("done: e}", "done: e, lost: e}")
+    (warning,) = about_rules("{on: lost, do: {then: e}}", holder=holder)
+    assert "every state that can end with 'lost' answers it itself" in warning
+    guarded = HOLDER.replace("b: {use: step, on: {done: e", "b: {use: step, on: {done: e, lost: {to: e, when: (p)}")
+    assert about_rules("{on: lost, do: {then: e}}", holder=guarded.replace("a: {use: step, on: {", "a: {use: step, on: {lost: e, ")) == []
+
+
+def test_in_plans_a_rule_for_this_plot_alone_is_in_nobodys_way():
+    holder = HOLDER.replace("b: {use: step, on: {done: e}}", "b: {goal: (p), on: {done: e, no_plan: e, gave_up: e}}")
+    assert about_rules("{on: lost, do: {then: e}}", "{on: lost, do: {then: retry}}", holder=holder) == []
+
+
+# -- transitions -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "ways",
+    ["[e, {to: f}]", "[{to: e, when: (p)}, {to: f, when: (and (p) (q))}]", "[{to: e, when: (p)}, {to: e, when: (not (p))}, f]"],
+)
+def test_a_transition_that_is_never_taken_is_found(ways):
+    (warning,) = warnings_of(f"plot: p\nstates:\n  a:\n    on: {{x: {ways}}}\n  e: {{final: true}}\n  f: {{final: true}}\n")
+    assert "transition on 'x' out of 'a' is never taken" in warning
+
+
+def test_transitions_on_other_events_do_not_count():
+    assert warnings_of("plot: p\nstates:\n  a: {on: {x: e, y: e}, always: {to: e, when: (p)}}\n  e: {final: true}\n") == []
+
+
+# -- candidates --------------------------------------------------------------------------------------------
+
+
+def about_candidates(*candidates, extra=""):
+    names = ", ".join(one.name for one in candidates)
+    text = f"plot: p\nstates:\n  a: {{dynamic: [{names}], {extra}on: {{done: e, no_candidate: e, no_plan: e, gave_up: e}}}}\n  e: {{final: true}}\n"
+    return warnings_of(text, *candidates)
+
+
+def test_a_candidate_that_is_never_chosen():
+    (warning,) = about_candidates(candidate("one"), candidate("two", "(p)"))
+    assert "the candidate 'two' is never chosen: whenever it fits, one before it does" in warning
+    (warning,) = about_candidates(candidate("one", "(and (p) (not (p)))"), candidate("two"))
+    assert "'one' is never chosen: its condition cannot hold" in warning
+
+
+def test_candidates_that_overlap():
+    (warning,) = about_candidates(candidate("few", "(<= (f) 3)"), candidate("many", "(>= (f) 3)"))
+    assert "'few' and 'many' overlap: both can fit, and then 'few' is chosen" in warning
+
+
+def test_candidates_that_leave_a_gap():
+    (warning,) = about_candidates(candidate("few", "(< (f) 3)"), candidate("many", "(> (f) 3)"))
+    assert "leave a gap" in warning
+
+
+@pytest.mark.parametrize(
+    "conditions",
+    [
+        ["(= (f) 0)", "(> (f) 0)"],  # a count is never below 0
+        ["(< (f) 3)", None],
+        ["(= (f) 0)", "(>= (f) 0)"],  # the special case before the general one
+        ["(p)", "(q)"],  # nobody knows
+        ["(p)"],
+        ["(and (p) (q))", "(p)", "(not (p))"],
+    ],
+)
+def test_candidates_about_which_nothing_is_said(conditions):
+    assert about_candidates(*(candidate(f"c{n}", when) for n, when in enumerate(conditions))) == []
+
+
+def test_with_a_goal_a_gap_is_planned_for():
+    few, many = candidate("few", "(< (f) 3)"), candidate("many", "(> (f) 3)")
+    assert about_candidates(few, many, extra="goal: (p), ") == []
+
+
+def test_what_only_one_candidate_is_handed_is_not_mistaken_for_the_others():
+    low = candidate("low", "(< ?n 3)", parameters={"n": "number"})
+    assert about_candidates(low, candidate("other", "(< ?n 2)", parameters={"n": "number"})) == []
+    (warning, *_) = about_candidates(low, candidate("lower", "(< ?n 2)"), extra="with: {n: 1}, ")
+    assert "'lower' is never chosen" in warning
+
+
+def test_plots_for_the_steps_of_plans_that_leave_a_gap():
+    goal = "plot: p\nstates:\n  a: {goal: (p), on: {done: e, no_plan: e, gave_up: e}}\n  e: {final: true}\n"
+    few, many = (candidate(n, w, implements="count") for n, w in (("few", "(< (f) 3)"), ("many", "(> (f) 3)")))
+    (warning,) = warnings_of(goal, few, many)
+    assert warning.startswith("many.yaml:")
+    assert "the plots for 'count' leave a gap, where none of them fits: few, many" in warning
+
+
+# -- large ones --------------------------------------------------------------------------------------------
+
+
+def test_of_what_is_too_large_to_decide_nothing_is_said():
+    ways = ", ".join(f"{{to: e, when: (= ?x {n})}}" for n in range(2_000))
+    assert warnings_of(f"plot: p\nvariables: {{x: number}}\nstates: {{a: {{on: {{x: [{ways}]}}}}, e: {{final: true}}}}\n") == []
+    many = " ".join(f"(p {n})" for n in range(10_000))
+    assert about_rules(f"{{on: lost, when: (and {many}), do: {{then: e}}}}", "{on: lost, when: (p 1), do: {then: e}}") == []
+    assert about_candidates(*(candidate(f"c{n}", f"(= (f) {n})") for n in range(500))) == []
+
+
+def test_rules_and_handlers_that_would_make_too_many_transitions_are_refused():
+    states = "".join(f"  s{n}: {{on: {{go: s{n + 1}}}}}\n" for n in range(600)) + "  s600: {final: true}\n"
+    text = f"plot: p\nreceives: {{go: , x: }}\nstates:\n{states}handlers:\n" + "  - {on: x, interrupt: true, do: {use: step}}\n" * 2
+    made = parse_plot(text, "p.yaml")
+    (finding,) = validate_plot(made, Library([made, STEP]))
+    assert "the handlers would make 1202 transitions; at most 1000" in str(finding)
+
+
+# -- no false alarm ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
+def test_nothing_is_said_about_shipped_plots(file):
+    made = load_plot(file)
+    assert review_plot(made, Neighbours().of(file, made)[0]) == []
+
+
+def test_nothing_is_said_about_plots_in_the_docs():
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    blocks = [block for page in pages for block in re.findall(r"^```yaml\n(plot:.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)]
+    made = [parse_plot(block) for block in blocks]
+    assert len(made) > 5
+    for each in made:
+        library = Library([each])
+        if not [finding for finding in validate_plot(each, library) if finding.rule == "known plot"]:
+            assert review_plot(each, library) == []
+
+
+# -- the command -------------------------------------------------------------------------------------------
+
+
+def test_the_command_gives_warnings_which_count_only_if_asked_to(tmp_path):
+    (tmp_path / "p.yaml").write_text("plot: p\nstates:\n  a:\n    on: {done: [e, {to: f}, {to: e}]}\n  e: {final: true}\n  f: {final: true}\n")
+    runner = CliRunner()
+    shown = runner.invoke(app, ["check", str(tmp_path / "p.yaml")])
+    assert shown.exit_code == 0
+    assert "never taken" in shown.output
+    assert "[warning]" in shown.output
+    assert runner.invoke(app, ["check", "--strict", str(tmp_path / "p.yaml")]).exit_code == 2
+    data = json.loads(runner.invoke(app, ["check", "--json", str(tmp_path / "p.yaml")]).output)
+    assert {one["level"] for one in data} == {"warning"}
+    assert data[0]["line"] == 4
