@@ -50,6 +50,8 @@ A_HANG = 120
 """Seconds of real time after which a run is one."""
 DEFAULT_EVERY = 100
 """One table in so many is the default one; the others are small."""
+CRASHES = 0.015
+"""Chance of a crash at each boundary."""
 REPLAYED_EVERY = 3
 """One run in so many is replayed, which takes as long as the run."""
 REMEMBERED = 2_000
@@ -126,7 +128,7 @@ class Trial:
         self._library: Library | None = None
         kinds = USUAL if seed % 2 else PLAIN
         self._faults = Faults(seed, chance / 4, kinds)
-        self._crashes: Crashes[Report | None] = Crashes(folder, seed)
+        self._crashes: Crashes[Report | None] = Crashes(folder, seed, chance=CRASHES)
 
     def run(self) -> Outcome:
         outcome = self.outcome
