@@ -40,9 +40,10 @@ test-engines: $(VENV)/.engines   ## every planning engine for real
 	$(BIN)/dsc doctor
 	$(BIN)/python -m pytest -rs tests/planning/test_real_engines.py
 
-test-all: $(VENV)/.engines check   ## as test, with every planning engine
+test-all: $(VENV)/.engines check   ## as test, with every planning engine and the page in a browser
 	$(BIN)/dsc doctor
 	$(BIN)/python -m pytest -n auto -rs
+	frontend/tests.sh
 
 check: $(VENV)/.test   ## ruff, mypy strict, import contracts
 	$(BIN)/ruff check .
@@ -100,13 +101,13 @@ $(NODE_MODULES): frontend/package.json   # Node is needed to build the page, nev
 viewer: $(NODE_MODULES)   ## build the page that `dsc view` shows (needs Node and npm)
 	cd frontend && npm run --silent build
 
-test-viewer: $(VENV)/.test $(NODE_MODULES)   ## the page's own tests, then the page in Debian's Chromium
-	cd frontend && npm run --silent types && npm test --silent && node --test e2e/*.mjs
+test-viewer: $(VENV)/.test   ## the page's own tests, then the page in Debian's Chromium (installed as root; skipped without)
+	frontend/tests.sh
 
 screenshots: $(VENV)/.test $(NODE_MODULES)   ## the pictures of the page that the docs show (needs Chromium)
 	cd frontend && node screenshots.mjs
 
-bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watching costs a run, a run of 100,000 records opened
+bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watching costs a run, 100,000 records opened and scrubbed
 	$(BIN)/python benchmarks/viewer.py --rounds $(or $(RUNS),5)
 
 clean:   ## forget the environment and caches

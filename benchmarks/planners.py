@@ -26,7 +26,8 @@ from typing import Any
 import replanning
 import set_table
 
-from planning.engines.planner import PlannerProcess
+from planning.engines.fast_downward import sas
+from planning.engines.planner import PlannerProcess, written
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, installed
 from planning.generation.plot import plot_from_plan
@@ -149,11 +150,12 @@ def part_row(items: int, rounds: int) -> dict[str, Any]:
     poser = Poser(domain)
     problem = poser.pose(world, goal)
     plan = _plan(problem)
-    order = deordered(plan, domain, world, goal)
+    order, request = deordered(plan, domain, world, goal), written(problem)
     parts: dict[str, Callable[[], object]] = {
         "pose, cold": lambda: Poser(domain).pose(world, goal),
         "pose, warm": lambda: poser.pose(world, goal),
-        "translate": lambda: json.dumps(problem.to_json()),
+        "write": lambda: written(replace(problem)),
+        "translate": lambda: sas(json.loads(request)),
         "validate": lambda: validate(plan, domain, world, goal),
         "de-order": lambda: deordered(plan, domain, world, goal),
         "generate": lambda: plot_from_plan(plan, domain, None, order=order),
@@ -177,7 +179,8 @@ def whole_row(items: int) -> dict[str, Any]:
 def optimal_row(items: int) -> dict[str, Any]:
     """Trips next to the fewest there can be, which an optimal engine finds when trips alone cost."""
     problem = pose(set_table.domain(), set_table.world(items), set_table.GOAL)
-    priced = replace(problem, whole=None, actions=tuple(replace(a, cost=_trip_cost(a.step)) for a in problem.actions))
+    actions = tuple(replace(a, cost=_trip_cost(a.step)) for a in problem.actions)
+    priced = replace(problem, unsliced=None, actions=actions)
     fewest = asyncio.run(_solved("fast-downward-opt", priced))
     if not isinstance(fewest, PlanFound):
         return {"items": items, "trips": "", "fewest": f"not within {SECONDS:g} s", "": ""}

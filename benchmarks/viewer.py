@@ -1,7 +1,10 @@
 """What the page costs: its weight, its layouts, a run that is watched, a long run opened (`make bench-viewer`).
 
-The run is measured with nobody, 1 and 8 browsers attached, in turn, each browser a process that takes in all records;
-what counts is the ratio to the same run without a page. Layouts and pages are measured by `frontend/bench.mjs`.
+Runs are measured with nobody, 1 and 8 browsers attached, in turn, each browser a process that takes in all records;
+what counts is the ratio to the same runs without a page: of the time they take, and of the computing time of their own
+process, in which the page is served too. All plans are known before, so that nothing but the run is measured. Eight
+processes that read at the same time on two cores slow the run besides; that is in the first ratio and not in the
+second. Layouts and pages are measured by `frontend/bench.mjs`.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from websockets.sync.client import connect
 
@@ -26,11 +29,16 @@ from domains.clean_up_table.scenario import Scenario
 from dsc.trace import header, write_to
 from dsc.viewer.records import RecordLog
 from dsc.viewer.server import STATIC, Viewer
+from planning import Planner
+from planning.engines.cache import CachingPlanner
+from planning.engines.planner import PlannerProcess
 
 FRONTEND = Path(__file__).parent.parent / "frontend"
 WATCHED = {"no page": None, "nobody looks": 0, "1 browser": 1, "8 browsers": 8}
 SCENARIO = "table: {cups: 4, cans: 3, crisp_cans: [small, large]}"
 RECORDS = 100_000
+RUNS = 4
+"""One after the other, with faults: one alone is too short to be measured."""
 
 
 def main() -> None:
@@ -59,33 +67,48 @@ _FETCHED = {".html", ".js", ".css", ".svg"}
 
 
 def print_watched(rounds: int) -> None:
-    """How much longer a run takes when it is watched; who begins changes from round to round."""
-    figures: dict[str, list[float]] = {name: [] for name in WATCHED}
-    run_watched(None)
+    """How much longer runs take when they are watched; who begins changes from round to round."""
+    figures: dict[str, list[Taken]] = {name: [] for name in WATCHED}
+    process = PlannerProcess()
+    planner = CachingPlanner(process)
+    runs_watched(None, planner)  # all plans are known from here on
     for number in range(rounds):
         names = list(WATCHED)[number % len(WATCHED) :] + list(WATCHED)[: number % len(WATCHED)]
         for name in names:
-            figures[name].append(run_watched(WATCHED[name]))
+            figures[name].append(runs_watched(WATCHED[name], planner))
+    process.kill()
     bare = figures["no page"]
     for name, taken in figures.items():
-        ratio = statistics.median(a / b for a, b in zip(taken, bare, strict=True))
-        print(f"a run, {name:<14} {statistics.median(taken):6.2f} s   {ratio:5.2f} times")
+        wall = statistics.median(one.wall / other.wall for one, other in zip(taken, bare, strict=True))
+        cpu = statistics.median(one.cpu / other.cpu for one, other in zip(taken, bare, strict=True))
+        seconds = statistics.median(one.wall for one in taken)
+        computed = statistics.median(one.cpu for one in taken)
+        print(f"{RUNS} runs, {name:<12} {seconds:6.2f} s {wall:5.2f} x, computing {computed:5.2f} s {cpu:5.2f} x")
 
 
-def run_watched(browsers: int | None) -> float:
-    """Seconds of one run; `None` browsers is a run without a page and without records."""
+class Taken(NamedTuple):
+    """Seconds: by the clock on the wall, and of computing in this process, all threads."""
+
+    wall: float
+    cpu: float
+
+
+def runs_watched(browsers: int | None, planner: Planner) -> Taken:
+    """What runs with so many browsers take; `None` browsers are runs without a page and without records."""
     log = RecordLog(header(), live=True)
-    table = deploy(Scenario.parse(SCENARIO), seed=1, faults=0.0, listener=None if browsers is None else log.hear)
+    wall, cpu = 0.0, 0.0
     with ExitStack() as stack:
-        stack.enter_context(table.executive)
         if browsers is not None:
             viewer = stack.enter_context(serving(log))
             stack.enter_context(watching(viewer, browsers))
-        start = time.perf_counter()
-        table.run()
-        taken = time.perf_counter() - start
+        for seed in range(RUNS):
+            table = deploy(Scenario.parse(SCENARIO), seed, 0.2, planner, None if browsers is None else log.hear)
+            with table.executive:
+                started, computed = time.perf_counter(), time.process_time()
+                table.run()
+                wall, cpu = wall + time.perf_counter() - started, cpu + time.process_time() - computed
         log.end()
-    return taken
+    return Taken(wall, cpu)
 
 
 @contextmanager
@@ -133,7 +156,9 @@ def print_opened() -> None:
         print(f"{RECORDS:,} records, {trace.stat().st_size / 1e6:.0f} MB")
         found = node("open", str(trace), str(RECORDS))
     print(f"opened: first moment {found['first'] / 1000:.2f} s, all there {found['all'] / 1000:.2f} s")
-    print(f"scrubbed: {found['jump']:.1f} ms to a moment, {found['slowest']:.1f} ms for 19 of 20")
+    print(f"jumps: {found['jump']:.1f} ms to a moment, {found['slowest']:.1f} ms for 19 of 20")
+    print(f"scrubbed: {found['frame']:.1f} ms from frame to frame, {found['slowestFrame']:.1f} ms for 19 of 20")
+    print(f"played: {found['drawn']:.0f} moments a second drawn")
 
 
 def write_long(path: Path, count: int) -> None:

@@ -9,6 +9,7 @@ import { browse, loaded, open, serve } from "./browser.mjs";
 const here = fileURLToPath(new URL(".", import.meta.url));
 const ROUNDS = 5;
 const JUMPS = 200;
+const SECONDS = 4;
 
 const [what, ...rest] = process.argv.slice(2);
 console.log(JSON.stringify(what === "layout" ? await layouts() : await opened(rest[0], Number(rest[1]))));
@@ -71,8 +72,9 @@ async function opened(trace, count) {
     await loaded(page, count);
     const all = performance.now() - start;
     const jumps = await page.evaluate(scrub, { count, jumps: JUMPS });
-    jumps.sort((a, b) => a - b);
-    return { first, all, jump: median(jumps), slowest: jumps[Math.floor(0.95 * jumps.length)] };
+    const frames = await page.evaluate(dragged, { count, seconds: SECONDS });
+    const drawn = await page.evaluate(played, SECONDS);
+    return { first, all, jump: median(jumps), slowest: nearlyAll(jumps), frame: median(frames), slowestFrame: nearlyAll(frames), drawn };
   } finally {
     await browser.close();
     await program.stop();
@@ -94,6 +96,48 @@ async function scrub({ count, jumps }) {
     await drawn();
   }
   return times;
+}
+
+/** In the page: the scrubber dragged from one end to the other, a bit with each frame; milliseconds between frames. */
+async function dragged({ count, seconds }) {
+  const slider = document.querySelector("input[type=range]");
+  const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  const frame = () => new Promise(requestAnimationFrame);
+  const times = [];
+  let before = await frame();
+  for (const start = before; before - start < 1000 * seconds;) {
+    set.call(slider, String(Math.round((count * (before - start)) / (1000 * seconds))));
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+    const now = await frame();
+    times.push(now - before);
+    before = now;
+  }
+  return times;
+}
+
+/** In the page: how often a second another moment is drawn while the run is played so fast that each frame has one. */
+async function played(seconds) {
+  const slider = document.querySelector("input[type=range]");
+  const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  set.call(slider, "1000");
+  slider.dispatchEvent(new Event("input", { bubbles: true }));
+  const speed = document.querySelector("select[aria-label=Speed]");
+  speed.value = "100";
+  speed.dispatchEvent(new Event("change", { bubbles: true }));
+  document.querySelector("button[aria-label=Play]").click();
+  let drawn = 0;
+  let shown = slider.value;
+  const end = performance.now() + 1000 * seconds;
+  while (performance.now() < end) {
+    await new Promise(requestAnimationFrame);
+    if (slider.value !== shown) drawn += 1;
+    shown = slider.value;
+  }
+  return drawn / seconds;
+}
+
+function nearlyAll(numbers) {
+  return [...numbers].sort((a, b) => a - b)[Math.floor(0.95 * numbers.length)];
 }
 
 function median(numbers) {

@@ -1,16 +1,15 @@
 // The pictures of the page that the docs show: `make screenshots`. Whole pages where it is about the whole, else a pane.
-import { mkdtempSync, readFileSync } from "node:fs";
+import { mkdtempSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { browse, goTo, loaded, open, record, ROOT, serve, settled } from "./browser.mjs";
+import { browse, goTo, loaded, open, record, ROOT, run, serve, settled } from "./browser.mjs";
 
 const PICTURES = process.env.PICTURES ?? join(ROOT, "docs", "pictures");
-const trace = process.env.TRACE ?? join(mkdtempSync(join(tmpdir(), "dsc-")), "run.jsonl");
-if (!process.env.TRACE) await record(trace, "--seed", "7", "--faults", "0.2");
-const records = readFileSync(trace, "utf8").trim().split("\n").slice(1).map((line) => JSON.parse(line));
+const trace = join(mkdtempSync(join(tmpdir(), "dsc-")), "run.jsonl");
+const records = await record(trace);
 const where = (is, from = 0) => records.find((rec) => rec.seq > from && is(rec)).seq;
 const broken = where((rec) => rec.type === "plan.broken");
-const replanned = where((rec) => rec.type === "step", where((rec) => rec.type === "plan.found", broken));
+const replanned = where((rec) => rec.type === "step", where((rec) => rec.type === "plan.ordered", broken));
 
 const program = await serve("view", trace, "--no-open");
 const browser = await browse();
@@ -24,9 +23,14 @@ async function looked(colorScheme, shoot) {
 
 try {
   await looked("light", async (page, shoot) => {
-    await goTo(page, where((rec) => rec.type === "rule") - 3);
+    await goTo(page, where((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_5")), replanned));
     await page.getByLabel("Moment", { exact: true }).blur();
     await shoot("plan");
+    const step = page.locator(".one-plan").first().getByRole("button", { name: /\(throw-away / }).last();
+    await step.press("Enter");
+    await settled(page);
+    await shoot("links");
+    await page.keyboard.press("Escape");
     await goTo(page, where((rec) => rec.type === "decision" && rec.chosen === "pick_up_from_side") - 1);
     await page.getByRole("button", { name: "Next decision" }).click();
     await settled(page);
@@ -35,7 +39,7 @@ try {
     await page.locator(".one-plan.past .head").first().press("Enter");
     await settled(page);
     await shoot("replan", ".side");
-    await goTo(page, where((rec) => rec.type === "step", records.findLast((rec) => rec.type === "plan.found").seq));
+    await goTo(page, where((rec) => rec.type === "step", records.findLast((rec) => rec.type === "plan.ordered").seq));
     await page.keyboard.press("Escape");
     await page.getByLabel("Moment", { exact: true }).blur();
     await shoot("plans", ".pane.plan");
@@ -55,7 +59,24 @@ try {
     await settled(page);
     await shoot("designed");
   });
+  await storeLooked();
 } finally {
   await browser.close();
   await program.stop();
+}
+
+/** A store into which the run's knowledge went, change by change. */
+async function storeLooked() {
+  const store = join(mkdtempSync(join(tmpdir(), "dsc-")), "kitchen.db");
+  run("kb", "new", store, "--domain", join(ROOT, "examples", "kitchen", "domain.pddl"));
+  run("kb", "import", store, join(ROOT, "examples", "kitchen", "problem.pddl"));
+  run("kb", "retract", store, "(on mug table)", "--author", "arm");
+  run("kb", "tell", store, "(on mug sink)", "(on muesli table)", "--author", "arm");
+  const other = await serve("view", store, "--no-open");
+  const { page, context } = await open(browser, other.url);
+  await page.getByLabel("Things by type").getByRole("button", { name: "sink" }).click();
+  await page.mouse.move(0, 0);
+  await page.screenshot({ path: join(PICTURES, "viewer_store.png") });
+  await context.close();
+  await other.stop();
 }

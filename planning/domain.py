@@ -11,7 +11,7 @@ from knowledge_base.exchange.action_text import ActionText
 from knowledge_base.exchange.domain_text import AxiomText, DomainText, parse_domain, read_domain
 from knowledge_base.exchange.domain_writer import action_to_text, axiom_to_text, domain_to_text
 from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
-from knowledge_base.language.effect import Add, Delete, effect_leaves
+from knowledge_base.language.effect import Add, Delete, Effect, effect_leaves, substitute_effect
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
 from knowledge_base.language.expression import (
     And,
@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 
     from knowledge_base.computation import Computed
     from knowledge_base.facts import Delta
-    from knowledge_base.language.effect import Effect
     from planning.plan import PlanStep
+
+_MOST_GROUND = 1024  # steps; a plan for 50 items has about 130
 
 __all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain", "Timed"]
 
@@ -76,6 +77,21 @@ class Axiom:
 
 
 @dataclass(frozen=True, slots=True)
+class GroundStep:
+    """What a step needs and does, its arguments in the place of the parameters.
+
+    Attributes:
+        condition: the precondition, without the types of the arguments.
+        typed: the types and the precondition, as one conjunction.
+        effect: what it changes.
+    """
+
+    condition: Expression
+    typed: And
+    effect: Effect
+
+
+@dataclass(frozen=True, slots=True)
 class PlanningDomain:
     """Planning actions over a schema.
 
@@ -91,6 +107,7 @@ class PlanningDomain:
     actions: Mapping[str, PlanningAction]
     axioms: tuple[Axiom, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    _ground: dict[PlanStep, GroundStep] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     @classmethod
     def from_pddl(cls, path: str | Path, *more: str | Path, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
@@ -189,10 +206,23 @@ class PlanningDomain:
 
     def precondition(self, step: PlanStep) -> Expression:
         """The step's precondition as one conjunction with its arguments in it, their types first."""
+        return self.ground(step).typed
+
+    def ground(self, step: PlanStep) -> GroundStep:
+        """The step with its arguments in it; kept, since one plan has most steps of the one before."""
+        known = self._ground.get(step)
+        if known is None:
+            if len(self._ground) >= _MOST_GROUND:
+                self._ground.clear()
+            known = self._ground[step] = self._grounded(step)
+        return known
+
+    def _grounded(self, step: PlanStep) -> GroundStep:
         action, bindings = self.action(step), self.bindings(step)
         types = [_type_test(p, bindings[p.name], self.schema) for p in action.parameters]
-        grounded = substitute(action.precondition, bindings)
-        return And((*types, *(grounded.parts if isinstance(grounded, And) else (grounded,))))
+        condition = substitute(action.precondition, bindings)
+        typed = And((*types, *(condition.parts if isinstance(condition, And) else (condition,))))
+        return GroundStep(condition, typed, substitute_effect(action.effect, bindings))
 
     def why_not(self, step: PlanStep, world: World) -> Explanation:
         """The precondition with truth values; its deciding leaf says what the step is waiting for."""

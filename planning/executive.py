@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import gc
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -160,10 +162,12 @@ class Executive:
 
         async def go_on() -> RunEnd:
             open_ended = bool(kept.run.header["open_ended"])
-            sequencer = self._sequencer(LoopClock(kept.time), kept.last_record, store, open_ended=open_ended)
+            clock = LoopClock(kept.time)
+            sequencer = self._sequencer(clock, kept.last_record, store, open_ended=open_ended)
             if prepare is not None:
                 prepare(sequencer)
-            return await sequencer.resume(kept)
+            with nullcontext() if clock.simulated else _settled():
+                return await sequencer.resume(kept)
 
         return run_simulated(go_on(), kept.time) if kept.run.header["simulated"] else run_real(go_on())
 
@@ -209,10 +213,12 @@ class Executive:
         store: RunStore | None = None,
     ) -> RunEnd:
         """As `run`, inside a loop that is there already; `store` keeps the run."""
-        sequencer = self._sequencer(LoopClock(), 0, store, open_ended=open_ended)
+        clock = LoopClock()
+        sequencer = self._sequencer(clock, 0, store, open_ended=open_ended)
         if prepare is not None:
             prepare(sequencer)
-        return await sequencer.run(plot, arguments)
+        with nullcontext() if clock.simulated else _settled():
+            return await sequencer.run(plot, arguments)
 
     def _sequencer(self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool) -> Sequencer:
         trace = Trace(clock.now, last)
@@ -259,6 +265,16 @@ class Executive:
     def __exit__(self, *_: object) -> None:
         """`close`."""
         self.close()
+
+
+@contextmanager
+def _settled() -> Iterator[None]:
+    """What is there now is left alone by the garbage collector, which would stop the robot to look at all of it."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 @cache

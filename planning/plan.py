@@ -84,6 +84,7 @@ class PlanFound:
             seconds until all of it is done.
         from_cache: whether it was found for the same problem before.
         failures: what happened to other engines that were asked as well.
+        translated: how much of the `seconds`, in processor time, its process took to put the problem into its words.
     """
 
     plan: Plan
@@ -94,6 +95,7 @@ class PlanFound:
     cost: float = 0.0
     from_cache: bool = False
     failures: tuple[EngineFailed, ...] = ()
+    translated: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

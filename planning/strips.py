@@ -18,7 +18,7 @@ from planning.quantities import Assignment, Bound, Numbers, from_json, to_json
 from planning.timeline import FINEST, Act, Changes, Event, Flaw, carried_out
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 
 FEATURES = ("numeric", "costs", "durations", "derived")
@@ -121,8 +121,7 @@ class Problem:
         actions: the ground actions that can contribute.
         unreachable: goal facts, as text, that no sequence of actions can make true even if nothing ever
             became false; if there are any, the problem is proven unsolvable without asking an engine.
-        whole: the problem without the slice of interchangeable objects, for when the slice has no plan;
-            `None` if nothing was sliced off. In JSON only whether there is one: it is sent when its turn comes.
+        unsliced: makes `whole`; `None` if nothing was sliced off.
         numbers: the numeric fluents' values now, as far as they matter.
         bounds: what shall hold of numbers.
         notes: what was asked for and cannot be had, e.g. a metric that no engine is told about; for people.
@@ -136,12 +135,21 @@ class Problem:
     goal: tuple[Fact, ...]
     actions: tuple[GroundAction, ...]
     unreachable: tuple[str, ...] = ()
-    whole: Problem | None = None
+    unsliced: Callable[[], Problem] | None = field(default=None, compare=False)
     numbers: Mapping[Fact, float] = field(default_factory=dict)
     bounds: tuple[Bound, ...] = ()
     notes: tuple[str, ...] = ()
     one_at_a_time: bool = False
     timed: Problem | None = None
+
+    @property
+    def whole(self) -> Problem | None:
+        """The problem without the slice of interchangeable objects, for when the slice has no plan.
+
+        Made when it is asked for, `None` if nothing was sliced off. In JSON only whether there is one: it is sent
+        when its turn comes.
+        """
+        return None if self.unsliced is None else self.unsliced()
 
     @property
     def features(self) -> frozenset[str]:
@@ -216,9 +224,13 @@ class Problem:
     def to_json(self) -> dict[str, Any]:
         """As JSON data, reversible except for `whole` and `timed`; facts are listed once and referred to by number."""
         number: dict[Fact, int] = {}
+        known: dict[int, int] = {}  # by identity, which is looked up faster; all facts are ours, so they stay
 
-        def refer(facts: Iterable[Fact]) -> list[int]:
-            return [number.setdefault(one, len(number)) for one in facts]
+        def refer(facts: Collection[Fact]) -> list[int]:
+            for one in facts:
+                if id(one) not in known:
+                    known[id(one)] = number.setdefault(one, len(number))
+            return [known[id(one)] for one in facts]
 
         rest = {
             "domain": self.domain,
@@ -243,7 +255,7 @@ class Problem:
             "bounds": [_bound_to_json(one) for one in self.bounds],
             "notes": list(self.notes),
             "one_at_a_time": self.one_at_a_time,
-            "whole": self.whole is not None,
+            "whole": self.unsliced is not None,
         }
         return {"facts": [[f.predicate, *f.args] for f in number], **rest}
 

@@ -18,6 +18,9 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 MOST_BOUND = 64
 """Plots given as data whose tables are kept: a retry binds the same plan again, a long run makes ever new ones."""
 
+MOST_EXPECTED = 4
+"""Plots made in this process that wait for being bound: of each plan the last one."""
+
 
 class Library:
     """Plots by name; also gives the engine their compiled form."""
@@ -26,6 +29,7 @@ class Library:
         self._plots: dict[str, ActionPlot] = {}
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
+        self._made: dict[str, ActionPlot] = {}
         for plot in plots:
             self.add(plot)
 
@@ -82,6 +86,12 @@ class Library:
             self._compiled[name] = compile_plot(self.expanded(self.plot(name)))
         return self._compiled[name]
 
+    def expect(self, plot: ActionPlot) -> None:
+        """The plot may soon be bound as data; its form, unchanged, need not be read then."""
+        self._made[plot.text] = plot
+        if len(self._made) > MOST_EXPECTED:
+            del self._made[next(iter(self._made))]
+
     def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
         """A plot given as data; equal data share their tables.
 
@@ -91,7 +101,7 @@ class Library:
         if not isinstance(form, Mapping):  # whatever a variable may hold
             raise InputError(f"the value to be bound is no plot: {form!r}")
         key = json.dumps(form)  # the order of states counts
-        compiled = self._bound.pop(key, None) or compile_plot(self.expanded(_read(form)), form)
+        compiled = self._bound.pop(key, None) or compile_plot(self.expanded(self._made.get(key) or _read(form)), form)
         self._bound[key] = compiled  # the last one is kept longest
         if len(self._bound) > MOST_BOUND:
             del self._bound[next(iter(self._bound))]

@@ -39,6 +39,8 @@ class Responses:
         self._added = added
         self._interrupted = any(handler.interrupt for handler in plot.handlers)
         self._beside = {name: scope.states for scope in plot.scopes() for name in scope.states}
+        self._ends: dict[tuple[int, str], str] = {}
+        self._endings: dict[tuple[str, str], Transition] = {}
 
     def carried_out(self, rule: Rule, key: str, onward: Iterable[Transition], states: States) -> list[Transition]:
         """The transitions that do what a rule says and then go `onward`; `states` gets the state that this takes.
@@ -79,8 +81,17 @@ class Responses:
 
     def ending(self, name: str, outcome: str, reason: str) -> Transition:
         """To the final state beside a step that ends the generated plot with the outcome."""
-        ends = (each for each, one in self._beside[name].items() if isinstance(one, FinalState) and one.emit == outcome)
-        return Transition.model_validate({"to": next(ends, outcome), "assign": {"reason": reason}})
+        end = self._end(self._beside[name], outcome)
+        if (end, reason) not in self._endings:  # the same for many steps
+            self._endings[end, reason] = Transition.model_validate({"to": end, "assign": {"reason": reason}})
+        return self._endings[end, reason]
+
+    def _end(self, scope: Mapping[str, AnyState], outcome: str) -> str:
+        """The final state of a scope that emits the outcome; looked for once."""
+        if (id(scope), outcome) not in self._ends:
+            found = (each for each, one in scope.items() if isinstance(one, FinalState) and one.emit == outcome)
+            self._ends[id(scope), outcome] = next(found, outcome)
+        return self._ends[id(scope), outcome]
 
     def remembered(self, terms: Terms, key: str, kept: dict[str, lang.Term]) -> dict[str, lang.Term]:
         """The terms as variables of the plot, which `kept` says how to assign."""

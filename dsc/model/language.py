@@ -17,6 +17,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import AllOf, Effect
 from knowledge_base.language.expression import Constant, Expression, Term
+from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
 from knowledge_base.language.printer import to_text
 
@@ -113,6 +114,14 @@ def _effect(value: Any) -> Effect:
         raise ValueError(str(error)) from error
 
 
+_texts: IdentityCache[Expression | Effect, str] = IdentityCache()
+
+
+def _text_out(part: Expression | Effect) -> str:
+    """Kept by identity: a plot, and the same with its rules carried out, share their conditions."""
+    return _texts.find(part, None) or _texts.keep(part, None, to_text(part))
+
+
 def _term_out(term: Term) -> Any:
     return term.value if isinstance(term, Constant) else to_text(term)
 
@@ -120,7 +129,7 @@ def _term_out(term: Term) -> Any:
 ConditionField = Annotated[
     Expression,
     PlainValidator(_condition),
-    PlainSerializer(to_text),
+    PlainSerializer(_text_out),
     WithJsonSchema({"type": "string", "description": "a condition, e.g. (and (on ?o table) (cup ?o))"}),
 ]
 """A condition that chart variables, parameters and event attributes bind completely."""
@@ -139,7 +148,7 @@ TermField = Annotated[
 EffectField = Annotated[
     Effect,
     PlainValidator(_effect),
-    PlainSerializer(to_text),
+    PlainSerializer(_text_out),
     WithJsonSchema({
         "type": ["string", "array"],
         "items": {"type": "string"},

@@ -99,7 +99,7 @@ class ActionPlot(Frozen):
     generated: bool = Field(default=False, strict=True)
     profile: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
-    _content: str | None = PrivateAttr(default=None)
+    _text: str | None = PrivateAttr(default=None)
 
     def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
         """The same plot that remembers where its parts stand in the text it was read from."""
@@ -189,31 +189,33 @@ class ActionPlot(Frozen):
 
     def to_form(self) -> dict[str, Any]:
         """The plot as plain data, in the form in which people write it; `ActionPlot.model_validate` reads it."""
-        form: dict[str, Any] = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+        form: dict[str, Any] = json.loads(self.text)
         return form
+
+    @property
+    def text(self) -> str:
+        """`to_form` as JSON; worked out once, since a trace asks for it whenever a plot is bound."""
+        if self._text is None:
+            self._text = json.dumps(self.model_dump(mode="json", by_alias=True, exclude_defaults=True))
+        return self._text
 
     @property
     def digest(self) -> str:
         """A hash of its content, of which the order of states is a part: equal plots have equal digests."""
-        return hashlib.sha256(self._text().encode()).hexdigest()[:12]
+        return hashlib.sha256(self.text.encode()).hexdigest()[:12]
 
     def __eq__(self, other: object) -> bool:
         """Whether both say the same, wherever they were written."""
-        return self is other or (isinstance(other, ActionPlot) and self._text() == other._text())
+        return self is other or (isinstance(other, ActionPlot) and self.text == other.text)
 
     def __hash__(self) -> int:
-        return hash(self._text())
+        return hash(self.text)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """See pydantic; what was worked out about the content is not copied with it."""
         copied = super().model_copy(update=update, deep=deep)
-        copied._content = None  # noqa: SLF001  a plot, like this one
+        copied._text = None  # noqa: SLF001  a plot, like this one
         return copied
-
-    def _text(self) -> str:
-        if self._content is None:  # a trace asks for the digest whenever a plot is bound
-            self._content = json.dumps(self.to_form())
-        return self._content
 
 
 def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, AnyState, Path]]:

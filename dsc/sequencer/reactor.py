@@ -58,6 +58,9 @@ class Reactor:
         self.in_vain = set(kept.in_vain)
         self.problem = kept.problem
         self.caused_by = {one.what.action_id: one.cause for one in kept.pending if isinstance(one.what, Start)}
+        for one in kept.pending:
+            if isinstance(one.what, Start) and not one.cancelled:
+                self.tracer.begun(one.what)
         self.tracer.known_plots.update(record.data["hash"] for record in kept.records if record.type == "plot")
 
     def start(self, plot: str, arguments: Mapping[str, Any], serials: int = 0) -> tuple[Output, ...]:
@@ -144,6 +147,8 @@ class Reactor:
 
     def _answered(self, message: SkillMessage) -> Event:
         start, outcome = message.start, message.outcome
+        if message.final:
+            self.tracer.answered(start)
         name = start.names.get(outcome.event, outcome.event)
         event = Event(name, outcome.attributes, to=start.activation)
         self.trace.cause = self.caused_by.get(start.action_id)

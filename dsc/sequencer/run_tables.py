@@ -125,6 +125,13 @@ class RunArchive:
                 if line and (record := Record.from_line(line)).seq > after:
                     yield record
 
+    def lines(self, run: int, since: int = 0) -> Iterator[tuple[int, str]]:
+        """The lines of a run's trace from the macrostep at place `since` of the file on, each with its place there."""
+        rows = self.connection.execute(
+            "SELECT place, records FROM steps WHERE run = ? AND place >= ? ORDER BY place", (run, since)
+        )
+        return ((place, line) for place, lines in rows for line in lines.split("\n") if line)
+
     def under_way(self) -> list[tuple[Start, float]]:
         """The skills of the unfinished run that have not ended, with the second at which they were started."""
         rows = self.connection.execute(

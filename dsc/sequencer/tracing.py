@@ -38,6 +38,7 @@ class StepTracer:
         self._trace = trace
         self.known_plots: set[str] = set()
         self._frames: dict[str, FrameState] = {}
+        self._at_work: dict[int, dict[str, str]] = {}  # activation -> action id -> skill
 
     def world(self, knowledge: KnowledgeBase) -> None:
         """All that is known at the start; what follows are changes of it. Left out while nobody listens."""
@@ -53,11 +54,23 @@ class StepTracer:
             data["original"] = original
         return self._trace.record("event", **data)
 
+    def begun(self, start: Start) -> str:
+        """A skill has been started, here or before a crash; its name with its component's."""
+        skill = f"{start.component}.{start.skill}"
+        self._at_work.setdefault(start.activation, {})[start.action_id] = skill
+        return skill
+
+    def answered(self, start: Start) -> None:
+        """A skill has ended by itself: it cannot be cancelled any more."""
+        self._at_work.get(start.activation, {}).pop(start.action_id, None)
+
     def step(self, step: Step) -> int | None:
         """A macrostep in which something happened: new plots before it, the rules that answered after it."""
         if not step.moved:
             return None
-        self._plots(step)
+        heard = self._trace.heard  # else nobody wants to know what plots look like, which takes a while to say
+        if heard:
+            self._plots(step)
         seq = self._trace.record(
             "step",
             microsteps=[
@@ -68,7 +81,7 @@ class StepTracer:
                     ],
                     "exited": list(micro.exited),
                     "entered": list(micro.entered),
-                    **_bound(micro),
+                    **(_bound(micro) if heard else {}),
                 }
                 for micro in step.microsteps
             ],
@@ -107,13 +120,11 @@ class StepTracer:
     def output(self, output: Output) -> int | None:
         """An action that leaves; timers do not."""
         if isinstance(output, Start):
-            return self._trace.record(
-                "action",
-                action="start",
-                id=output.action_id,
-                skill=f"{output.component}.{output.skill}",
-                arguments=dict(output.arguments),
-            )
+            skill, arguments = self.begun(output), dict(output.arguments)
+            return self._trace.record("action", action="start", id=output.action_id, skill=skill, arguments=arguments)
+        if isinstance(output, Cancel):
+            for action_id, skill in self._at_work.pop(output.activation, {}).items():
+                self._trace.record("action", action="cancel", id=action_id, skill=skill)
         if isinstance(output, SetParameter):
             port = f"{output.component}.{output.parameter}"
             return self._trace.record("action", action="set", port=port, value=output.value)

@@ -1,16 +1,11 @@
-"""What the page asks beyond records: the knowledge of a moment, a chart of a moment as a drawing."""
+"""What the page asks beyond records: the knowledge of a moment."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import ValidationError
-
-from dsc.dynamic.library import Library
-from dsc.model.plot import ActionPlot
-from dsc.text.diagram import draw
-from dsc.viewer.moments import Configuration, configurations, knowledge
+from dsc.viewer.moments import knowledge
 from dsc.viewer.records import RecordLog
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Fact
@@ -27,7 +22,6 @@ class Answers:
     def __init__(self, log: RecordLog) -> None:
         self._log = log
         self._knowledge = knowledge(log)
-        self._configurations = configurations(log)
 
     def query(self, asked: Form) -> dict[str, Any]:
         """Who makes the expression true, or whether it is true and why."""
@@ -57,18 +51,6 @@ class Answers:
             "values": [[*_listed(fluent), value] for fluent, value in values.items()],
         }
 
-    def svg(self, asked: Form) -> str:
-        """The plot in a state, drawn with its active states marked."""
-        moment = self._configurations.at(_seq(asked))
-        path = str(asked.get("path") or "")
-        if path not in moment.bound:
-            raise UnknownNameError(f"no plot runs in the state '{path}'", found=path, valid=moment.bound)
-        library = _library(moment)
-        plot = library.plot(str(moment.plots[moment.bound[path]]["plot"]))
-        prefix = f"{path}/" if path else ""
-        inside = (state.removeprefix(prefix) for state in moment.active if state.startswith(prefix))
-        return draw(plot, library, marks={name: "active" for name in inside if "/" not in name})
-
     def _view(self, asked: Form) -> View:
         known = self._knowledge.at(_seq(asked))
         return View(known.state, known.version)
@@ -90,15 +72,3 @@ def _text(asked: Form, name: str) -> str:
     if not isinstance(said, str):
         raise InputError(f"'{name}' is a text")
     return said
-
-
-def _library(moment: Configuration) -> Library:
-    """The plots seen so far, by name; of those with the same name the last, as a plan is made anew."""
-    found: dict[str, ActionPlot] = {}
-    for form in moment.plots.values():
-        try:
-            plot = ActionPlot.model_validate(form)
-        except ValidationError as error:
-            raise InputError(f"a plot of this trace cannot be read: {error.errors()[0]['msg']}") from None
-        found[plot.name] = plot
-    return Library(found.values())

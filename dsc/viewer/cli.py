@@ -19,15 +19,15 @@ NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.
 
 
 def view_command(
-    trace: Annotated[Path, typer.Argument(metavar="TRACE.jsonl", help="What `--trace` wrote.")],
+    file: Annotated[Path, typer.Argument(metavar="TRACE.jsonl|STORE", help="What `--trace` wrote, or a store.")],
     port: Port = 0,
     no_open: NoOpen = False,
 ) -> None:
-    """Look at a recorded run in the browser; Ctrl-C ends it."""
+    """Look at a recorded run, or at a store as others change it, in the browser; Ctrl-C ends it."""
     viewer_installed()
-    from dsc.viewer.records import read_trace
+    from dsc.viewer.opening import records_of
 
-    with page(read_trace(trace), None, port, opens=not no_open) as viewer:
+    with records_of(file) as log, page(log, None, port, opens=not no_open) as viewer:
         until_interrupt(viewer)
 
 

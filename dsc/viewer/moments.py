@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Generic, TypeVar
 
@@ -75,26 +75,6 @@ class Replay(Generic[_S]):
                 self._seqs.append(self._scanned)
 
 
-@dataclass(frozen=True, slots=True)
-class Configuration:
-    """Which states are active, and which plot is the content of which state.
-
-    Attributes:
-        active: paths of the active states.
-        bound: path of a state -> hash of the plot in it; `""` is the outermost plot.
-        plots: hash -> the plot's form, of all plots seen so far.
-    """
-
-    active: frozenset[str] = frozenset()
-    bound: Mapping[str, str] = field(default_factory=dict)
-    plots: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-
-
-def configurations(log: RecordLog) -> Replay[Configuration]:
-    """The configuration at any record."""
-    return Replay(log, frozenset({"plot", "step"}), Configuration(), lambda state: state, _configured)
-
-
 @dataclass(slots=True)
 class Known:
     """A world with its version."""
@@ -107,17 +87,6 @@ def knowledge(log: RecordLog) -> Replay[Known]:
     """The knowledge at any record."""
     begin = Known(WorldState(Schema()), 0)
     return Replay(log, frozenset({"world", "knowledge"}), begin, lambda k: Known(k.state.copy(), k.version), _known)
-
-
-def _configured(before: Configuration, record: Mapping[str, Any]) -> Configuration:
-    if record["type"] == "plot":
-        return Configuration(before.active, before.bound, {**before.plots, record["hash"]: record["plot"]})
-    active, bound = set(before.active), dict(before.bound)
-    for micro in record["microsteps"]:
-        active.difference_update(micro["exited"])
-        active.update(micro["entered"])
-        bound.update({one["state"]: one["hash"] for one in micro.get("bound", ())})
-    return Configuration(frozenset(active), bound, before.plots)
 
 
 def _known(before: Known, record: Mapping[str, Any]) -> Known:

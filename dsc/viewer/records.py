@@ -29,6 +29,7 @@ class RecordLog:
         self._live = live
         self._lock = Lock()
         self._wakers: list[Callable[[], None]] = []
+        self._batch: tuple[int, int, str] = (0, 0, "")
 
     def __len__(self) -> int:
         """The number of the last record."""
@@ -74,8 +75,12 @@ class RecordLog:
         while end < last and characters < MOST_CHARACTERS:
             characters += len(self._lines[end])
             end += 1
-        # The lines are JSON already; writing them anew would cost more than everything else here.
-        return f'{{"type":"records","from":{seq},"records":[{",".join(self._lines[seq - 1 : end])}]}}', end + 1
+        kept = self._batch
+        if kept[:2] != (seq, end):  # browsers that have caught up get the same: it is put together once
+            # The lines are JSON already; writing them anew would cost more than everything else here.
+            text = f'{{"type":"records","from":{seq},"records":[{",".join(self._lines[seq - 1 : end])}]}}'
+            kept = self._batch = (seq, end, text)
+        return kept[2], end + 1
 
     def line(self, seq: int) -> str:
         """The record as its line.
@@ -116,4 +121,5 @@ def _require_header(line: str, path: Path) -> None:
     except ValueError:
         said = None
     if not isinstance(said, dict) or said.get("format") != FORMAT:
-        raise ParseError(f'a trace begins with {{"format": "{FORMAT}", …}}', place=Place(str(path), 1))
+        begins = f'{{"format": "{FORMAT}", …}}'
+        raise ParseError(f"neither a store nor a trace, which begins with {begins}", place=Place(str(path), 1))

@@ -73,7 +73,6 @@ class Viewer:
             Route("/record/{seq:int}", self._record),
             Route("/query", self._asked(self._answers.query), methods=["POST"]),
             Route("/facts", self._asked(self._answers.facts), methods=["POST"]),
-            Route("/svg", self._asked(self._answers.svg), methods=["POST"]),
             Route("/control", self._controlled, methods=["POST"]),
             WebSocketRoute("/socket", self._stream),
             Mount("/", StaticFiles(directory=STATIC, check_dir=False)),
@@ -115,7 +114,7 @@ class Viewer:
                 said = await run_in_threadpool(answer, await _body(request))
             except InputError as error:
                 return _wrong(error)
-            return Response(said, media_type="image/svg+xml") if isinstance(said, str) else JSONResponse(said)
+            return JSONResponse(said)
 
         return asked
 

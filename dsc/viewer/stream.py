@@ -9,7 +9,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from dsc.viewer.records import RecordLog
+from dsc.viewer.records import MOST_RECORDS, RecordLog
 
 FORMAT = "dsc-view/1"
 INTERVAL_S = 1 / 30
@@ -34,7 +34,7 @@ class Stream:
         self._more = asyncio.Event()
         self._loop = asyncio.get_running_loop()
         self._woken = False
-        self._said: dict[str, Any] | None = None
+        self._said: tuple[object, ...] | None = None
 
     async def serve(self) -> None:
         """Until the browser goes away."""
@@ -83,10 +83,14 @@ class Stream:
             await self._sleep(INTERVAL_S)
 
     async def _tell_status(self) -> None:
-        status = {"type": "status", "last": len(self._log), "live": self._log.live, **self._status()}
-        if status != self._said:
-            self._said = status
-            await self._send(status)
+        """Say how the run is, if that is new, or how far, if that cannot be seen from the records that follow."""
+        status = {"type": "status", "live": self._log.live, **self._status()}
+        last = len(self._log)
+        behind = self._cursor is None or last - self._cursor >= MOST_RECORDS
+        said = (status, last if behind else None)
+        if said != self._said:
+            self._said = said
+            await self._send({**status, "last": last})
 
     async def _send(self, said: dict[str, Any]) -> None:
         await self._socket.send_text(json.dumps(said))

@@ -38,12 +38,34 @@ test("a held run stands still and says so, and goes on", { timeout: 60_000 }, as
   await page.getByRole("banner").getByText("stands still").waitFor({ state: "detached" });
 });
 
-test("a breakpoint is listed and taken away", async () => {
-  await page.getByLabel("Add: what").selectOption("plan_step");
-  await page.getByLabel("Add: which").fill("(drive table sink)");
+test("a fact that is handed in is known, and stops the run at a breakpoint on it; taken away, the run goes on", { timeout: 60_000 }, async () => {
+  await page.getByLabel("Add: what").selectOption("condition");
+  await page.getByLabel("Add: which").fill("(robot-at operator)");
   await page.getByRole("button", { name: "Add", exact: true }).click();
-  await page.getByRole("button", { name: "Remove plan step (drive table sink)" }).click();
+  await page.getByLabel("Send: what").selectOption("tell");
+  await page.getByLabel("Send: which").fill("(robot-at operator)");
+  await page.getByRole("button", { name: "Send" }).click();
+  await page.getByRole("banner").getByText("stands still: condition (robot-at operator)").waitFor({ timeout: 40_000 });
+  await page.getByRole("tab", { name: "Knowledge" }).click();
+  await page.getByLabel("Filter or ask").fill("(robot-at operator)");
+  await page.getByLabel("Answers").getByText("true", { exact: true }).waitFor();
+  await page.getByLabel("Filter or ask").fill("");
+  await page.getByRole("tab", { name: "Control" }).click();
+  await page.getByLabel("Send: what").selectOption("retract");
+  await page.getByLabel("Send: which").fill("(robot-at operator)");
+  await page.getByRole("button", { name: "Send" }).click();
+  await page.getByRole("button", { name: "Remove condition (robot-at operator)" }).click();
   await page.getByRole("button", { name: /^Remove/ }).waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "Go on" }).click();
+  await page.getByRole("banner").getByText("stands still").waitFor({ state: "detached" });
+});
+
+test("an event that is handed in is one of the run", { timeout: 60_000 }, async () => {
+  await page.getByLabel("Send: what").selectOption("event");
+  await page.getByLabel("Send: which").fill("somebody_waves");
+  await page.getByRole("button", { name: "Send" }).click();
+  await page.getByRole("tab", { name: "Why" }).click();
+  await page.getByText("somebody_waves from").first().waitFor({ timeout: 40_000 });
 });
 
 test("who goes back is no longer taken along, until he goes to the end", { timeout: 60_000 }, async () => {

@@ -1,17 +1,18 @@
 // A recorded run in the browser: what the page shows is what the records say, at any moment.
 import assert from "node:assert/strict";
+import { once } from "node:events";
 import { mkdtempSync, readFileSync } from "node:fs";
+import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { browse, loaded, open, record, serve } from "../browser.mjs";
+import { browse, loaded, open, OTHER_NAME, record, serve } from "../browser.mjs";
 
 let program, browser, page, complaints, records;
 
 before(async () => {
   const trace = join(mkdtempSync(join(tmpdir(), "dsc-")), "run.jsonl");
-  await record(trace, "--seed", "7", "--faults", "0.2");
-  records = readFileSync(trace, "utf8").trim().split("\n").slice(1).map((line) => JSON.parse(line));
+  records = await record(trace);
   program = await serve("view", trace, "--no-open");
   browser = await browse();
   ({ page, complaints } = await open(browser, program.url));
@@ -72,6 +73,7 @@ test("a decision record shows each candidate and the leaf that decided", async (
   await why.getByLabel("pick_up_from_side: chosen").waitFor();
   const rejected = why.getByLabel("pick_up_from_above: rejected");
   assert.match(await rejected.locator(".leaf.false.decides").innerText(), /\(= \(failures \w+\) 0\)/);
+  await page.keyboard.press("Escape");
 });
 
 test("a state tells its parameters, and its decision", async () => {
@@ -101,20 +103,49 @@ test("a click in the chart selects a state; it is collapsed, opened and zoomed i
   await page.keyboard.press("Escape");
 });
 
+test("the chart of a moment is saved as an SVG, with all that is open in it", async () => {
+  const moment = first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_2")));
+  await goTo(moment.seq);
+  await active("clear/execute/step_2").waitFor();
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "SVG" }).click()]);
+  const picture = readFileSync(await download.path(), "utf8");
+  assert.match(picture, new RegExp(`after record ${moment.seq}`));
+  const drawn = await page.evaluate((text) => {
+    const made = new DOMParser().parseFromString(text, "image/svg+xml");
+    return { wrong: made.querySelector("parsererror")?.textContent, bold: [...made.querySelectorAll("text.bold")].map((one) => one.textContent), taken: made.querySelectorAll('[marker-end="url(#taken)"]').length };
+  }, picture);
+  assert.equal(drawn.wrong, undefined);
+  assert.ok(drawn.bold.some((text) => text.startsWith("◆ 2 ")));
+  assert.ok(drawn.taken > 0);
+});
+
 test("the plan is there before and after a replan, with what broke it and who did", async () => {
   const broken = first((rec) => rec.type === "plan.broken");
-  const old = records.findLast((rec) => rec.seq < broken.seq && rec.type === "plan.found");
-  const found = first((rec) => rec.type === "plan.found", broken.seq);
+  const old = records.findLast((rec) => rec.seq < broken.seq && rec.type === "plan.ordered");
+  const next = first((rec) => rec.type === "plan.ordered", broken.seq);
   await goTo(broken.seq - 1);
   await page.getByLabel(old.plot, { exact: false }).first().waitFor();
   assert.equal(await page.getByLabel(`${old.plot} given up`).count(), 0);
-  await goTo(first((rec) => rec.type === "step", found.seq).seq);
+  await goTo(first((rec) => rec.type === "step", next.seq).seq);
   await page.getByLabel(`${old.plot} given up`).locator(".head").click();
-  assert.equal(await page.locator(".one-plan").first().locator("ol li").count(), found.steps.length);
-  assert.match(await page.locator(".one-plan").first().innerText(), new RegExp(found.plot));
+  assert.equal(await page.locator(".one-plan").first().locator("ol li").count(), next.steps.length);
+  assert.match(await page.locator(".one-plan").first().innerText(), new RegExp(next.plot));
   const why = page.getByLabel("Broken plan");
-  assert.ok((await why.innerText()).includes(broken.reason));
+  assert.ok((await why.innerText()).includes(broken.link.fact));
   await why.getByRole("button", { name: /knowledge/ }).waitFor();
+  await page.keyboard.press("Escape");
+});
+
+test("a step of the plan tells what it provides to whom, and what it relies on", async () => {
+  const plan = first((rec) => rec.type === "plan.ordered");
+  const [provider, fact, user] = plan.links.find(([from, , to]) => from > 0 && to <= plan.steps.length);
+  await goTo(first((rec) => rec.type === "step", plan.seq).seq);
+  await page.getByLabel(`${provider} ${plan.steps[provider - 1]}:`).click();
+  const why = page.getByLabel("Step of the plan");
+  const provided = why.locator("h3:text('Provides') + ul li").filter({ hasText: fact });
+  await page.getByLabel(`${user} ${plan.steps[user - 1]}:`).and(page.getByLabel("relies on the step selected")).waitFor();
+  await provided.getByRole("button", { name: `${user} ${plan.steps[user - 1]}` }).click();
+  await why.locator("h3:text('Relies on') + ul li").filter({ hasText: fact }).getByText(`${provider} ${plan.steps[provider - 1]}`).waitFor();
   await page.keyboard.press("Escape");
 });
 
@@ -187,9 +218,23 @@ test("every control has a name, and the page asks nobody else for anything", asy
   assert.deepEqual(complaints, []);
 });
 
-test("a wrong token is refused", async () => {
+test("a wrong token is refused, and so are another Host and another Origin, also for a socket", async () => {
   const other = await browser.newContext();
-  const answer = await (await other.newPage()).goto(program.url.replace(/token=.*/, "token=wrong"));
-  assert.equal(answer.status(), 403);
+  const stranger = await other.newPage();
+  assert.equal((await stranger.goto(program.url.replace(/token=.*/, "token=wrong"))).status(), 403);
+  const { host, port } = new URL(program.url);
+  assert.equal((await stranger.goto(program.url.replace(host, `${OTHER_NAME}:${port}`))).status(), 403);
+  const elsewhere = createServer((_, answer) => answer.end("<!doctype html>")).listen(0, "127.0.0.1");
+  await once(elsewhere, "listening");
+  await stranger.goto(`http://127.0.0.1:${elsewhere.address().port}/`);
+  const token = new URL(program.url).search;
+  const opened = await stranger.evaluate((url) => new Promise((done) => {
+    const socket = new WebSocket(url);
+    socket.onopen = () => done(true);
+    socket.onclose = () => done(false);
+  }), `ws://${host}/socket${token}`);
+  const asked = await stranger.evaluate((url) => fetch(url, { method: "POST", body: "{}" }).then(() => true, () => false), `http://${host}/query${token}`);
+  elsewhere.close();
   await other.close();
+  assert.deepEqual([opened, asked], [false, false]);
 });

@@ -2,6 +2,7 @@
 
 import { useEffect, useState } from "react";
 import { Chart } from "./panes/Chart";
+import { Graph } from "./panes/Graph";
 import { Controls } from "./panes/Controls";
 import { Header } from "./panes/Header";
 import { Knowledge } from "./panes/Knowledge";
@@ -10,7 +11,7 @@ import { Timeline } from "./panes/Timeline";
 import { Why } from "./panes/Why";
 import { World } from "./panes/World";
 import { useKeys } from "./keys";
-import { useControl, useSelection } from "./session";
+import { useControl, useKind, useSelection } from "./session";
 
 const TABS = ["Why", "Knowledge"] as const;
 
@@ -22,13 +23,17 @@ export function Page() {
   useEffect(() => {
     if (selection) setTab(selection.kind === "thing" ? "Knowledge" : "Why");
   }, [selection]);
+  const kind = useKind();
+  useEffect(() => {
+    if (kind === "store") setTab("Knowledge");
+  }, [kind]);
   const tabs = control ? ([...TABS, "Control"] as const) : TABS;
   return (
-    <div className="page">
+    <div className={`page ${kind}`}>
       <Header />
-      <World />
-      <PlanPane />
-      <Chart />
+      {kind === "run" && <World />}
+      {kind === "run" && <PlanPane />}
+      {kind === "store" ? <Graph /> : <Chart />}
       <section className="pane side" aria-label={tab}>
         <div className="tabs" role="tablist" aria-label="Side">
           {tabs.map((name) => (

@@ -31,6 +31,8 @@ export interface Shown {
 export const SPEEDS = [1, 2, 5, 10, 30, 100];
 
 const LOADING_MS = 250;
+/** Somebody stays at a moment who is there so long: it is in the address then. */
+const NOTED_MS = 300;
 
 export class Session {
   readonly history = new History();
@@ -44,6 +46,7 @@ export class Session {
   private drawn = 0;
   private clock = 0;
   private wanted: number | null = null;
+  private noted = 0;
 
   constructor() {
     const asked = Number(location.hash.slice(1));
@@ -79,19 +82,26 @@ export class Session {
     const moment = this.history.at(wanted);
     this.clock = moment.t;
     this.set({ moment, following: this.shown.live && wanted === this.history.last, playing: false, ...(select && { selection: select }) });
-    history.replaceState(null, "", `#${wanted}`);
+    clearTimeout(this.noted); // browsers refuse to be told of each place that somebody scrubs over
+    this.noted = window.setTimeout(() => history.replaceState(null, "", `#${wanted}`), NOTED_MS);
+  }
+
+  get kind(): Kind {
+    const { marks } = this.history;
+    if (this.shown.header.store === true) return "store";
+    return marks.scene.length || marks.plan.length || marks.decision.length || this.history.last === 0 ? "run" : "chart";
   }
 
   /** To the next mark, or the one before; returns whether there is one. */
   jump(mark: Mark, way: 1 | -1): boolean {
     const found = this.history.beside(this.shown.moment.seq, mark, way);
     if (found === undefined) return false;
-    this.goTo(found, mark === "step" ? undefined : { kind: "record", seq: found });
+    this.goTo(found, mark === "step" || this.kind === "store" ? undefined : { kind: "record", seq: found });
     return true;
   }
 
   step(way: 1 | -1): void {
-    if (!this.jump("step", way)) this.goTo(way > 0 ? this.history.last : 0);
+    if (!this.jump(this.kind === "store" ? "knowledge" : "step", way)) this.goTo(way > 0 ? this.history.last : 0);
   }
 
   play(playing: boolean): void {
@@ -144,7 +154,7 @@ export class Session {
     if (this.wanted !== null && last >= this.wanted) this.wanted = null;
     const over = playing && seq >= last;
     const next = seq === moment.seq ? moment : this.history.at(seq);
-    this.set({ moment: next, last, ...(over && { playing: false, following: this.shown.live }) });
+    this.set({ moment: next, last, expected: Math.max(this.shown.expected, last), ...(over && { playing: false, following: this.shown.live }) });
     if (this.shown.playing) this.later();
   }
 
@@ -172,6 +182,13 @@ export function useMoment(): Moment {
 
 export function useSelection(): Selection | null {
   return useSyncExternalStore(session.subscribe, () => session.get().selection);
+}
+
+/** What there is to see: a run, one that neither plans nor draws a world, or a store of knowledge. */
+export type Kind = "run" | "chart" | "store";
+
+export function useKind(): Kind {
+  return useSyncExternalStore(session.subscribe, () => session.kind);
 }
 
 /** Whether the run may be changed from here. */

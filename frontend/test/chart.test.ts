@@ -1,7 +1,7 @@
 import ELK from "elkjs/lib/elk.bundled.js";
 import { describe, expect, it } from "vitest";
 import { layout, signature } from "../src/chart/layout";
-import { edgeOf, HUB, visible, type View } from "../src/chart/visible";
+import { edgeOf, HUB, MANY, visible, type View } from "../src/chart/visible";
 import { beginning, type Moment } from "../src/core/moment";
 import type { PlotForm, StateForm } from "../src/core/plots";
 
@@ -65,6 +65,21 @@ describe("what is to be seen", () => {
     const { edges } = visible(moment({ "": "m" }, "work"), plots, PLAIN);
     expect(edges.map((edge) => [edge.id, edge.labels])).toEqual([["work>ended", ["stop", "failed"]], ["look>clear", ["done"]]]);
     expect(edgeOf("clear/step_1", "clear/after_1")).toBe("clear/step_1>after_1");
+  });
+
+  it("is of a plot with many states only what is active, and what was opened by hand", () => {
+    const group = (name: string): StateForm => ({ states: Object.fromEntries(Array.from({ length: MANY / 2 }, (_, i) => [`${name}${i}`, {}])) });
+    const large = new Map([["l", { plot: "large", states: { a: group("a"), b: group("b") } } as PlotForm]]);
+    const inside = (view: View) => visible(moment({ "": "l" }, "a", "a0"), large, view).nodes.map((node) => node.id).filter((id) => id.length > 1);
+    expect(inside(PLAIN).every((id) => id.startsWith("a"))).toBe(true);
+    expect(inside(PLAIN)).toHaveLength(MANY / 2);
+    expect(inside({ ...PLAIN, open: new Map([["a", false], ["b", true]]) }).every((id) => id.startsWith("b"))).toBe(true);
+  });
+
+  it("keeps the ways out of a plan quiet", () => {
+    const out: PlotForm = { plot: "p", generated: true, states: { step_1: { on: { done: [{ to: "finished" }], failed: [{ to: "replan" }] } }, finished: { final: true }, replan: { final: true } } };
+    const { edges } = visible(moment({ "": "o" }), new Map([["o", out]]), PLAIN);
+    expect(edges.map((edge) => [edge.to, edge.quiet])).toEqual([["finished", false], ["replan", true]]);
   });
 
   it("keeps ways into a hub quiet and counts them", () => {

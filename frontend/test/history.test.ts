@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { CHECKPOINT_EVERY, History } from "../src/core/history";
-import { nextStep } from "../src/core/plans";
+import { kinOf, nextOf } from "../src/core/plans";
 import type { Rec } from "../src/core/records";
 import { repeated, run } from "./run";
 
@@ -29,11 +29,27 @@ describe("a moment", () => {
     const states = (seq: number) => made.at(seq).plans.map((plan) => plan.steps.map((step) => step.state));
     expect(states(5)).toEqual([["waiting", "waiting"]]);
     expect(states(7)).toEqual([["running", "waiting"]]);
-    expect(nextStep(made.at(7).plans[0]!)).toBe(1);
+    expect(nextOf(made.at(7).plans[0]!, [0, 1])).toBe(1);
     expect(states(9)).toEqual([["done", "running"]]);
     expect(states(13)).toEqual([["done", "stopped"], ["waiting"]]);
     expect(made.at(13).plans.map((plan) => plan.ended)).toEqual([11, null]);
     expect(states(15)).toEqual([["done", "stopped"], ["running"]]);
+  });
+
+  it("has a plan as it is carried out: with its links, and without what was done meanwhile", () => {
+    const links = [[0, "(at a)", 1], [1, "(holding cup)", 2], [2, "(tidy cup)", 3]];
+    const made = history([...run.slice(0, 5), { seq: 6, t: 1, type: "plan.ordered", cause: null, plot: "plan_1", steps: ["(go a)", "(put cup)"], links } as Rec]);
+    const [plan] = made.at(6).plans;
+    expect(plan!.steps.map((step) => step.text)).toEqual(["(go a)", "(put cup)"]);
+    expect(plan!.links).toEqual(links);
+    expect([kinOf(plan!, 0, 1), kinOf(plan!, 1, 0), kinOf(plan!, 0, 0)]).toEqual(["provider", "user", null]);
+  });
+
+  it("knows what broke a plan also if another one was found while it went on", () => {
+    const rest = [run[12]!, { type: "rule", rule: "slipped: wait, retry", state: "clear/execute/step_2" }, run[11]!];
+    const later = rest.map((rec, i) => ({ t: 4, cause: null, ...rec, seq: 12 + i }) as Rec);
+    const made = history([...run.slice(0, 11), ...later]);
+    expect(made.at(14).plans.map((plan) => [plan.name, plan.ended])).toEqual([["plan_1", 11], ["plan_2", null]]);
   });
 
   it("does not blame a rule after which the step was begun again for the end of the plan", () => {
@@ -48,6 +64,14 @@ describe("a moment", () => {
     const plan = history([...run, ...rest]).at(run.length + 3).plans[1]!;
     expect(plan.ended).toBe(run.length + 3);
     expect(plan.steps.map((step) => [step.state, step.tries])).toEqual([["done", 2]]);
+  });
+
+  it("has the skills at work: not those that ended, nor those whose state was left", () => {
+    const actions = [["start", "a1"], ["start", "a2"], ["cancel", "a1"]];
+    const recs = actions.map(([action, id], i) => ({ seq: i + 1, t: 0, type: "action", cause: null, action, id, skill: id }) as Rec);
+    const made = history([...recs, { seq: 4, t: 1, type: "event", cause: 2, name: "done" } as Rec]);
+    const working = (seq: number) => [...made.at(seq).working.values()].map((one) => one.id);
+    expect([2, 3, 4].map(working)).toEqual([["a1", "a2"], ["a2"], []]);
   });
 
   it("has the transitions taken last, the latest first", () => {

@@ -8,7 +8,7 @@ const said: [number, string, number | null, object][] = [
   [0, "plot", null, { name: "plan_1", hash: "p1", plot: plan("plan_1", "(pick-up cup)", "(drive sink)") }],
   [0, "step", null, { microsteps: [{ event: null, taken: [], exited: [], entered: ["clear", "clear/plan"], bound: [
     { state: "", plot: "main", hash: "main" }, { state: "clear", plot: "achieve", hash: "achieve" }] }] }],
-  [1, "plan.found", 4, { plot: "plan_1", steps: ["(pick-up cup)", "(drive sink)"], engine: "hand", links: [[1, "(holding cup)", 2]] }],
+  [1, "plan.found", 4, { plot: "plan_1", steps: ["(pick-up cup)", "(drive sink)"], engine: "hand" }],
   [1, "event", 5, { name: "plan_found", source: "planner", attributes: {} }],
   [1, "step", 6, {
     variables: { "clear/execute": { reason: "unknown" } },

@@ -74,7 +74,7 @@ class CachingPlanner:
 
 def _recalled(known: PlanFound | ProvenUnsolvable, seconds: float) -> PlanFound | ProvenUnsolvable:
     known = replace(known, failures=())
-    return replace(known, from_cache=True, seconds=seconds) if isinstance(known, PlanFound) else known
+    return replace(known, from_cache=True, seconds=seconds, translated=0.0) if isinstance(known, PlanFound) else known
 
 
 def _key(problem: Problem) -> Hashable:

@@ -18,11 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-
-    from knowledge_base.facts import Fact
     from planning.engines.registry import Engine
-    from planning.strips import GroundAction, Problem
+    from planning.engines.worker import Answers, Request, Search
 
 # Lazy greedy search with h_FF alone: on the clean-up table preferred operators and landmarks are no faster up to 50
 # items and make up to twice as many trips. What follows only ever looks for a better plan.
@@ -41,7 +38,7 @@ _OUT_OF_MEMORY = (22, 24)
 _FINEST_COST = 1000  # costs are whole numbers there: ours are kept as fractions of at most so many parts
 
 
-def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | None]]:
+def searching(engine: Engine) -> Search:
     """The search that the engine is made by, for `planning.engines.worker`.
 
     Raises:
@@ -49,8 +46,8 @@ def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | None]]
     """
     program, options = str(_program()), _SEARCHES[engine.made_by]
 
-    def search(problem: Problem) -> Iterator[list[int] | None]:
-        yield from _plans(program, options, sas(problem))
+    def search(request: Request) -> Answers:
+        return _plans(program, options, sas(request))
 
     return search
 
@@ -62,7 +59,7 @@ def _program() -> Path:
     return Path(package.origin).parent / "downward" / "builds" / "release" / "bin" / "downward"
 
 
-def _plans(program: str, options: str, text: str) -> Iterator[list[int] | None]:
+def _plans(program: str, options: str, text: str) -> Answers:
     """Plans as they are found; each is in a file of its own before the program says so."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as task:
         task.write(text)
@@ -102,36 +99,25 @@ def _read(file: Path) -> list[int]:
     return [int(line.strip("() ").removeprefix("a")) for line in lines if line.startswith("(")]
 
 
-def sas(problem: Problem) -> str:
+def sas(request: Request) -> str:
     """The problem in the translator's output format; actions are called `a0`, `a1`, ... as they are numbered."""
-    number: dict[Fact, int] = {}
-    for fact in (*problem.init, *problem.goal, *(f for action in problem.actions for f in action.facts())):
-        number.setdefault(fact, len(number))
-    costs = _whole([Fraction(action.cost).limit_denominator(_FINEST_COST) for action in problem.actions])
-    init = set(problem.init)
-    lines = ["begin_version", "3", "end_version", "begin_metric", "1", "end_metric", str(len(number))]
-    for n in range(len(number)):
+    number, init, goal, actions = len(request["facts"]), set(request["init"]), request["goal"], request["actions"]
+    prices = {cost: Fraction(cost).limit_denominator(_FINEST_COST) for cost in {action[4] for action in actions}}
+    unit = lcm(*(price.denominator for price in prices.values()))
+    lines = ["begin_version", "3", "end_version", "begin_metric", "1", "end_metric", str(number)]
+    for n in range(number):
         lines += ["begin_variable", f"var{n}", "-1", "2", f"NegatedAtom f{n}()", f"Atom f{n}()", "end_variable"]
-    lines += ["0", "begin_state", *("1" if fact in init else "0" for fact in number), "end_state"]
-    lines += ["begin_goal", str(len(problem.goal)), *(f"{number[fact]} 1" for fact in problem.goal), "end_goal"]
-    lines.append(str(len(problem.actions)))
-    for n, (action, cost) in enumerate(zip(problem.actions, costs, strict=True)):
-        lines += _operator(f"a{n}", action, cost, number)
+    lines += ["0", "begin_state", *("1" if n in init else "0" for n in range(number)), "end_state"]
+    lines += ["begin_goal", str(len(goal)), *(f"{n} 1" for n in goal), "end_goal"]
+    lines.append(str(len(actions)))
+    for n, (_, needs, adds, deletes, cost, *_) in enumerate(actions):
+        lines += _operator(f"a{n}", needs, adds, deletes, int(prices[cost] * unit))
     return "\n".join([*lines, "0", ""])
 
 
-def _operator(name: str, action: GroundAction, cost: int, number: dict[Fact, int]) -> list[str]:
-    changes = [*((fact, 1) for fact in action.adds), *((fact, 0) for fact in action.deletes)]
-    changed, needed = {fact for fact, _ in changes}, set(action.precondition)
-    prevail = [f"{number[fact]} 1" for fact in action.precondition if fact not in changed]
-    effects = [f"0 {number[fact]} {1 if fact in needed else -1} {after}" for fact, after in changes]
+def _operator(name: str, needs: list[int], adds: list[int], deletes: list[int], cost: int) -> list[str]:
+    prevail = [f"{n} 1" for n in needs if n not in adds and n not in deletes]
+    effects = [f"0 {n} {1 if n in needs else -1} {after}" for those, after in ((adds, 1), (deletes, 0)) for n in those]
     return [
         "begin_operator", name, str(len(prevail)), *prevail, str(len(effects)), *effects, str(cost), "end_operator",
     ]  # fmt: skip
-
-
-def _whole(costs: Iterable[Fraction]) -> list[int]:
-    """In the same proportions, as whole numbers."""
-    costs = list(costs)
-    unit = lcm(*(cost.denominator for cost in costs))
-    return [int(cost * unit) for cost in costs]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import math
 import threading
 import time
@@ -15,6 +16,7 @@ from contextlib import AbstractContextManager, aclosing, nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
+from knowledge_base.language.memory import IdentityCache
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import can_time, cannot, in_concert, nobody
 from planning.patience import aside
@@ -137,10 +139,11 @@ class PlannerProcess:
         """Whether this engine can be asked for a plan with durations."""
         return problem.timed is not None and can_time(self.engine)
 
-    def _forms(self, problem: Problem) -> list[Problem]:
-        """The forms of a problem in which it is tried, one after the other."""
-        forms = (problem.timed if self._timed(problem) else None, problem, problem.whole)
-        return [one for one in forms if one is not None and not one.unreachable]
+    def _forms(self, problem: Problem) -> list[Callable[[], Problem]]:
+        """The forms of a problem in which it is tried, one after the other, each made when its turn comes."""
+        forms = [problem.timed] if self._timed(problem) else []
+        made = [_made(one) for one in (*forms, problem) if one is not None and not one.unreachable]
+        return made if problem.unsliced is None else [*made, problem.unsliced]
 
     async def _tried(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
         """The plans of the first form that has one; each but the last gets half of the time that is left."""
@@ -148,7 +151,7 @@ class PlannerProcess:
         cut_short = False
         for form in first:
             started = time.monotonic()
-            async with aclosing(self._attempt(form, seconds / 2)) as outcomes:
+            async with aclosing(self._attempt(form(), seconds / 2)) as outcomes:
                 async for outcome in outcomes:
                     if not isinstance(outcome, PlanFound | EngineFailed):
                         cut_short |= isinstance(outcome, TimedOut)
@@ -157,7 +160,7 @@ class PlannerProcess:
                 else:
                     return
             seconds -= min(time.monotonic() - started, seconds / 2)  # a new start is not planning time
-        async with aclosing(self._attempt(last, seconds)) as outcomes:
+        async with aclosing(self._attempt(last(), seconds)) as outcomes:
             async for outcome in outcomes:
                 yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
 
@@ -174,7 +177,7 @@ class PlannerProcess:
             return
         started = time.monotonic()
         try:
-            async with aclosing(_answers(process, problem.to_json(), seconds)) as answers:
+            async with aclosing(_answers(process, written(problem), seconds)) as answers:
                 async for answer in answers:
                     outcome = self._judged(answer, problem, time.monotonic() - started)
                     if best is None or (isinstance(outcome, PlanFound) and outcome.cost < best.cost):
@@ -218,7 +221,24 @@ class PlannerProcess:
         if isinstance(plan, str):
             return EngineFailed(self.engine, f"its plan is no solution: {plan}")
         cost = plan.seconds if durations else problem.cost(chosen)
-        return PlanFound(plan, self.engine, seconds, problem.simulated_seconds, cost=cost)
+        translated = answer.get("translated", 0.0)
+        return PlanFound(
+            plan, self.engine, seconds, problem.simulated_seconds, cost=cost,
+            translated=translated if isinstance(translated, float) else 0.0,
+        )  # fmt: skip
+
+
+_written: IdentityCache[Problem, bytes] = IdentityCache(size=2)
+
+
+def written(problem: Problem) -> bytes:
+    """The problem as a worker reads it; all engines of a race get the same."""
+    known = _written.find(problem, None)
+    return known or _written.keep(problem, None, json.dumps(problem.to_json()).encode() + b"\n")
+
+
+def _made(problem: Problem) -> Callable[[], Problem]:
+    return lambda: problem
 
 
 def _numbers(chosen: Any) -> list[int]:
@@ -236,7 +256,7 @@ def _times(timed: Any) -> list[tuple[int, float, float]]:
 
 
 async def _answers(
-    process: EngineProcess, request: dict[str, Any], seconds: float
+    process: EngineProcess, request: bytes, seconds: float
 ) -> AsyncGenerator[dict[str, Any], None]:
     """What the process answers, as it comes; closing this ends the search.
 

@@ -15,7 +15,7 @@ import weakref
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
 _LONGEST_ANSWER = 1 << 26  # bytes; a worker that babbles must not fill our memory
 _GRACE = 1.0  # seconds for a worker to say that its search, which was killed, has ended
@@ -121,15 +121,20 @@ class EngineProcess:
                 raise EngineStoppedError("it did not say that it is ready")
             self._ready = True
 
-    def ask(self, request: Mapping[str, Any], deadline: Deadline, hear: Callable[[dict[str, Any]], object]) -> None:
-        """Let it search; `hear` is called with each answer, in this thread. Returns when the search has ended.
+    def ask(self, request: bytes, deadline: Deadline, hear: Callable[[dict[str, Any]], object]) -> None:
+        """Let it search; returns when the search has ended.
+
+        Args:
+            request: the problem, as a line of JSON.
+            deadline: until when.
+            hear: is called with each answer, in this thread.
 
         Raises:
             OutOfTimeError: the deadline has come; the search is gone, and the process, unless it takes that well.
             EngineStoppedError: it ended or was killed before it gave an answer, or answered rubbish.
         """
         with self._turn:
-            self._unsent = memoryview(json.dumps(request).encode() + b"\n")
+            self._unsent = memoryview(request)
             answered = False
             while "ended" not in (said := self._in_time(deadline)):
                 if "searching" in said:

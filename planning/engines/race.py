@@ -83,7 +83,8 @@ class PlannerRace:
                     return
             seconds -= min(time.monotonic() - started, limit)
             failures = _failures(outcome)
-        async with aclosing(self._raced(self._choose(problem), replace(problem, timed=None), seconds)) as outcomes:
+        problem = problem if problem.timed is None else replace(problem, timed=None)
+        async with aclosing(self._raced(self._choose(problem), problem, seconds)) as outcomes:
             async for outcome in outcomes:
                 yield outcome if isinstance(outcome, EngineFailed | NobodyCan) else _with(failures, outcome)
 

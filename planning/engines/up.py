@@ -11,75 +11,44 @@ from typing import TYPE_CHECKING, Any
 
 from unified_planning.engines import PlanGenerationResultStatus, pddl_planner
 from unified_planning.plans import TimeTriggeredPlan
-from up_pyperplan.engine import EngineImpl  # type: ignore[import-untyped]
 
 from planning.engines.translation import ticks, translated
+from planning.strips import Problem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from unified_planning.engines.results import PlanGenerationResult
-    from unified_planning.environment import Environment
-    from unified_planning.model import InstantaneousAction
+    from unified_planning.model import Problem as UpProblem
 
     from planning.engines.registry import Engine
-    from planning.engines.worker import Schedule
-    from planning.strips import Problem
-
-
-# Greedy best-first search visits every state, except those that h_FF finds hopeless even without deletions:
-# an exhausted search is a proof. The binding calls it incomplete because it compares a function with names.
-_EXHAUSTED = (
-    PlanGenerationResultStatus.UNSOLVABLE_PROVEN,
-    PlanGenerationResultStatus.UNSOLVABLE_INCOMPLETELY,
-)
+    from planning.engines.worker import Answers, Request, Search
 
 
 _NO_MEMORY = ("OutOfMemoryError", "insufficient memory")
 """What Java says."""
 
 
-class Pyperplan(EngineImpl):  # type: ignore[misc]  # the package has no types
-    """pyperplan, with greedy best-first search and h_FF, giving the same plan for the same problem.
-
-    The binding keeps an action's effects in sets ordered by memory address, and pyperplan breaks ties by
-    that order; here they are in the order of their names. (String hashes must be fixed, too: PYTHONHASHSEED.)
-    """
-
-    def __init__(self) -> None:
-        super().__init__(search="gbf", heuristic="hff")
-
-    def _convert_action(self, action: InstantaneousAction, environment: Environment) -> Any:
-        converted = super()._convert_action(action, environment)
-        for name in ("addlist", "dellist"):
-            atoms = sorted(getattr(converted.effect, name), key=_by_name)
-            setattr(converted.effect, name, dict.fromkeys(atoms))
-        return converted
-
-
-def _by_name(atom: Any) -> str:
-    return str(atom.name)
-
-
-def searching(engine: Engine) -> Callable[[Problem], Iterator[list[int] | Schedule | None]]:
+def searching(engine: Engine) -> Search:
     """The search with an engine made by the class `module:name`, for `planning.engines.worker`.
 
     Raises:
         ImportError: it is not installed.
     """
     module, _, name = engine.made_by.partition(":")
-    found = getattr(import_module(module), name)
-    make = Pyperplan if issubclass(found, EngineImpl) else found
+    make = getattr(import_module(module), name)
 
-    def search(problem: Problem) -> Iterator[list[int] | Schedule | None]:
-        costs = "costs" in engine.features & problem.features
-        answer = make().solve(translated(problem, costs=costs))
-        if "durations" in problem.features and answer.plan is not None:
-            yield {"timed": _timed(answer.plan, ticks(problem))}
-        else:
-            yield _actions(answer)
+    def search(request: Request) -> Answers:
+        problem = Problem.from_json(request)
+        return _found(make(), translated(problem, costs="costs" in engine.features & problem.features), problem)
 
     return search
+
+
+def _found(engine: Any, translation: UpProblem, problem: Problem) -> Answers:
+    answer = engine.solve(translation)
+    if "durations" in problem.features and answer.plan is not None:
+        yield {"timed": _timed(answer.plan, ticks(problem))}
+    else:
+        yield _actions(answer)
 
 
 def _actions(result: PlanGenerationResult) -> list[int] | None:
@@ -94,7 +63,7 @@ def _actions(result: PlanGenerationResult) -> list[int] | None:
         return [int(action.action.name[1:]) for _, action, _ in timed]
     if result.plan is not None:
         return [int(step.action.name[1:]) for step in result.plan.actions]
-    if result.status in _EXHAUSTED:
+    if result.status is PlanGenerationResultStatus.UNSOLVABLE_PROVEN:
         return None
     said = " ".join(str(message.message) for message in result.log_messages or ())
     if any(words in said for words in _NO_MEMORY):

@@ -8,8 +8,9 @@ One JSON object a line. The worker begins with `{"ready": true}`. For each probl
 standard input it says `{"searching": G}`, G being the process group of the search and of all that it starts;
 then answers, `{"actions": [3, 0, ...]}` or, with the seconds at which each begins and that it takes, `{"timed":
 [[3, 0.0, 5.0], ...]}` (each plan better than the one before), `{"actions": null}` when there
-is proven to be no plan, or `{"failed": "why"}`; and at last, always, `{"ended": STATUS}`. It ends when its
-standard input does, and the search with it: a planner never outlives who asked.
+is proven to be no plan, or `{"failed": "why"}`; and at last, always, `{"ended": STATUS}`. With what an engine answers
+goes `"translated"`: the seconds of processor time for reading the problem and putting it into the engine's words. It
+ends when its standard input does, and the search with it: a planner never outlives who asked.
 """
 
 from __future__ import annotations
@@ -24,18 +25,24 @@ import select
 import signal
 import sys
 import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NoReturn
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from planning.strips import Problem
+from typing import Any, NoReturn
 
 _PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 
 Schedule = dict[str, list[tuple[int, float, float]]]
 """A plan with times as it is answered."""
+
+Answers = Iterator[list[int] | Schedule | None]
+"""What an engine finds, which it searches for when asked for the next one."""
+
+Request = Mapping[str, Any]
+"""A problem as `Problem.to_json` gives it: with numbers for facts, which is all that most engines want to know."""
+
+Search = Callable[[Request], Answers]
+"""Puts a problem into the engine's words; the search begins when the first answer is asked for."""
 
 MEGABYTES = 2048
 """Memory that a search may take, each of its processes by itself, if nobody says otherwise."""
@@ -73,7 +80,7 @@ def _say(out: int, said: dict[str, Any]) -> None:
         data = data[os.write(out, data) :]
 
 
-def _loaded(name: str) -> Callable[[Problem], Iterator[list[int] | Schedule | None]]:
+def _loaded(name: str) -> Search:
     """The engine's search; if it cannot be imported, one that says so to each problem."""
     try:
         import planning.strips  # noqa: F401, PLC0415  before the first fork, so that no search pays for it
@@ -81,20 +88,18 @@ def _loaded(name: str) -> Callable[[Problem], Iterator[list[int] | Schedule | No
 
         one = engine(name)
         driver = import_module(f"planning.engines.{one.driver}")
-        searching: Callable[[Problem], Iterator[list[int] | Schedule | None]] = driver.searching(one)
+        searching: Search = driver.searching(one)
     except Exception as error:  # noqa: BLE001  a broken installation is an answer, too
         failure = error
 
-        def failing(problem: Problem) -> Iterator[list[int] | Schedule | None]:  # noqa: ARG001
+        def failing(request: Request) -> Answers:  # noqa: ARG001
             raise failure
 
         return failing
     return searching
 
 
-def _serve(
-    line: bytes, search: Callable[[Problem], Iterator[list[int] | Schedule | None]], out: int, megabytes: int
-) -> None:
+def _serve(line: bytes, search: Search, out: int, megabytes: int) -> None:
     heard, said = os.pipe()
     lifeline, held = os.pipe()
     child = os.fork()
@@ -155,13 +160,7 @@ def _kill_group(group: int) -> None:
         os.killpg(group, signal.SIGKILL)
 
 
-def _search(
-    line: bytes,
-    search: Callable[[Problem], Iterator[list[int] | Schedule | None]],
-    said: int,
-    lifeline: int,
-    megabytes: int,
-) -> NoReturn:
+def _search(line: bytes, search: Search, said: int, lifeline: int, megabytes: int) -> NoReturn:
     """What the forked process does; it never returns to the loop that it was forked from."""
     try:
         _in_group(0)
@@ -192,12 +191,14 @@ def _limit_memory(megabytes: int) -> None:
     os.environ["JAVA_TOOL_OPTIONS"] = f"-Xmx{max(16, megabytes // 2)}m {unwritten}"
 
 
-def _answer(line: bytes, search: Callable[[Problem], Iterator[list[int] | Schedule | None]], said: int) -> None:
-    from planning.strips import Problem  # noqa: PLC0415  see _loaded
-
+def _answer(line: bytes, search: Search, said: int) -> None:
     try:
-        for actions in search(Problem.from_json(json.loads(line))):
-            _say(said, actions if isinstance(actions, dict) else {"actions": actions})
+        began = time.thread_time()
+        answers = search(json.loads(line))
+        translated = time.thread_time() - began
+        for actions in answers:
+            answer = actions if isinstance(actions, dict) else {"actions": actions}
+            _say(said, {**answer, "translated": translated})
     except MemoryError:
         _say(said, {"failed": "it ran out of memory"})
     except Exception as error:  # noqa: BLE001  an engine may raise anything

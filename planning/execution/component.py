@@ -215,7 +215,7 @@ class PlanningComponent(Component):
             return Outcome("goal_holds")
         self._telling.asked(goal, self._knowledge.version)
         try:
-            left = () if before is None else before.course.left_steps
+            left = None if before is None else before.course
             found = await self._search.plan(wanted, seconds, left, call.clock.sleep)
             if isinstance(found, NotFound):
                 return self._none(found.kind, found.reason)
@@ -230,7 +230,7 @@ class PlanningComponent(Component):
         self._telling.found(found.answer, carried.name)
         if before is not None:
             self._telling.replaced(before.name, carried.name, found.kept)
-        return self._ladder.found(carried, form)
+        return self._ladder.found(carried, order, form)
 
     def _none(self, kind: str, reason: str) -> Outcome:
         self._telling.none(kind, reason)

@@ -164,7 +164,7 @@ class Course:
     @property
     def left_steps(self) -> tuple[PlanStep, ...]:
         """The steps with the numbers of `left`."""
-        return self._of(self.left)
+        return self.steps_of(self.left)
 
     def needed(self) -> Mapping[Expression, int] | None:
         """What must hold now, with who needs it first; `None` if that cannot be written as conditions.
@@ -172,6 +172,14 @@ class Course:
         A step at work may have done its part already, so that what later steps need of it counts as well.
         """
         return self._needs.before(self.left)
+
+    def needed_by(self, numbers: tuple[int, ...]) -> Mapping[Expression, int] | None:
+        """As `needed`, if only the steps with these numbers, in this order, were left."""
+        return self._needs.before(numbers)
+
+    def steps_of(self, numbers: Iterable[int]) -> tuple[PlanStep, ...]:
+        """The steps with these numbers."""
+        return tuple(self.steps[number - 1] for number in numbers)
 
     def needed_later(self) -> Mapping[Expression, int] | None:
         """As `needed`, as if everything at work were done."""
@@ -188,18 +196,15 @@ class Course:
 
     def coming(self) -> tuple[PlanStep, ...]:
         """The steps that have not begun."""
-        return self._of(self._after(self.at_work))
+        return self.steps_of(self._after(self.at_work))
 
     def _ways_on(self) -> Iterator[tuple[PlanStep, ...]]:
         """What may be left to do."""
         at_work = self.at_work
         sizes = range(len(at_work) + 1) if len(at_work) <= _MOST_AT_WORK else (0, len(at_work))
         finished = itertools.chain.from_iterable(itertools.combinations(at_work, size) for size in sizes)
-        return (self._of(self._after(done)) for done in finished)
+        return (self.steps_of(self._after(done)) for done in finished)
 
     def _after(self, done: Iterable[int]) -> tuple[int, ...]:
         gone = set(done)
         return tuple(number for number in self.left if number not in gone)
-
-    def _of(self, numbers: Iterable[int]) -> tuple[PlanStep, ...]:
-        return tuple(self.steps[number - 1] for number in numbers)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from planning.execution.plotting import Plotting
     from planning.execution.search import Search
     from planning.execution.telling import Telling
+    from planning.ordering.order import PartialOrder
     from planning.plan import PlanStep
     from planning.posing.derived import Derivation
 
@@ -75,9 +76,10 @@ class Ladder:
             self.search.exclude(failed, why)
         return Outcome("replan")
 
-    def found(self, carried: Carried, form: dict[str, Any]) -> Outcome:
-        """The plan will be carried out with a plot of that form."""
+    def found(self, carried: Carried, order: PartialOrder, form: dict[str, Any]) -> Outcome:
+        """The plan will be carried out in that order, with a plot of that form."""
         self.plans.carry(carried)
+        self.telling.ordered(carried.name, order)
         return Outcome("plan_found", {"plot": form, "name": carried.name, "steps": len(carried.course.steps)})
 
     def _rung(
@@ -106,14 +108,14 @@ class Ladder:
         if carried.following_name is not None:
             self.telling.replaced(carried.name, name, carried.following_kept)
         elif len(steps) < len(left):
-            self.telling.skipped(name, [step for step in left if step not in steps], why)
+            self.telling.skipped(carried.name, [step for step in left if step not in steps], why)
         else:
             self.telling.resumed(carried.name, name, steps[0], why, instead_of)
         self.plans.over(carried.name)
         order, before = self.plotting.order(Plan(steps), carried.goal), carried.course
         course = Course(steps, before.domain, before.goal, order.before)
         again = Carried(name, carried.goal, course, carried.attempt, carried.holder, carried.seconds, carried.replans)
-        return self.found(again, self.plotting.form(again, order, instead_of))
+        return self.found(again, order, self.plotting.form(again, order, instead_of))
 
     def _give_up(self, carried: Carried, reason: str) -> Outcome:
         self.plans.over(carried.name)

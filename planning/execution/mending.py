@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from itertools import islice
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation import World, holds
-from knowledge_base.language.expression import And, Expression
+from knowledge_base.language.expression import And, Atom, Constant, Expression
 from planning.domain import PlanningDomain
-from planning.execution.needs import Needs
+from planning.execution.course import Course
 from planning.patience import Patience
 from planning.plan import Plan, PlanStep
 from planning.posing.derived import derivation
@@ -43,7 +44,7 @@ class Mending:
 
 
 def mending(
-    before: Sequence[PlanStep],
+    before: Course,
     excluded: AbstractSet[PlanStep],
     domain: PlanningDomain,
     world: World,
@@ -55,7 +56,7 @@ def mending(
     Of the ends of the plan the one that is nearest to being possible is kept; the problem is to reach what it needs.
 
     Args:
-        before: the steps that are left of the plan.
+        before: the plan as far as it came.
         excluded: steps that shall not be taken.
         domain: has the steps' conditions and effects.
         world: the present.
@@ -66,19 +67,19 @@ def mending(
         OutOfPatienceError: it takes too long.
     """
     derived = derivation(domain)
-    closed, wanted = derived.world(world), derived.expand(goal)
-    needs = Needs(before, derived.domain, wanted)  # of all ends, since a shorter one is the end of a longer one
-    numbers = range(1, len(before) + 1)
-    firsts = [first for first in range(min(_MOST_LEFT_OUT + 1, len(before))) if not excluded & set(before[first:])]
-    ends = [(tuple(before[first:]), needs.before(tuple(numbers[first:]))) for first in firsts]
-    near = [
-        (unmet + len(end), end, needed)
-        for end, needed in ends
-        if needed is not None and (unmet := sum(not _true(one, closed) for one in needed)) <= _MOST_UNMET
-    ]
+    closed, left = derived.world(world), before.left  # once: the plan may go on meanwhile
+    if derived.recursive:  # its conditions are those of another state of the world
+        before = before.renewed(derived.domain, derived.expand(goal))
+    ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))
+    known = ((before.steps_of(end), before.needed_by(end)) for end in ends)
+    allowed = [(end, needed) for end, needed in known if excluded.isdisjoint(end)]
+    gaps = [(end, needed, _unmet(needed, closed)) for end, needed in allowed if needed is not None]
+    near = [(end, needed, gap) for end, needed, gap in gaps if len(gap) <= _MOST_UNMET]
     if not near:
         return None
-    _, end, needed = min(near, key=lambda one: one[0])
+    end, needed, gap = min(near, key=lambda one: len(one[0]) + len(one[2]))
+    if not all(map(derived.may_change, gap)):
+        return None
     try:
         problem = pose(domain, world, And(tuple(needed)), patience=patience)
     except InputError:  # what the end needs cannot be asked for
@@ -86,7 +87,16 @@ def mending(
     return None if problem.unreachable else Mending(end, problem)
 
 
+def _unmet(needed: Iterable[Expression], world: World) -> list[Expression]:
+    """What does not hold of what is needed, as soon as it is too much no more of it."""
+    return list(islice((one for one in needed if not _true(one, world)), _MOST_UNMET + 1))
+
+
 def _true(condition: Expression, world: World) -> bool:
+    if isinstance(condition, Atom) and condition.predicate in world.schema.predicates:
+        args = [term.value for term in condition.args if isinstance(term, Constant)]
+        if len(args) == len(condition.args) and condition.predicate not in world.schema.computed:
+            return world.holds(condition.predicate, tuple(args))  # most are such: asked once, not worth preparing
     try:
         return holds(condition, world)
     except InputError:

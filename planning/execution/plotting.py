@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from planning.generation.plot import plot_from_plan
@@ -42,15 +42,15 @@ class Plotting:
         """Which steps wait for which."""
         if plan.schedule:
             return scheduled(plan)
-        if not self.parallel:
-            return in_sequence(plan)
-        return deordered(plan, self.derivation.original, self.knowledge, goal)
+        order = deordered(plan, self.derivation.original, self.knowledge, goal)
+        return order if self.parallel else replace(order, before=in_sequence(plan).before)
 
     def form(self, carried: Carried, order: PartialOrder, instead_of: str | None = None) -> dict[str, Any]:
         """The plot as data; its first step is done rather not with the candidate `instead_of`."""
         rules = self.library.plot(carried.holder).rules if carried.holder in self.library else ()
         plan, domain = Plan(carried.course.steps), carried.course.domain
         plot = plot_from_plan(plan, domain, self.library, rules, carried.name, order, self.shared)
+        self.library.expect(plot)
         form = plot.to_form()
         if instead_of is not None:
             _put_last(instead_of, _state(plot, form, "step_1")["dynamic"])

@@ -74,12 +74,8 @@ def regressed(e: Expression, changes: Sequence[Leaf]) -> Expression:
             within = regressed(body, changes)
             empty = FALSE if isinstance(e, Exists) else TRUE
             return empty if within == empty else replace(e, body=within)
-        case Comparison(operator, left, right):
-            return disjunction(
-                conjunction((before_left, before_right, _compared(operator, new_left, new_right)))
-                for before_left, new_left in _values(left, changes)
-                for before_right, new_right in _values(right, changes)
-            )
+        case Comparison():
+            return _comparison(e, changes)
 
 
 def conjuncts(e: Expression) -> tuple[Expression, ...]:
@@ -134,6 +130,16 @@ def _atom(atom: Atom, changes: Sequence[Leaf]) -> Expression:
     if not added and not deleted:
         return atom
     return disjunction((conjunction((atom, negation(disjunction(deleted)))), *added))
+
+
+def _comparison(e: Comparison, changes: Sequence[Leaf]) -> Expression:
+    if isinstance(e.left, Constant | Variable) and isinstance(e.right, Constant | Variable):
+        return _compared(e.operator, e.left, e.right)  # as that does below, only sooner
+    return disjunction(
+        conjunction((before_left, before_right, _compared(e.operator, new_left, new_right)))
+        for before_left, new_left in _values(e.left, changes)
+        for before_right, new_right in _values(e.right, changes)
+    )
 
 
 def _hit(leaf: Leaf, own: tuple[Term, ...], asked: tuple[Term, ...]) -> Expression:

@@ -117,7 +117,10 @@ def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:
 
 def without(problem: Problem, steps: Collection[PlanStep]) -> Problem:
     """The problem of reaching the goal without taking any of these steps."""
+    if not steps:
+        return problem
     allowed = tuple(action for action in problem.actions if action.step not in steps)
-    whole = None if problem.whole is None else without(problem.whole, steps)
+    unsliced = problem.unsliced
     timed = None if problem.timed is None else without(problem.timed, steps)
-    return replace(problem, actions=allowed, whole=whole, timed=timed)
+    whole = None if unsliced is None else lambda: without(unsliced(), steps)
+    return replace(problem, actions=allowed, unsliced=whole, timed=timed)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import threading
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
+    from planning.execution.course import Course
     from planning.execution.foresight import Foresight
     from planning.execution.telling import Telling
     from planning.strips import Problem
@@ -133,18 +133,14 @@ class Search:
         self._excluded = {PlanStep.from_json(step): until for step, until in memory}
 
     async def plan(
-        self,
-        goal: Expression,
-        seconds: float,
-        before: Sequence[PlanStep],
-        sleep: Callable[[float], Awaitable[None]],
+        self, goal: Expression, seconds: float, before: Course | None, sleep: Callable[[float], Awaitable[None]]
     ) -> Found | NotFound:
         """A plan for the goal from the world as it is when it is found.
 
         Args:
             goal: what shall hold.
             seconds: real time for one search.
-            before: what was left of the plan that it takes the place of; it is mended if that takes little.
+            before: the plan that it takes the place of; what is left of it is mended if that takes little.
             sleep: lets the simulated time of a search pass, which has begun earlier if the run was broken off.
 
         Raises:
@@ -170,7 +166,7 @@ class Search:
                 if verdict.valid:
                     return found
                 await found.close()
-                before = ()
+                before = None
                 if verdict.failing_step is None or len(rejected) == MAX_REJECTED:
                     return NotFound("failed", f"the simulation foresees that it fails: {verdict.why}")
                 rejected[found.steps[verdict.failing_step]] = verdict.why
@@ -187,20 +183,20 @@ class Search:
         self,
         goal: Expression,
         seconds: float,
-        before: Sequence[PlanStep],
+        before: Course | None,
         rejected: dict[PlanStep, str],
         snapshot: WorldState,
     ) -> Found | NotFound:
         """One plan for the world as it was."""
-        mended = await self._mended(goal, seconds, before, snapshot) if before else None
+        budget = Patience(seconds)
+        mended = None if before is None else await self._mended(goal, seconds / 2, before, snapshot)
         if isinstance(mended, Found):
             return mended
-        patience = Patience(seconds)
         try:
-            problem = await self._posed(goal, snapshot, patience)
+            problem = await self._posed(goal, snapshot, Patience(budget.left))
         except OutOfPatienceError as error:
             return NotFound("timed_out", f"no plan within {seconds:g} s (while {error.doing})")
-        answer, better = await self._answer(problem, patience.left, rejected)
+        answer, better = await self._answer(problem, budget.left, rejected)
         if isinstance(answer, PlanFound):
             reproducible = answer.reproducible and mended is None
             return Found(replace(answer, reproducible=reproducible), better=better)
@@ -209,7 +205,7 @@ class Search:
         if rejected:
             reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
-        missing = await self._why_not(goal, snapshot, Patience(seconds))
+        missing = await self._why_not(goal, snapshot, Patience(budget.left))
         return NotFound("unsolvable", "; ".join(missing) or answer.reason)
 
     async def _posed(self, goal: Expression, snapshot: WorldState, patience: Patience) -> Problem:
@@ -236,7 +232,7 @@ class Search:
         return answer, better
 
     async def _mended(
-        self, goal: Expression, seconds: float, before: Sequence[PlanStep], snapshot: WorldState
+        self, goal: Expression, seconds: float, before: Course, snapshot: WorldState
     ) -> Found | TimedOut | None:
         """What was left of the plan before, mended; `TimedOut` if a limit of real time cut in."""
         excluded, patience = self._excluded_now(), Patience(seconds)
@@ -247,11 +243,11 @@ class Search:
             return TimedOut("mending", seconds)
         if how is None:
             return None
-        seconds = min(seconds / 4, MENDING_SECONDS)
+        seconds = min(patience.left / 4, MENDING_SECONDS)
         answer, _ = await self._solve(without(how.problem, excluded), seconds, going_on=False)
         if not isinstance(answer, PlanFound):
             return answer if isinstance(answer, TimedOut) else None
-        plan = how.mended(answer.plan, before, self._domain, snapshot, goal)
+        plan = how.mended(answer.plan, before.left_steps, self._domain, snapshot, goal)
         return None if plan is None else Found(replace(answer, plan=plan), kept=len(how.end))
 
     def _excluded_now(self) -> set[PlanStep]:

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from knowledge_base.language.printer import to_text
+from planning.ordering.order import PRESENT
+
 if TYPE_CHECKING:
     from dsc.trace import Trace
     from planning.execution.course import Course
     from planning.execution.monitor import Broken
+    from planning.ordering.order import PartialOrder
     from planning.plan import PlanFound, PlanStep
 
 _CUT_SHORT = {"reproducible": False}
@@ -32,6 +36,23 @@ class Telling:
             more["failures"] = [{"engine": one.engine, "message": one.message} for one in answer.failures]
         steps = [str(step) for step in answer.plan.steps]
         self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine, **more)
+
+    def ordered(self, name: str, order: PartialOrder) -> None:
+        """The plan of that name is going to be carried out: its steps, and its causal links.
+
+        A link says which step, from 1, brings about what for which; 0 is what holds already, one past the last the
+        goal. What holds already and only the goal needs is left out: it may be as much as the goal has parts. A plan
+        with a schedule of its own comes without links.
+        """
+        goal = len(order.steps) + 1
+        kept = [link for link in order.links if (link.provider, link.user) != (PRESENT, goal)]
+        links = sorted([link.user, link.provider, to_text(link.fact)] for link in kept)
+        self._trace.record(
+            "plan.ordered",
+            plot=name,
+            steps=[str(step) for step in order.steps],
+            links=[[provider, fact, user] for user, provider, fact in links],
+        )
 
     def none(self, kind: str, reason: str) -> None:
         """There is none."""
@@ -59,7 +80,7 @@ class Telling:
         self._trace.record("plan.resumed", plot=new, after=old, step=str(step), why=why, **other)
 
     def skipped(self, name: str, steps: Iterable[PlanStep], why: str) -> None:
-        """Steps are left out since the goal is reached without them."""
+        """Steps of the plan of that name are left out since the goal is reached without them."""
         self._trace.record("plan.skipped", plot=name, steps=[str(step) for step in steps], why=why)
 
     def gave_up(self, name: str, reason: str) -> None:

@@ -197,7 +197,7 @@ class _Watch:
         goal, course = self._carried.goal, self._carried.course
         self._about.telling.asked(to_text(goal), self._about.knowledge.version)
         try:
-            found = await self._about.search.plan(goal, self._carried.seconds, course.left_steps, clock.sleep)
+            found = await self._about.search.plan(goal, self._carried.seconds, course, clock.sleep)
             if isinstance(found, Found):
                 await found.close()
         except Exception as error:  # noqa: BLE001  whatever goes wrong beside a plan must not leave it unwatched

@@ -19,6 +19,7 @@ from dsc.dynamic.responses import skipped
 from dsc.events import GAVE_UP
 from dsc.model.rules import REPLAN
 from knowledge_base.language.expression import And, Comparison, Constant, Expression, Not, Variable
+from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.printer import to_text
 from planning.generation.steps import CarriedStep
 from planning.ordering.order import PartialOrder
@@ -82,9 +83,9 @@ class Writer:
         states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
         for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
             states[f"step_{number}"] = self._step(number, lane)
-            states[f"after_{number}"] = self._after(number, following, lane, self._steps[number].expected)
+            states[f"after_{number}"] = self._after(number, following, lane)
             if number in self._left_out:
-                states[skipped(f"step_{number}")] = self._after(number, following, lane, ())
+                states[skipped(f"step_{number}")] = self._after(number, following, lane, left_out=True)
             if following is not None and self._waits[following]:
                 states[f"before_{following}"] = self._before(following, lane)
         for end in (REPLAN, GAVE_UP):
@@ -106,48 +107,76 @@ class Writer:
             state["entry"] = {"set": f"planner.{self._plan}", "to": number}
         if step.over_all:
             state["always"] = [
-                self._replan(lane, f"lost during {step.text}: {to_text(one)}", [Not(one)])
+                self._replan(lane, f"lost during {step.text}: {to_text(one)}", Not(one))
                 for one in step.over_all
             ]
         if step.seconds is not None:
             state["after"] = {"seconds": step.seconds, **self._replan(lane, f"too slow: {step.text}")}
         return state
 
-    def _after(
-        self, number: int, following: int | None, lane: Lane, expected: tuple[Expression, ...]
-    ) -> dict[str, Any]:
+    def _after(self, number: int, following: int | None, lane: Lane, *, left_out: bool = False) -> dict[str, Any]:
         step, flag = self._steps[number], f"{_DONE}_{number}"
         told = {"assign": {flag: True}} if flag in self._flags else {}
         if following is not None and self._waits[following]:
-            onward = [_guarded({"to": f"before_{following}", **told}, expected)]
+            onward = [_guarded({"to": f"before_{following}", **told}, None if left_out else _seen(step))]
+        elif left_out:
+            onward = self._onward(following, lane, (), told)
         else:
-            onward = self._onward(following, lane, expected, told)
+            onward = self._onward(following, lane, step.expected, told, step)
         state: dict[str, Any] = {"always": onward}
-        if expected:
+        if step.expected and not left_out:
             state["after"] = {"seconds": step.confirm, **self._replan(lane, f"not observed: {step.text}")}
         return state
 
     def _onward(
-        self, number: int | None, lane: Lane, first: Iterable[Expression], told: Mapping[str, Any] | None = None
-    ) -> list[dict[str, Any]]:
-        """To a step if it is applicable, else back to planning; both only once the `first` conditions hold."""
+        self, number: int | None, lane: Lane, first: Iterable[Expression], told: Mapping[str, Any] | None = None,
+        after: CarriedStep | None = None,
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """To a step if it is applicable, else back to planning; both only once the `first` conditions hold.
+
+        These are what `after` is expected to bring about, if that is given.
+        """
         first, assigned = tuple(first), dict((told or {}).get("assign", {}))
+        begun = _joined(first) if after is None else _seen(after)
         if number is None:
-            return [_guarded({"to": lane.finished, **(told or {})}, first)]
+            return [_guarded({"to": lane.finished, **(told or {})}, begun)]
         step, flag = self._steps[number], f"{_BEGUN}_{number}"
         if flag in self._flags:
             assigned[flag] = True
         begin = {"to": f"step_{number}", **({"assign": assigned} if assigned else {})}
-        needed = tuple(dict.fromkeys((*first, *step.needed)))
-        otherwise = [] if needed == first else [self._replan(lane, f"not applicable: {step.text}", first)]
-        return [_guarded(begin, needed), *otherwise]
+        both = _joined((*first, *step.needed)) if after is None else _between(after, step)
+        otherwise = [] if both == begun else [self._replan(lane, f"not applicable: {step.text}", begun)]
+        return [_guarded(begin, both), *otherwise]
 
-    def _replan(self, lane: Lane, reason: str, when: Iterable[Expression] = ()) -> dict[str, Any]:
-        return _guarded({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, tuple(when))
+    def _replan(self, lane: Lane, reason: str, when: Expression | None = None) -> dict[str, Any]:
+        return _guarded({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, when)
 
 
-def _guarded(transition: dict[str, Any], when: tuple[Expression, ...]) -> dict[str, Any]:
-    return {**transition, "when": when[0] if len(when) == 1 else And(when)} if when else transition
+def _guarded(transition: dict[str, Any], when: Expression | None) -> dict[str, Any]:
+    return transition if when is None else {**transition, "when": when}
+
+
+def _joined(conditions: Iterable[Expression]) -> Expression | None:
+    """All of them; `None` if there are none."""
+    all_ = tuple(dict.fromkeys(conditions))
+    return None if not all_ else all_[0] if len(all_) == 1 else And(all_)
+
+
+# What is known of a condition is known by its identity, and one plan has most pairs of steps of the one before.
+_pairs: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
+
+
+def _seen(step: CarriedStep) -> Expression | None:
+    """What is to be seen when it is done."""
+    (found,) = _pairs.find(step, None) or _pairs.keep(step, None, (_joined(step.expected),))
+    return found
+
+
+def _between(step: CarriedStep, following: CarriedStep) -> Expression | None:
+    """What is to be seen when the one is done and needed by the other."""
+    both = (*step.expected, *following.needed)
+    (found,) = _pairs.find(step, following) or _pairs.keep(step, following, (_joined(both),))
+    return found
 
 
 def _is_set(kind: str, number: int) -> Expression:

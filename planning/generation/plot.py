@@ -61,7 +61,7 @@ def plot_from_plan(
         order = scheduled(plan) if plan.schedule else in_sequence(plan)
     domain = derivation(domain).domain  # the knowledge base knows no derived predicates
     rules = [own for rule in rules if (own := _inherited(rule, plan)) is not None]
-    writing = None if library is None else Carrier(domain, library, rules)
+    writing = None if library is None else Carrier.of(domain, library, rules)
     steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
     order = order.restricted(_clashes([step.usage for step in steps], order, shared))
     lanes = _lanes(order, steps)

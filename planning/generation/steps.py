@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
@@ -12,7 +12,7 @@ from dsc.model.plot import ActionPlot
 from dsc.model.rules import Rule
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, substitute_effect
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect
 from knowledge_base.language.expression import (
     And,
     Arithmetic,
@@ -26,6 +26,7 @@ from knowledge_base.language.expression import (
     substitute,
     substitute_term,
 )
+from knowledge_base.language.memory import IdentityCache
 from planning.domain import PlanningAction, PlanningDomain
 from planning.generation.usage import Usage, fitting, usage
 from planning.plan import PlanStep
@@ -33,6 +34,7 @@ from planning.posing.relevance import changed, names_of
 
 PATIENCE = 2
 """A step that takes so many times as long as its action says, or as its skills may take together, is broken off."""
+_MOST_CARRIED = 1024  # steps; a plan for 50 items has about 130
 _CONFIRM = ActionPlot.model_fields["confirm"].default
 
 
@@ -79,8 +81,17 @@ class Carrier:
     def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule] = ()) -> None:
         self._domain = domain
         self._library = library
-        self._rules = tuple(rules)
+        self.rules = tuple(rules)
         self._usage: dict[tuple[str, ...], Usage] = {}  # most steps have the candidates of others
+        self._carried: dict[tuple[PlanStep, tuple[str, ...]], CarriedStep] = {}
+
+    @staticmethod
+    def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
+        """The same as for the plan before, if that had the same rules: most of its steps come again."""
+        known = _carriers.find(domain, library)
+        if known is None or known.rules != tuple(rules):
+            known = _carriers.keep(domain, library, Carrier(domain, library, rules))
+        return known
 
     def carried(self, step: PlanStep) -> CarriedStep:
         """The step as a dynamic state over the plots that carry it out, if its arguments do not rule them out.
@@ -88,11 +99,21 @@ class Carrier:
         Raises:
             UnknownNameError: no plot implements its action, or one uses a plot that is not there.
         """
+        plots = implementing(step, self._library)  # a library may grow, what it has does not change
+        key = step, tuple([plot.name for plot in plots])
+        known = self._carried.get(key)
+        if known is None:
+            if len(self._carried) >= _MOST_CARRIED:
+                self._carried.clear()
+            known = self._carried[key] = self._newly_carried(step, plots)
+        return known
+
+    def _newly_carried(self, step: PlanStep, plots: Iterable[ActionPlot]) -> CarriedStep:
         bindings = self._domain.bindings(step)
-        candidates = fitting(implementing(step, self._library), bindings)
+        candidates = fitting(plots, bindings)
         names = tuple(plot.name for plot in candidates)
         if names not in self._usage:
-            self._usage[names] = usage(candidates, self._library, self._rules)
+            self._usage[names] = usage(candidates, self._library, self.rules)
         used = self._usage[names]
         taken = {name for plot in candidates for name in plot.parameters}
         content = {"dynamic": names, "with": {name: value for name, value in bindings.items() if name in taken}}
@@ -102,6 +123,9 @@ class Carrier:
             confirm=max(plot.confirm for plot in candidates),
             outcomes=frozenset(event for plot in candidates for event in plot.emits), usage=used,
         )  # fmt: skip
+
+
+_carriers: IdentityCache[PlanningDomain, Carrier] = IdentityCache(size=8)
 
 
 def sketched(step: PlanStep, domain: PlanningDomain) -> CarriedStep:
@@ -136,15 +160,15 @@ def _step(
     step: PlanStep, domain: PlanningDomain, content: Mapping[str, Any], seconds: float | None, *,
     assumed: bool = False, **more: Any,
 ) -> CarriedStep:  # fmt: skip
-    action, bindings = domain.action(step), domain.bindings(step)
+    action, bindings, ground = domain.action(step), domain.bindings(step), domain.ground(step)
     limit = _limit(action, bindings)
     if limit is None and seconds:
         limit = Constant(seconds)
     return CarriedStep(
         text=str(step),
-        needed=tuple(one for one in parts(substitute(action.precondition, bindings)) if not _decided(one)),
+        needed=tuple(one for one in parts(ground.condition) if not _decided(one)),
         over_all=tuple(substitute(one, bindings) for one in _watched(action)),
-        effect=substitute_effect(action.effect, bindings),
+        effect=ground.effect,
         expected=() if assumed else parts(expectation(action.effect, bindings)),
         content=content, assumed=assumed, seconds=limit, **more,
     )  # fmt: skip

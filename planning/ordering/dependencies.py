@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 
 from knowledge_base.errors import SchemaError
-from knowledge_base.facts import Fact
+from knowledge_base.facts import Delta, Fact
 from knowledge_base.language.application import apply_effect, choices
 from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When, substitute_effect
 from knowledge_base.language.evaluation import World, evaluate_argument, holds
@@ -59,6 +59,11 @@ class Changes:
     makes: dict[Literal, None] = field(default_factory=dict)
     numbers: dict[Fact, bool] = field(default_factory=dict)
     reads: set[Fact] = field(default_factory=set)
+
+    def delta(self) -> Delta:
+        """The changed facts; what is both deleted and added is true, as in PDDL."""
+        added = tuple([one.fact for one in self.makes if one.positive])
+        return Delta(added=added, removed=tuple([o.fact for o in self.makes if not o.positive and o.fact not in added]))
 
 
 def changes(effect: Effect, world: World, after: Effect | None = None) -> Changes:

@@ -22,7 +22,7 @@ from functools import cached_property
 from knowledge_base.errors import InputError
 from knowledge_base.language.effect import substitute_effect
 from knowledge_base.language.evaluation import World, apply_effect, holds
-from knowledge_base.language.expression import Expression, substitute
+from knowledge_base.language.expression import Expression
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
 from planning.domain import PlanningDomain
@@ -186,20 +186,22 @@ class _Tracing:
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
         """Step number `number` comes next."""
         action, bindings = domain.action(step), domain.bindings(step)
-        effect = substitute_effect(action.effect, bindings)
+        ground = domain.ground(step)
+        effect = ground.effect
         if action.timed is None:
             doing = changes(effect, self.world)
         else:
             start, end = (substitute_effect(e, bindings) for e in (action.timed.start_effect, action.timed.end_effect))
             doing = changes(end, self.world, after=start)
-        needed = conjuncts(substitute(action.precondition, bindings), self.world)
+        needed = conjuncts(ground.condition, self.world)
         asked = (one for one in doing.conditions if holds(one, self.world, {}))  # else its own start brings it about
         for condition in dict.fromkeys((*needed, *asked)):
             self.need(number, condition, str(step))
         for fluent in doing.reads:
             self._rely(number, fluent)
         self._change(number, doing)
-        self.world.apply(apply_effect(effect, self.world))
+        plain = action.timed is None and not doing.numbers
+        self.world.apply(doing.delta() if plain else apply_effect(effect, self.world))
 
     def need(self, user: int, condition: Expression, whose: str) -> None:
         """A step, or the goal, needs a ground condition now."""

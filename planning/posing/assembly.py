@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from knowledge_base.language.memory import IdentityCache
 from planning.quantities import Bound, fluents, worth
 from planning.strips import GroundAction, Problem
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from knowledge_base.facts import Fact
     from knowledge_base.language.evaluation import World
@@ -16,8 +17,7 @@ if TYPE_CHECKING:
     from planning.posing.reduction import Task
     from planning.posing.ways import Way
 
-_Numbers = tuple[int, ...]
-_MOST_KEPT = 50_000
+_MOST_KEPT = 20_000  # ground actions; a problem of 50 items has 3,000
 
 
 class Assembly:
@@ -25,31 +25,33 @@ class Assembly:
 
     def __init__(self, numbering: Numbering) -> None:
         self._numbering = numbering
-        self._made: dict[tuple[int, _Numbers, _Numbers, _Numbers, float | None], GroundAction] = {}
+        self._made: IdentityCache[Way, GroundAction] = IdentityCache(_MOST_KEPT)
 
-    def problem(self, domain: str, task: Task, world: World, notes: tuple[str, ...]) -> Problem:
-        """The problem that the task stands for; numeric fluents have their values in `world`."""
+    def problem(
+        self, domain: str, task: Task, things: Mapping[str, str], world: World | None, notes: tuple[str, ...]
+    ) -> Problem:
+        """The problem that the task stands for.
+
+        Args:
+            domain: its name.
+            task: what is left of the problem in numbers.
+            things: all things with their types.
+            world: where numeric fluents have their values; none is needed if there are no fluents.
+            notes: for people.
+        """
         init, _ = self._split(task.init)
         goal, bounds = self._split(task.goal)
-        actions = tuple(map(self._action, task.ways.all))
+        ways = task.ways.all if task.left is None else task.left.values()
+        actions = tuple(map(self._action, ways))
         mentioned = dict.fromkeys([arg for action in actions if action.step for arg in action.step.args])
         mentioned.update(dict.fromkeys(str(value) for fact in (*init, *goal) for value in fact.args))
-        types = {one: world.type_of(one) for one in mentioned}
-        objects = {one: kind for one, kind in types.items() if kind is not None}
+        objects = {one: things[one] for one in mentioned if one in things}
         asked = _fluents(actions, bounds) if self._numbering.fluents else ()
-        numbers = {one: worth(world, one) for one in asked}
+        numbers = {} if world is None else {one: worth(world, one) for one in asked}
         return Problem(domain, objects, init, goal, actions, numbers=numbers, bounds=bounds, notes=notes)
 
     def _action(self, way: Way) -> GroundAction:
-        if way.step is None or way.assignments:
-            return self._make(way)
-        key = (way.number, way.needs, way.adds, way.deletes, way.cost)
-        made = self._made.get(key)
-        if made is None:
-            if len(self._made) >= _MOST_KEPT:
-                self._made.clear()
-            made = self._made[key] = self._make(way)
-        return made
+        return self._made.find(way, None) or self._made.keep(way, None, self._make(way))
 
     def _make(self, way: Way) -> GroundAction:
         numbering = self._numbering

@@ -49,6 +49,10 @@ class Literal:
     fact: Fact
     positive: bool = True
 
+    def __hash__(self) -> int:
+        """As a dataclass would, in one go: literals are looked up all the time."""
+        return hash((self.fact.predicate, self.fact.args, self.positive))
+
     @property
     def negated(self) -> Literal:
         """The opposite."""

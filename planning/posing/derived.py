@@ -76,9 +76,10 @@ class Derivation:
         self._circles = [circle for circle in _strata(graph) if _is_circle(circle, graph)]
         self._recursive = frozenset().union(*self._circles)
         self._schema = domain.schema
-        changing = frozenset().union(*(changed(action.effect) for action in domain.actions.values()))
+        self._changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
         reached = {name: {name, *nx.descendants(graph, name)} for name in self._recursive}
-        self._unsupported = {name: changing & follows for name, follows in reached.items() if changing & follows}
+        affected = {name: self._changing & follows for name, follows in reached.items()}
+        self._unsupported = {name: causes for name, causes in affected.items() if causes}
         if domain.axioms:
             actions = {name: rewritten(action, self.expand) for name, action in domain.actions.items()}
             domain = replace(domain, actions=actions, axioms=())
@@ -126,6 +127,12 @@ class Derivation:
             for args in closed.match(name, (None,) * len(self._schema.predicates[name].parameters))
         )
         return Settled(self, facts, frozenset(supported))
+
+    def may_change(self, e: Expression) -> bool:
+        """Whether some action may make the expanded condition true or false; `False` is certain."""
+        changing = self._changing.union(self._schema.computed, self._unsupported)
+        fixed = self._schema.predicates.keys() - changing
+        return not all(name in fixed or self._schema.is_type(name, 1) for name in names_of(e))
 
     @property
     def recursive(self) -> bool:

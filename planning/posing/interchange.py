@@ -10,69 +10,76 @@ without a plan says nothing, and the problem is tried as a whole.
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from planning.posing.ways import Way, Ways
 from planning.quantities import Bound, fluents
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from planning.plan import PlanStep
-    from planning.posing.numbering import Numbering
     from planning.posing.reduction import Task
-
-_Key = tuple[str, tuple[str, ...]] | None
-
-
-def spared(task: Task) -> Ways | None:
-    """The ways that are left without the objects that others can stand in for; `None` if there are no such objects."""
-    settled = frozenset(_settled(task))
-    return task.ways.known(settled, lambda: _spared(task, settled))
+    from planning.posing.ways import Way
 
 
-def _spared(task: Task, settled: frozenset[Value]) -> Ways | None:
-    ways = task.ways.all
-    mentions = _mentions(task, settled)
+def spared(task: Task) -> list[int]:
+    """The positions of the ways that are of no use, because each mentions an object that another can stand in for."""
+    left = task.left or {}
+    settled = frozenset(map(str, _settled(task, left)))
+    mentions = _mentions(task, left, settled)
     if not mentions:
-        return None
-    by_step: dict[_Key, list[Way]] = {}
-    for way in ways:
-        by_step.setdefault(_key(way.step), []).append(way)
-    named = dict.fromkeys([arg for way in ways if way.step for arg in way.step.args])
-    stand_ins = [name for name in named if name not in mentions]
+        return []
+    naming = task.ways.naming
+    stand_ins = [name for name in naming if name not in mentions and any(i in left for i in naming[name])]
+    before: dict[str, _Exchange] = task.ways.known("exchanges", dict)
     gone: set[int] = set()
     for name, listed in mentions.items():
-        if any(_Exchange(name, other, task.numbering, by_step).covers(ways[i] for i in listed) for other in stand_ins):
+        known = [before[name]] if name in before and before[name].other in stand_ins else []  # as a rule once more
+        exchanges = chain(known, (_Exchange(name, other, task) for other in stand_ins))
+        exchange = next((one for one in exchanges if one.covers(listed, left)), None)
+        if exchange is not None:
+            before[name] = exchange
             gone.update(listed)
-    return Ways([way for i, way in enumerate(ways) if i not in gone]) if gone else None
+    return sorted(gone)
 
 
-def _mentions(task: Task, settled: frozenset[Value]) -> Mapping[str, Iterable[int]]:
+def _mentions(task: Task, left: Mapping[int, Way], settled: frozenset[str]) -> Mapping[str, Sequence[int]]:
     """Object that need not stay -> positions of the ways that mention it, in their step or in literals."""
-    ways = task.ways.all
-    about: dict[int, list[str]] = {}
-    for one in set[int]().union(*[part for way in ways for part in (way.needs, way.adds, way.deletes)]):
-        about[one] = [str(thing) for thing in _things(task.numbering.named(one)) if thing not in settled]
-    telling = {one for one, names in about.items() if names}
     found: dict[str, dict[int, None]] = {}
-    for i, way in enumerate(ways):
-        for name in way.step.args if way.step else ():
-            if name not in settled:
-                found.setdefault(name, {})[i] = None
-        for part in (way.needs, way.adds, way.deletes):
-            if not telling.isdisjoint(part):
-                for name in [name for one in part for name in about[one]]:
-                    found.setdefault(name, {})[i] = None
-    return found
+    for name, positions in task.ways.naming.items():
+        if name not in settled and (here := [i for i in positions if i in left]):
+            found[name] = dict.fromkeys(here)
+    about = task.ways.known("about", lambda: _about(task))
+    for name in about.keys() - settled:
+        mine = found.get(name, {})
+        for one in about[name]:
+            for i in task.ways.touching.get(one, ()):
+                if i not in mine and i in left and _touches(left[i], one):
+                    mine[i] = None
+        if mine:
+            found[name] = mine
+    return {name: sorted(positions) for name, positions in sorted(found.items())}
 
 
-def _settled(task: Task) -> Iterator[Value]:
+def _touches(way: Way, one: int) -> bool:
+    return one in way.needs or one in way.adds or one in way.deletes
+
+
+def _about(task: Task) -> Mapping[str, Sequence[int]]:
+    """Object -> what of all that the ways need, add or delete is about it."""
+    about: dict[str, list[int]] = {}
+    for one in task.ways.touching:
+        for thing in {str(thing) for thing in _things(task.numbering.named(one))}:
+            about.setdefault(thing, []).append(one)
+    return about
+
+
+def _settled(task: Task, left: Mapping[int, Way]) -> Iterator[Value]:
     """The objects that must stay."""
     for number in (*task.init, *task.goal):
         yield from _things(task.numbering.named(number))
-    for way in task.ways.all if task.numbering.fluents else ():
+    for way in left.values() if task.numbering.fluents else ():
         for one in way.assignments:
             for fluent in (one.fluent, *fluents(one.amount)):
                 yield from fluent.args
@@ -87,36 +94,46 @@ def _things(one: Fact | Bound) -> Iterator[Value]:
 
 
 class _Exchange:
-    """`other` in the place of `name`."""
+    """`other` in the place of `name`; remembers what covered each way, which as a rule does so again."""
 
-    def __init__(self, name: str, other: str, numbering: Numbering, by_step: Mapping[_Key, Sequence[Way]]) -> None:
-        self._name, self._other = name, other
-        self._images = numbering.images(name, other)
-        self._by_step = by_step
+    def __init__(self, name: str, other: str, task: Task) -> None:
+        self.other = other
+        self._name = name
+        self._images = task.numbering.images(name, other)
+        self._of_step = task.ways.of_step
+        self._proofs: dict[int, tuple[Way, int, Way]] = {}
 
-    def covers(self, ways: Iterable[Way]) -> bool:
+    def covers(self, positions: Iterable[int], left: Mapping[int, Way]) -> bool:
         """Whether for each of the ways, all that mention `name`, there is one about `other` that is as good."""
-        return all(map(self._covers, ways))
+        return all(self._proven(i, left) or self._covers(i, left) for i in positions)
 
-    def _covers(self, way: Way) -> bool:
-        images = self._images
+    def _proven(self, i: int, left: Mapping[int, Way]) -> bool:
+        proof = self._proofs.get(i)
+        return proof is not None and proof[0] is left[i] and left.get(proof[1]) is proof[2]
+
+    def _covers(self, i: int, left: Mapping[int, Way]) -> bool:
+        way, images = left[i], self._images
         needs = tuple([images[one] for one in way.needs])
         adds = tuple([images[one] for one in way.adds])
         deletes = tuple([images[one] for one in way.deletes])
-        return any(
-            (needs == real.needs or set(needs).issuperset(real.needs))
-            and (adds == real.adds or set(adds) <= {*real.adds, *real.needs})
-            and (deletes == real.deletes or set(deletes).issuperset(real.deletes))
-            and set(real.assignments) == set(way.assignments)
-            and (real.cost or 0) <= (way.cost or 0)
-            for real in self._by_step.get(self._key(way), ())
-        ) or set(adds) <= set(needs)
+        for j, real in self._reals(way, left):
+            if (
+                (needs == real.needs or set(needs).issuperset(real.needs))
+                and (adds == real.adds or set(adds) <= {*real.adds, *real.needs})
+                and (deletes == real.deletes or set(deletes).issuperset(real.deletes))
+                and set(real.assignments) == set(way.assignments)
+                and (real.cost or 0) <= (way.cost or 0)
+            ):
+                self._proofs[i] = (way, j, real)
+                return True
+        if set(adds) <= set(needs):  # it is of no use
+            self._proofs[i] = (way, i, way)
+            return True
+        return False
 
-    def _key(self, way: Way) -> _Key:
-        if way.step is None:
-            return None
-        return way.step.action, tuple([self._other if arg == self._name else arg for arg in way.step.args])
-
-
-def _key(step: PlanStep | None) -> _Key:
-    return None if step is None else (step.action, step.args)  # hashed much faster than the step
+    def _reals(self, way: Way, left: Mapping[int, Way]) -> Iterator[tuple[int, Way]]:
+        there = None
+        if way.step is not None:
+            args = tuple([self.other if arg == self._name else arg for arg in way.step.args])
+            there = way.step.action, args
+        return ((j, left[j]) for j in self._of_step.get(there, ()) if j in left)

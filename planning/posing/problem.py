@@ -27,7 +27,7 @@ from planning.posing.grounding import Variant
 from planning.posing.groundwork import Groundwork, numbered, things_of
 from planning.posing.interchange import spared
 from planning.posing.reduction import Task, pruned, reachable
-from planning.posing.relevance import Relevant, relevant
+from planning.posing.relevance import Relevant, names_of, relevant
 from planning.posing.timed import durative, pose_timed
 from planning.posing.unforeseeable import refuse_unforeseeable
 from planning.posing.ways import Ways
@@ -35,6 +35,8 @@ from planning.quantities import Bound
 from planning.strips import Problem
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.language.evaluation import World
     from planning.domain import PlanningDomain
@@ -110,6 +112,7 @@ class Poser:
         self._derivation = derivation(domain)
         self._domain = self._derivation.domain
         self._kept: dict[tuple[tuple[str, ...], frozenset[str], Term | None], tuple[Groundwork, Assembly]] = {}
+        self._matters: dict[tuple[frozenset[str], Term | None], Relevant] = {}
         self._lock = threading.Lock()
 
     def pose(
@@ -146,7 +149,7 @@ class Poser:
             missing = [said(numbering, one, goal) for one in posing.task.goal if one not in reach.facts]
             if missing:
                 return self._nothing(*dict.fromkeys(missing))
-            task, notes = _priced(pruned(posing.task, reach), amount)
+            task, notes = _priced(pruned(posing.task, reach.taken), amount)
             return self._sliced(task, posing.assembly, world, notes)
 
     def posing(
@@ -164,7 +167,7 @@ class Poser:
             UnsupportedGoalError, UnsupportedActionError, OutOfPatienceError: as for `pose`.
         """
         goal = self._derivation.expand(goal)
-        matters = relevant(goal, metric, self._domain.actions.values())
+        matters = self._relevant(goal, metric)
         self._derivation.require_supported(goal, matters.actions)
         refuse_unforeseeable(goal, matters.actions, self._domain)
         patience = patience or Patience()
@@ -183,6 +186,15 @@ class Poser:
         task = Task(numbering, init, goal_numbers, ways)
         return Posing(matters, wanted, task, assembly)
 
+    def _relevant(self, goal: Expression, metric: Term | None) -> Relevant:
+        """What matters for the goal; the same for all that ask about the same predicates and functions."""
+        key = frozenset(names_of(goal)), metric
+        if key not in self._matters:
+            if len(self._matters) >= _MOST_KEPT:
+                self._matters.clear()
+            self._matters[key] = relevant(goal, metric, self._domain.actions.values())
+        return self._matters[key]
+
     def _prepared(
         self, matters: Relevant, metric: Term | None, world: World, patience: Patience
     ) -> tuple[Groundwork, Assembly]:
@@ -199,16 +211,25 @@ class Poser:
         return known
 
     def _sliced(self, task: Task, assembly: Assembly, world: World, notes: tuple[str, ...]) -> Problem:
-        name = self._domain.name
-        whole = assembly.problem(name, task, world, notes)
-        left = spared(task)
-        if left is None:
-            return whole
-        slice_ = replace(task, ways=left)
-        reach = reachable(slice_)
-        if not reach.facts.issuperset(task.goal):
-            return whole
-        return replace(assembly.problem(name, pruned(slice_, reach), world, notes), whole=whole)
+        """Without the objects that others can stand in for; what they need to reach the goal is there all the same."""
+        left, gone, things = task.left or {}, spared(task), things_of(world)
+
+        def problem(task: Task, world: World | None) -> Problem:
+            return assembly.problem(self._domain.name, task, things, world, notes)
+
+        def whole() -> Problem:
+            with self._lock:
+                return problem(task, None)
+
+        if not gone:
+            return problem(task, world)
+        slice_ = pruned(task, _only(left.keys() - set(gone), len(task.ways.all)))
+        if notes:
+            slice_ = _evenly_priced(slice_)
+        if task.numbering.fluents:  # they have the values of now
+            now = problem(task, world)
+            return replace(problem(slice_, world), unsliced=lambda: now)
+        return replace(problem(slice_, None), unsliced=whole)
 
     def _nothing(self, *unreachable: str) -> Problem:
         """A problem that needs no engine: the goal holds, or cannot be reached."""
@@ -217,10 +238,21 @@ class Poser:
 
 def _priced(task: Task, metric: Term | None) -> tuple[Task, tuple[str, ...]]:
     """The task with costs; all the same, and a note why, if the metric is no cost of actions."""
-    if metric is None or all(way.cost is not None for way in task.ways.all):
+    if metric is None or all(way.cost is not None for way in (task.left or {}).values()):
         return task, ()
-    ways = Ways([way._replace(cost=None if way.step is None else 1.0) for way in task.ways.all])
-    return replace(task, ways=ways), (ignored(metric),)
+    return _evenly_priced(task), (ignored(metric),)
+
+
+def _only(positions: Iterable[int], of: int) -> bytearray:
+    only = bytearray(of)
+    for i in positions:
+        only[i] = 1
+    return only
+
+
+def _evenly_priced(task: Task) -> Task:
+    left = (task.left or {}).items()
+    return replace(task, left={i: way._replace(cost=None if way.step is None else 1.0) for i, way in left})
 
 
 def _with_conjunctive_goal(ways: Ways, goal: Residual, numbering: Numbering) -> tuple[Ways, tuple[int, ...]]:

@@ -6,7 +6,7 @@ costs the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from planning.posing.ways import Way, Ways
@@ -27,12 +27,16 @@ class Task:
         init: literals and bounds that hold.
         goal: literals and bounds that shall hold.
         ways: what may be done.
+        left: position of a way -> what is left of it where not all matters; `None` if all of it and of all ways does.
+        settled: literals and bounds that hold whenever they are asked for, and are left out.
     """
 
     numbering: Numbering
     init: Collection[int]
     goal: tuple[int, ...]
     ways: Ways
+    left: Mapping[int, Way] | None = None
+    settled: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,21 +76,51 @@ def reachable(task: Task) -> Reach:
     return Reach(reached, taken)
 
 
-def pruned(task: Task, reach: Reach) -> Task:
+def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
     """The task with everything left out that cannot matter.
 
     Left out are ways that can never be taken or cannot contribute to the goal, literals that no kept way or goal
     asks for, and literals and bounds that hold now and can never cease to (they hold whenever asked for).
+
+    Args:
+        task: pruned before or not.
+        possible: by position, whether a way may be taken (1) or not (0).
     """
     # From one problem to the next mostly other facts hold, but the same is possible, and the same can cease to hold.
-    key = (bytes(reach.taken), task.goal)
-    contribution = task.ways.known(key, lambda: _contributing(task, reach))
-    settled = contribution.lasting.intersection(task.init)
-    ways = task.ways.known((key, settled), lambda: Ways(_restricted(contribution, settled, task.numbering)))
+    key = (bytes(possible), task.goal, task.settled)
+    contribution = task.ways.known(key, lambda: _contributing(task, bytearray(possible)))
+    settled = task.settled | contribution.lasting.intersection(task.init)
+    asked = contribution.wanted - settled
+    kept = task.ways.known("slice" if task.left else "whole", lambda: Restriction(task.ways, task.numbering))
+    left = kept.of(contribution.positions, asked, settled)
     goal = tuple([one for one in task.goal if one not in settled])
     present = set(task.init)
-    init = tuple([one for one in dict.fromkeys((*ways.asked, *goal)) if one in present])
-    return Task(task.numbering, init, goal, ways)
+    needed = dict.fromkeys([one for way in left.values() for one in way.needs])
+    init = tuple([one for one in (*needed, *(one for one in goal if one not in needed)) if one in present])
+    return replace(task, init=init, goal=goal, left=left, settled=settled)
+
+
+class Restriction:
+    """What is left of ways without what nobody asks for; from one problem to the next mostly the same."""
+
+    def __init__(self, ways: Ways, numbering: Numbering) -> None:
+        self._ways, self._numbering = ways, numbering
+        self._asked: frozenset[int] = frozenset()
+        self._settled: frozenset[int] = frozenset()
+        self._left: dict[int, Way] = {}
+
+    def of(self, positions: Iterable[int], asked: frozenset[int], settled: frozenset[int]) -> dict[int, Way]:
+        """Of the ways at these positions, those that add something asked for, by position."""
+        if self._left:
+            for one in (asked ^ self._asked) | (settled ^ self._settled):
+                for i in self._ways.touching.get(one, ()):
+                    self._left.pop(i, None)
+        self._asked, self._settled = asked, settled
+        left = self._left
+        for i in positions:
+            if i not in left:
+                left[i] = _clean(self._ways.all[i], asked, settled, self._numbering)
+        return {i: left[i] for i in positions if left[i].adds}
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,38 +129,40 @@ class _Contribution:
 
     Attributes:
         wanted: what the goal and the ways ask for.
-        ways: those that add something of it, or change a number that it depends on.
+        positions: the ways that add something of it, or change a number that it depends on.
         lasting: what of it can never cease to hold, if it does: no way deletes it or changes its numbers.
     """
 
-    wanted: set[int]
-    ways: Sequence[Way]
+    wanted: frozenset[int]
+    positions: Sequence[int]
     lasting: frozenset[int]
 
 
-def _contributing(task: Task, reach: Reach) -> _Contribution:
-    ways, adders, wants = task.ways.all, task.ways.adders, task.numbering.wants
-    open_, inputs = bytearray(reach.taken), _inputs(ways, task.numbering)
+def _contributing(task: Task, open_: bytearray) -> _Contribution:
+    ways, adders, wants, settled = task.ways.all, task.ways.adders, task.numbering.wants, task.settled
+    inputs = _inputs(ways, task.numbering)
     wanted, agenda = set(task.goal), list(task.goal)
     found: list[int] = []
     while agenda:
         here = agenda.pop()
-        fresh = [one for one in (*wants.get(here, ()), *inputs.get(here, ())) if one not in wanted]
-        wanted.update(fresh)
-        agenda += fresh
+        if wants or inputs:
+            fresh = [one for one in (*wants.get(here, ()), *inputs.get(here, ())) if one not in wanted]
+            wanted.update(fresh)
+            agenda += fresh
         for i in adders.get(here, ()):
             if open_[i]:
                 open_[i] = 0
                 found.append(i)
                 for need in ways[i].needs:
-                    if need not in wanted:
+                    if need not in wanted and need not in settled:
                         wanted.add(need)
                         agenda.append(need)
-    kept = [ways[i] for i in sorted(found)]
-    made = {one for way in kept for one in way.deletes}
-    made.update(one for way in kept for one in way.adds if one in task.numbering.fluents)
-    lasting = frozenset(one for one in wanted if one not in made and made.isdisjoint(wants.get(one, ())))
-    return _Contribution(wanted, kept, lasting)
+    found.sort()
+    made = set[int]().union(*[ways[i].deletes for i in found])
+    if task.numbering.fluents:
+        made.update(one for i in found for one in ways[i].adds if one in task.numbering.fluents)
+    lasting = frozenset([one for one in wanted if one not in made and made.isdisjoint(wants.get(one, ()))])
+    return _Contribution(frozenset(wanted), found, lasting)
 
 
 def _inputs(ways: Iterable[Way], numbering: Numbering) -> Mapping[int, Iterable[int]]:
@@ -138,14 +174,7 @@ def _inputs(ways: Iterable[Way], numbering: Numbering) -> Mapping[int, Iterable[
     return found
 
 
-def _restricted(contribution: _Contribution, settled: frozenset[int], numbering: Numbering) -> list[Way]:
-    """The ways without what nobody asks for."""
-    asked = contribution.wanted - settled
-    clean = [_clean(way, asked, settled, numbering) for way in contribution.ways]
-    return [way for way in clean if way.adds]
-
-
-def _clean(way: Way, asked: set[int], settled: frozenset[int], numbering: Numbering) -> Way:
+def _clean(way: Way, asked: frozenset[int], settled: frozenset[int], numbering: Numbering) -> Way:
     needs = tuple([one for one in way.needs if one not in settled])
     return Way(
         way.step,

@@ -49,6 +49,8 @@ class _NotOfFactsError(Exception):
 
 def durative(domain: PlanningDomain, goal: Expression) -> bool:
     """Whether actions with a duration matter for the goal, in which derived predicates have been replaced."""
+    if all(action.timed is None for action in domain.actions.values()):
+        return False
     return any(action.timed is not None for action in _relevant(domain, goal).actions)
 
 

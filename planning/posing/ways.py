@@ -37,6 +37,14 @@ class Way(NamedTuple):
     number: int = -1
 
 
+Key = tuple[str, tuple[str, ...]] | None
+
+
+def key(step: PlanStep | None) -> Key:
+    """The step by value; hashed much faster than itself."""
+    return None if step is None else (step.action, step.args)
+
+
 class Ways:
     """Ways in order, indexed when that is first asked for; referred to by position."""
 
@@ -46,22 +54,16 @@ class Ways:
 
     def known(self, key: Hashable, work_out: Callable[[], _T]) -> _T:
         """What follows from these ways and `key`; worked out unless that was done lately."""
-        if key not in self._known:
-            if len(self._known) >= _MOST_KNOWN:
-                self._known.clear()
-            self._known[key] = work_out()
-        found: _T = self._known[key]
+        found: _T = self._known.pop(key) if key in self._known else work_out()
+        self._known[key] = found  # the last one is kept longest
+        if len(self._known) > _MOST_KNOWN:
+            del self._known[next(iter(self._known))]
         return found
 
     @cached_property
     def counts(self) -> Sequence[int]:
         """How much each way needs."""
         return [len(way.needs) for way in self.all]
-
-    @cached_property
-    def asked(self) -> Sequence[int]:
-        """All that they need, in the order of the ways."""
-        return tuple(dict.fromkeys([one for way in self.all for one in way.needs]))
 
     @cached_property
     def users(self) -> Mapping[int, Sequence[int]]:
@@ -74,9 +76,36 @@ class Ways:
 
     @cached_property
     def adders(self) -> Mapping[int, Sequence[int]]:
-        """Literal or fluent -> the ways that add or change it."""
+        """Literal or fluent -> the ways that add or change it; none that need it, since they bring nothing."""
         adders: dict[int, list[int]] = {}
         for i, way in enumerate(self.all):
             for one in way.adds:
-                adders.setdefault(one, []).append(i)
+                if one not in way.needs:
+                    adders.setdefault(one, []).append(i)
         return adders
+
+    @cached_property
+    def touching(self) -> Mapping[int, Sequence[int]]:
+        """Literal, bound or fluent -> the ways that have anything to do with it."""
+        touching: dict[int, list[int]] = {}
+        for i, way in enumerate(self.all):
+            for one in {*way.needs, *way.adds, *way.deletes}:
+                touching.setdefault(one, []).append(i)
+        return touching
+
+    @cached_property
+    def naming(self) -> Mapping[str, Sequence[int]]:
+        """Object -> the ways whose steps name it."""
+        naming: dict[str, list[int]] = {}
+        for i, way in enumerate(self.all):
+            for name in set(way.step.args) if way.step else ():
+                naming.setdefault(name, []).append(i)
+        return naming
+
+    @cached_property
+    def of_step(self) -> Mapping[Key, Sequence[int]]:
+        """Step, see `key` -> the ways to take it."""
+        of_step: dict[Key, list[int]] = {}
+        for i, way in enumerate(self.all):
+            of_step.setdefault(key(way.step), []).append(i)
+        return of_step

@@ -86,6 +86,12 @@ def test_the_same_seed_gives_the_same_trace_byte_for_byte(planner):
     assert all(record["cause"] is None or record["cause"] < record["seq"] for record in records[1:])
     kinds = {record["type"] for record in records[1:]}
     assert {"plot", "event", "step", "decision", "knowledge", "action", "plan.asked", "plan.found", "scene", "end"} <= kinds
+    ordered = {record["plot"]: record for record in records[1:] if record["type"] == "plan.ordered"}
+    made = {record["plot"]["plot"]: record["plot"] for record in records[1:] if record["type"] == "plot"}
+    assert ordered.keys() == {name for name, plot in made.items() if plot.get("generated")}
+    for name, plan in ordered.items():
+        steps = [state["about"] for state in made[name]["states"].values() if "dynamic" in state]
+        assert (steps, bool(plan["links"])) == (plan["steps"], True)
 
 
 class Script:

@@ -10,6 +10,7 @@ from dsc_charts import plot
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
+from dsc.engine.steps import Cancel, Start
 from dsc.events import Event
 from dsc.sequencer.tracing import StepTracer
 from dsc.trace import FORMAT, VERSION, Record, Trace, header, write_to
@@ -110,6 +111,20 @@ def test_actions_are_told_and_timers_are_not():
     assert actions[0]["skill"] == "c.s"
     assert actions[0]["arguments"] == {"x": 1}
     assert actions[1]["port"] == "c.y"
+
+
+def test_a_skill_that_is_cancelled_is_told_once_and_one_that_ended_is_not():
+    trace, heard = Trace(lambda: 0.0), []
+    trace.listen(heard.append)
+    tracer = StepTracer(trace)
+    starts = [Start(f"a{n}.0", n, "c", "s", {}) for n in (1, 2)]
+    for start in starts:
+        tracer.output(start)
+    tracer.answered(starts[0])
+    for _ in range(2):
+        for start in starts:
+            tracer.output(Cancel(start.activation))
+    assert [r.data for r in heard[2:]] == [{"action": "cancel", "id": "a2.0", "skill": "c.s"}]
 
 
 def test_every_plot_is_told_once_in_full_before_its_first_step():

@@ -144,7 +144,7 @@ def test_what_somebody_else_did_is_skipped_and_said():
     run = Run("(and (clean a) (clean b) (clean c))", then=[(0.5, Delta(added=(fact("clean", "b"),)))])
     assert run.how == "reached"
     assert "(sweep b)" not in run.done
-    assert run.said("skipped") == [{"plot": "plan_2", "steps": ["(sweep b)"], "why": "fewer steps lead to the goal"}]
+    assert run.said("skipped") == [{"plot": "plan_1", "steps": ["(sweep b)"], "why": "fewer steps lead to the goal"}]
     assert len(run.planner.asked) == 1
 
 

@@ -101,7 +101,7 @@ def test_an_engine_that_does_not_read_cannot_block_us():
 
 def test_a_slice_that_takes_too_long_leaves_time_for_the_whole():
     whole = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND))
-    sliced = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND), whole=whole)
+    sliced = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND), unsliced=lambda: whole)
     found = outcome(COUNTING, sliced, seconds=2.0)
     assert isinstance(found, PlanFound)
     assert not found.reproducible  # real time decided which problem was solved
@@ -113,7 +113,7 @@ def test_a_slice_without_a_plan_proves_nothing():
         "    whole = json.loads(line)['whole']\n"
         "    print(json.dumps({'actions': None if whole else [0, 1]}), '{\"ended\": 0}', sep='\\n', flush=True)\n"
     )
-    sliced = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND), whole=PROBLEM)
+    sliced = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND), unsliced=lambda: PROBLEM)
     found = outcome(script, sliced)
     assert isinstance(found, PlanFound)
     assert found.reproducible

@@ -76,7 +76,7 @@ def test_a_problem_without_some_steps_is_without_them_as_a_whole_too():
     other = GroundAction(PlanStep("go", ("c", "b")), (), (fact("at", "b"),), ())
     closing = GroundAction(None, (), (fact("done"),), ())
     whole = Problem("places", {}, (), (fact("at", "b"),), (go, other, closing))
-    narrowed = without(Problem("places", {}, (), (fact("at", "b"),), (go, closing), whole=whole), {STEP})
+    narrowed = without(Problem("places", {}, (), (fact("at", "b"),), (go, closing), unsliced=lambda: whole), {STEP})
     assert narrowed.actions == (closing,)
     assert narrowed.whole is not None
     assert narrowed.whole.actions == (other, closing)

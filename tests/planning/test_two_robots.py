@@ -60,6 +60,18 @@ def test_no_causal_link_is_ever_violated(two_tables, planner, seed):
     assert [record.type for record in records].count("plan.found") == 1  # nothing had to be planned again
 
 
+@pytest.mark.parametrize("parallel", [True, False])
+def test_the_trace_says_what_each_step_provides_to_whom(two_tables, planner, parallel):
+    records, replay = run(two_tables, planner, {"anna": 2, "bert": 1}, 0, parallel=parallel)
+    (ordered,) = [record.data for record in records if record.type == "plan.ordered"]
+    assert ordered["steps"] == [str(step) for step in replay.steps.values()]
+    said = [f"{provider} -{fact}-> {user}" for provider, fact, user in ordered["links"]]
+    assert said
+    assert sorted(said) == sorted(
+        str(link) for link in replay.links if (link.provider, link.user) != (0, len(replay.steps) + 1)
+    )
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_both_at_once_take_at_most_six_tenths_of_the_time(two_tables, planner, seed):
     items = {"anna": 2 + seed, "bert": 2 + seed}

@@ -6,6 +6,12 @@ import { joinPath, splitPath, statesOf, waysOf, type Kind, type PlotForm, type P
 /** So many ways into one state would be a thicket: they are drawn only when asked for. */
 export const HUB = 6;
 
+/** Where every step of a plan leads to if it fails. */
+const WAY_OUT = /^(replan|gave_up)(_\d+)*$/;
+
+/** With more states than that in a plot, what is not active is closed until it is opened: the rest can be read then. */
+export const MANY = 60;
+
 export interface ChartNode {
   readonly id: string;
   readonly parent: string | null;
@@ -74,6 +80,7 @@ function show(on: Showing, holder: string, plot: PlotForm, around: string | null
   let hidden = 0;
   const own: PlotState[] = [];
   const closed = new Set<string>();
+  const large = states.length > MANY;
   const gates = new Set<string>();
   for (const state of states) {
     const id = joinPath(holder, state.name);
@@ -88,14 +95,14 @@ function show(on: Showing, holder: string, plot: PlotForm, around: string | null
     }
     shown.set(state.name, state.parent === null ? around : joinPath(holder, state.parent));
     own.push(state);
-    if ((state.kind === "composite" || state.kind === "orthogonal") && !(on.view.open.get(id) ?? true)) closed.add(state.name);
+    if ((state.kind === "composite" || state.kind === "orthogonal") && !(on.view.open.get(id) ?? (!large || on.moment.active.has(id)))) closed.add(state.name);
   }
-  const edges = edgesBetween(holder, states, throughGates(waysOf(plot), gates), shown);
+  const edges = edgesBetween(holder, states, throughGates(waysOf(plot), gates), shown, plot.generated === true);
   const counts = new Map<string, number>();
   for (const edge of edges) if (edge.quiet) counts.set(edge.to, (counts.get(edge.to) ?? 0) + 1);
   for (const state of own) {
     const id = joinPath(holder, state.name);
-    showState(on, plot, state, id, shown.get(state.name)!, counts.get(id) ?? 0, depth);
+    showState(on, plot, state, id, shown.get(state.name)!, counts.get(id) ?? 0, depth, large);
   }
   on.edges.push(...edges);
   return hidden;
@@ -103,6 +110,7 @@ function show(on: Showing, holder: string, plot: PlotForm, around: string | null
 
 function showState(
   on: Showing, plot: PlotForm, state: PlotState, id: string, parent: string | null, ways: number, depth: number,
+  large: boolean,
 ): void {
   const { moment, plots, view, nodes } = on;
   const inner = plots.get(moment.bound.get(id) ?? "");
@@ -110,7 +118,7 @@ function showState(
   const holds = state.kind === "submachine" || state.kind === "dynamic";
   const byItself = active && (depth === 0 || (inner?.generated ?? false));
   const expandable = holds ? inner !== undefined : state.kind === "composite" || state.kind === "orthogonal";
-  const expanded = expandable ? view.open.get(id) ?? (holds ? byItself : true) : state.kind === "region";
+  const expanded = expandable ? view.open.get(id) ?? (holds ? byItself : !large || active) : state.kind === "region";
   const place = nodes.length;
   const gate = plot.generated === true && isGate(state);
   const node: ChartNode = {
@@ -152,6 +160,7 @@ function isSpare(on: Showing, holder: string, id: string, state: PlotState): boo
 /** Ways between what is shown: those between the same two are one, those across a border are lifted to it. */
 function edgesBetween(
   holder: string, states: readonly PlotState[], ways: readonly Through[], shown: ReadonlyMap<string, string | null>,
+  generated: boolean,
 ): ChartEdge[] {
   const parents = new Map(states.map((state) => [state.name, state.parent]));
   const merged = new Map<string, { from: string; to: string; labels: Set<string>; rule: boolean; via: string[] }>();
@@ -173,7 +182,7 @@ function edgesBetween(
     to: joinPath(holder, edge.to),
     labels: [...edge.labels],
     rule: edge.rule,
-    quiet: into.get(edge.to)! > HUB,
+    quiet: into.get(edge.to)! > HUB || (generated && WAY_OUT.test(edge.to)),
     via: edge.via.map((one) => joinPath(holder, one)),
   }));
 }

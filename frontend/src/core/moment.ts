@@ -1,6 +1,6 @@
 /** How things were after a record: a pure function of the records up to it. */
 
-import { newPlan, withEnd, withStep, type Plan } from "./plans";
+import { newPlan, withEnd, withOrder, withStep, type Plan } from "./plans";
 import { splitPath, stepsOf, stepTexts, type PlotForm } from "./plots";
 import {
   written,
@@ -12,6 +12,7 @@ import {
   type Micro,
   type Named,
   type PlanFoundRec,
+  type PlanOrderedRec,
   type Rec,
   type SceneRec,
   type StepRec,
@@ -47,8 +48,10 @@ export interface Moment {
   plans: Plan[];
   /** Path of a state -> place in `plans` of the plan that is carried out in it. */
   running: Map<string, number>;
-  /** The record that may turn out to be why the plan ends. */
+  /** The rule that may turn out to be why the plan ends. */
   trouble: number | null;
+  /** The last record that said that a plan does not lead to the goal any more: it may be carried out until there is another. */
+  broken: number | null;
   version: number;
   nodes: Map<string, string>;
   facts: Map<string, Fact>;
@@ -62,7 +65,7 @@ export type Plots = ReadonlyMap<string, PlotForm>;
 export function beginning(): Moment {
   return {
     seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [], decisions: new Map(),
-    working: new Map(), plans: [], running: new Map(), trouble: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
+    working: new Map(), plans: [], running: new Map(), trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
     scene: null, end: null,
   };
 }
@@ -89,15 +92,23 @@ const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots
   decision: (moment, rec: DecisionRec) => void moment.decisions.set(rec.state, rec.seq),
   world: worldBegins,
   knowledge: knowledgeChanged,
-  action: (moment, rec: ActionRec) => void (rec.action === "start" && moment.working.set(rec.seq, rec)),
+  action: acted,
   event: (moment, rec: EventRec) => void (rec.cause !== null && moment.working.delete(rec.cause)),
   scene: (moment, rec: SceneRec) => void (moment.scene = rec),
   rule: (moment, rec: Rec) => void (moment.trouble = rec.seq),
   end: (moment, rec: Rec) => void (moment.end = rec.seq),
-  "plan.broken": (moment, rec: Rec) => void (moment.trouble = rec.seq),
+  "plan.broken": (moment, rec: Rec) => void (moment.broken = rec.seq),
   "plan.found": planFound,
+  "plan.ordered": planOrdered,
   "plan.skipped": stepsSkipped,
 };
+
+/** A skill begins, or is cancelled since its state was left. */
+function acted(moment: Moment, rec: ActionRec): void {
+  if (rec.action === "start") moment.working.set(rec.seq, rec);
+  if (rec.action !== "cancel") return;
+  for (const [seq, one] of moment.working) if (one.id === rec.id) moment.working.delete(seq);
+}
 
 function stepped(moment: Moment, rec: StepRec, plots: Plots): void {
   for (const micro of rec.microsteps) microstepped(moment, rec, micro, plots);
@@ -131,14 +142,24 @@ function microstepped(moment: Moment, rec: StepRec, micro: Micro, plots: Plots):
 }
 
 function planFound(moment: Moment, rec: PlanFoundRec): void {
-  moment.plans.push(newPlan(rec.plot, rec.seq, rec.steps, rec.links, rec.engine));
-  moment.trouble = null;
+  moment.plans.push(newPlan(rec.plot, rec.seq, rec.steps, rec.engine));
 }
 
-/** A generated plot begins to run: the plan of its name, or one that nobody announced. */
+/** What is going to be carried out: the plan found, or what is left of the one before. */
+function planOrdered(moment: Moment, rec: PlanOrderedRec): void {
+  const number = announced(moment, rec, rec.plot, rec.steps);
+  moment.plans[number] = withOrder(moment.plans[number]!, rec.steps, rec.links);
+}
+
+/** The number of the plan of a name; a new one if nobody spoke of it. */
+function announced(moment: Moment, rec: Rec, name: string, steps: readonly string[]): number {
+  const number = moment.plans.findLastIndex((plan) => plan.name === name && plan.ended === null);
+  return number < 0 ? moment.plans.push(newPlan(name, rec.seq, steps)) - 1 : number;
+}
+
+/** A generated plot begins to run. */
 function planBound(moment: Moment, rec: Rec, at: string, name: string, form: PlotForm): void {
-  let number = moment.plans.findLastIndex((plan) => plan.name === name && plan.ended === null);
-  if (number < 0) number = moment.plans.push(newPlan(name, rec.seq, stepTexts(form))) - 1;
+  const number = announced(moment, rec, name, stepTexts(form));
   const plan = moment.plans[number]!;
   const texts = plan.steps.map((step) => step.text);
   moment.plans[number] = { ...plan, at, names: stepsOf(form, texts) };
@@ -150,7 +171,8 @@ function planLeft(moment: Moment, rec: Rec, path: string): void {
   if (number === undefined) return;
   moment.running.delete(path);
   const plan = moment.plans[number]!;
-  moment.plans[number] = withEnd(plan, moment.trouble !== null && moment.trouble > plan.seq ? moment.trouble : rec.seq, rec.t);
+  const why = [moment.broken, moment.trouble].find((one) => one !== null && one > plan.seq);
+  moment.plans[number] = withEnd(plan, why ?? rec.seq, rec.t);
 }
 
 function planStepLeft(moment: Moment, rec: Rec, path: string, taken: readonly Taken[]): void {

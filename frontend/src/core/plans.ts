@@ -25,9 +25,17 @@ export interface Plan {
   readonly ended: number | null;
 }
 
-export function newPlan(name: string, seq: number, steps: readonly string[], links: Plan["links"] = [], engine = ""): Plan {
-  const waiting = steps.map((text): PlanStep => ({ text, state: "waiting", tries: 0, since: null, until: null }));
-  return { name, seq, steps: waiting, links, engine, at: null, names: new Map(), ended: null };
+export function newPlan(name: string, seq: number, steps: readonly string[], engine = ""): Plan {
+  return { name, seq, steps: waiting(steps), links: [], engine, at: null, names: new Map(), ended: null };
+}
+
+/** The plan as it is going to be carried out: of the one found, what was done meanwhile is left out. */
+export function withOrder(plan: Plan, steps: readonly string[], links: Plan["links"]): Plan {
+  return { ...plan, steps: waiting(steps), links };
+}
+
+function waiting(steps: readonly string[]): PlanStep[] {
+  return steps.map((text) => ({ text, state: "waiting", tries: 0, since: null, until: null }));
 }
 
 export function withStep(plan: Plan, number: number, change: Partial<PlanStep>): Plan {
@@ -42,10 +50,15 @@ export function withEnd(plan: Plan, ended: number, t: number): Plan {
   return { ...plan, steps, ended };
 }
 
-/** The number of the step that comes next; -1 if none does. */
-export function nextStep(plan: Plan): number {
-  if (plan.ended !== null) return -1;
-  return plan.steps.findIndex((step) => step.state === "waiting");
+/** Of these steps, in their order, the number of the one that comes next; undefined if none does. */
+export function nextOf(plan: Plan, which: readonly number[]): number | undefined {
+  return plan.ended === null ? which.find((i) => plan.steps[i]!.state === "waiting") : undefined;
+}
+
+/** What a step is to another one: it provides for it, or relies on it. */
+export function kinOf(plan: Plan, step: number, other: number): "provider" | "user" | null {
+  const linked = (from: number, to: number) => plan.links.some(([provider, , user]) => provider === from + 1 && user === to + 1);
+  return linked(step, other) ? "provider" : linked(other, step) ? "user" : null;
 }
 
 /** Whether nothing of it is left to do. */

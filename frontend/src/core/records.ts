@@ -93,8 +93,13 @@ export interface PlanFoundRec extends Rec {
   readonly plot: string;
   readonly steps: readonly string[];
   readonly engine?: string;
+}
+
+export interface PlanOrderedRec extends Rec {
+  readonly plot: string;
+  readonly steps: readonly string[];
   /** Who brings about what for whom: step number (0: it holds already), fact, step number (one past the last: goal). */
-  readonly links?: readonly (readonly [number, string, number])[];
+  readonly links: readonly (readonly [number, string, number])[];
 }
 
 export interface PlanBrokenRec extends Rec {

@@ -25,10 +25,6 @@ export interface Break {
 export const query = (seq: number, expression: string) => ask<Answer>("query", { seq, expression });
 export const control = (command: object) => ask<{ ok: boolean; breaks?: readonly Break[] }>("control", command);
 
-export async function svg(seq: number, path: string): Promise<Blob> {
-  return (await post("svg", { seq, path })).blob();
-}
-
 async function ask<T>(what: string, body: object): Promise<T> {
   return (await (await post(what, body)).json()) as T;
 }

@@ -1,19 +1,25 @@
 /** The chart: what is active, what was taken lately; open, close, zoom in. */
 
-import { Controls as Zoom, ReactFlow, ReactFlowProvider } from "@xyflow/react";
+import { Controls as Zoom, MiniMap, ReactFlow, ReactFlowProvider } from "@xyflow/react";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import { useCamera } from "../chart/camera";
 import { drawnEdges, drawnNodes, type Acts } from "../chart/drawn";
 import { knownLayout, layoutOf } from "../chart/elk";
 import { signature, type Layout } from "../chart/layout";
+import { pictureOf } from "../chart/picture";
 import { StateNode } from "../chart/StateNode";
-import { visible, type View, type Visible } from "../chart/visible";
+import { visible, type ChartNode, type View, type Visible } from "../chart/visible";
 import { WayEdge } from "../chart/WayEdge";
-import { svg } from "../link/requests";
-import { session, useMoment, useSelection } from "../session";
+import type { Moment } from "../core/moment";
+import { joinPath } from "../core/plots";
+import { session, useMoment, useSelection, type Selection } from "../session";
+import { seconds } from "./Timeline";
 
 const NODES = { state: StateNode };
 const EDGES = { way: WayEdge };
+/** From so many states on, a small map says where one is. */
+const MAPPED = 60;
+const MAP = { width: 130, height: 96 };
 const PLAIN: View = { focus: "", open: new Map(), all: new Set() };
 
 export function Chart() {
@@ -32,11 +38,11 @@ function ChartPane() {
   const focus = moment.bound.has(view.focus) ? view.focus : "";
   const shown = useMemo(() => visible(moment, session.history.plots, { ...view, focus }), [moment, view, focus]);
   const layout = useLayout(shown);
-  const chosen = selection?.kind === "state" ? selection.path : null;
+  const chosen = pathOf(selection, moment);
   const acts = useActs(setView);
   const nodes = useMemo(() => (layout ? drawnNodes(shown, layout, moment, chosen, acts) : []), [shown, layout, moment, chosen, acts]);
   const edges = useMemo(() => (layout ? drawnEdges(shown, layout, moment, chosen) : []), [shown, layout, moment, chosen]);
-  useCamera(shown, layout, follow);
+  useCamera(shown, layout, moment, follow);
   return (
     <section className="pane chart" aria-label="Chart">
       <h2>
@@ -44,11 +50,12 @@ function ChartPane() {
         <span className="tools">
           <label><input type="checkbox" checked={follow} onChange={(event) => setFollow(event.target.checked)} /> follow</label>
           <button onClick={() => setView((before) => ({ ...PLAIN, focus: before.focus }))}>reset</button>
-          <button onClick={() => void save(moment.seq, focus)} title="This chart at this moment, as a drawing">SVG</button>
+          <button onClick={() => save(pictureOf(nodes, edges, captionOf(moment, focus)), moment.seq)} title="This chart at this moment, as a drawing">SVG</button>
         </span>
       </h2>
       <div className="flow">
         <Tips />
+        {shown.nodes.length === 0 && <p className="quiet note">Nothing runs yet: the first step is to come.</p>}
         <ReactFlow
           nodes={nodes} edges={edges} nodeTypes={NODES} edgeTypes={EDGES} minZoom={0.05} maxZoom={2.5}
           nodesDraggable={false} nodesConnectable={false} elementsSelectable={false} edgesFocusable={false} nodesFocusable={false}
@@ -56,10 +63,27 @@ function ChartPane() {
           onMove={(event) => event && setFollow(false)} proOptions={{ hideAttribution: true }}
         >
           <Zoom showInteractive={false} />
+          {nodes.length > MAPPED && (
+            <MiniMap pannable zoomable style={MAP} ariaLabel="The whole chart" nodeClassName={mapped} />
+          )}
         </ReactFlow>
       </div>
     </section>
   );
+}
+
+function mapped({ data }: { data: Record<string, unknown> }): string {
+  const { expanded, active } = data.node as ChartNode;
+  return expanded ? "open" : active ? "active" : "";
+}
+
+/** The state that is selected, or that carries out the step of a plan that is. */
+function pathOf(selection: Selection | null, moment: Moment): string | null {
+  if (selection?.kind === "state") return selection.path;
+  const plan = selection?.kind === "step" ? moment.plans[selection.plan] : undefined;
+  if (selection?.kind !== "step" || !plan || plan.at === null || plan.ended !== null) return null;
+  const name = [...plan.names].find(([, step]) => step === selection.step)?.[0];
+  return name === undefined ? null : joinPath(plan.at, name);
 }
 
 /** The layout of what is visible, or of what was until it is there. */
@@ -70,7 +94,7 @@ function useLayout(shown: Visible): Layout | null {
   useEffect(() => {
     if (known || shown.nodes.length === 0) return;
     let wanted = true;
-    void layoutOf(shown).then((layout) => wanted && setDone({ key, layout }));
+    void layoutOf(shown).then((layout) => wanted && layout && setDone({ key, layout }));
     return () => void (wanted = false);
     // What is active changes `shown` often; only another picture needs another layout.
     // eslint-disable-next-line react-hooks/exhaustive-deps
@@ -118,9 +142,14 @@ function Tips() {
   );
 }
 
-async function save(seq: number, path: string): Promise<void> {
+function captionOf(moment: Moment, focus: string): string {
+  const run = String(session.get().header.run ?? "a run");
+  return `${run}${focus && `, ${focus}`}: ${seconds(moment.t)}, after record ${moment.seq}`;
+}
+
+function save(picture: string, seq: number): void {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(await svg(seq, path));
+  link.href = URL.createObjectURL(new Blob([picture], { type: "image/svg+xml" }));
   link.download = `chart-${seq}.svg`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);

@@ -5,7 +5,7 @@ import { Help } from "./Help";
 
 export function Header() {
   const { header, live, connected, paused, moment, last, expected } = useShown();
-  const facts = ["seed", "faults"].filter((name) => header[name] !== undefined).map((name) => `${name} ${String(header[name])}`);
+  const facts = ["seed", "faults", "began"].filter((name) => header[name] !== undefined).map((name) => `${name} ${String(header[name])}`);
   const working = [...moment.working.values()].map((one) => one.skill).filter((skill) => skill && !skill.startsWith("planner."));
   return (
     <header>

@@ -4,8 +4,8 @@ import { useEffect, useMemo, useState } from "react";
 import { deciding } from "../core/explanations";
 import { written, type Fact, type KnowledgeRec, type Value } from "../core/records";
 import { query, type Answer } from "../link/requests";
-import { session, useMoment, useSelection } from "../session";
-import { Neighbourhood } from "./Neighbourhood";
+import { session, useKind, useMoment, useSelection } from "../session";
+import { Neighbourhood, SMALL } from "./Neighbourhood";
 import { changed, RecordLink, Tree } from "./parts";
 
 const MOST = 300;
@@ -18,12 +18,13 @@ export function Knowledge() {
   const [view, setView] = useState<(typeof VIEWS)[number]>("facts");
   const [text, setText] = useState("");
   const thing = selection?.kind === "thing" ? selection.id : null;
+  const kind = useKind();
   const asking = text.trim().startsWith("(");
   return (
     <div className="scrolls knowledge" role="tabpanel">
-      {thing !== null && <Neighbourhood about={thing} />}
+      {thing !== null && kind !== "store" && <Neighbourhood about={thing} size={SMALL} />}
       <input
-        type="search" aria-label="Filter or ask" placeholder="a word, or a condition: (lies-at ?i table)" value={text}
+        type="search" aria-label="Filter or ask" placeholder={`a word, or a condition: ${example(moment.facts)}`} value={text}
         spellCheck={false} onChange={(event) => setText(event.target.value)}
       />
       {asking ? <Answers seq={moment.seq} text={text} /> : (
@@ -37,6 +38,12 @@ export function Knowledge() {
       )}
     </div>
   );
+}
+
+/** A question that has an answer. */
+function example(facts: ReadonlyMap<string, Fact>): string {
+  for (const [name, thing, other] of facts.values()) if (thing !== undefined && other !== undefined) return `(${name} ?x ${other})`;
+  return "(on ?x table)";
 }
 
 function Table({ word, about }: { word: string; about: string | null }) {

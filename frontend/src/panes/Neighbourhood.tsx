@@ -3,11 +3,18 @@
 import { written, type Fact } from "../core/records";
 import { session, useMoment } from "../session";
 
-const WIDE = 340;
-const HIGH = 250;
-const MOST = 12;
+interface Size {
+  readonly wide: number;
+  readonly high: number;
+  /** So many things around it at most; more could not be told apart. */
+  readonly most: number;
+}
 
-export function Neighbourhood({ about }: { about: string }) {
+export const SMALL: Size = { wide: 340, high: 250, most: 12 };
+export const LARGE: Size = { wide: 820, high: 480, most: 30 };
+
+export function Neighbourhood({ about, size }: { about: string; size: Size }) {
+  const { wide, high, most } = size;
   const moment = useMoment();
   const facts = [...moment.facts.values()].filter((fact) => fact.includes(about));
   const near = new Map<string, string[]>();
@@ -17,7 +24,7 @@ export function Neighbourhood({ about }: { about: string }) {
     }
   }
   const alone = facts.filter((fact) => fact.length === 2).map((fact) => String(fact[0]));
-  const others = [...near].slice(0, MOST);
+  const others = [...near].slice(0, most);
   return (
     <figure className="near" aria-label={`${about} and what it is related to`}>
       <figcaption>
@@ -26,22 +33,22 @@ export function Neighbourhood({ about }: { about: string }) {
         <button className="close" aria-label="Close" onClick={() => session.select(null)}>✕</button>
       </figcaption>
       {others.length > 0 && (
-        <svg viewBox={`0 0 ${WIDE} ${HIGH}`} role="group" aria-label={facts.map(written).join(" ")}>
+        <svg viewBox={`0 0 ${wide} ${high}`} role="group" aria-label={facts.map(written).join(" ")}>
           {others.map(([id, relations], i) => {
             const angle = (2 * Math.PI * i) / others.length - Math.PI / 2;
-            const [x, y] = [WIDE / 2 + Math.cos(angle) * 120, HIGH / 2 + Math.sin(angle) * 95];
+            const [x, y] = [wide / 2 + Math.cos(angle) * wide * 0.36, high / 2 + Math.sin(angle) * high * 0.39];
             return (
               <g key={id}>
-                <line x1={WIDE / 2} y1={HIGH / 2} x2={x} y2={y} />
-                <text className="relation" x={(WIDE / 2 + x) / 2} y={(HIGH / 2 + y) / 2}>{shortened(relations)}<title>{relations.join(", ")}</title></text>
+                <line x1={wide / 2} y1={high / 2} x2={x} y2={y} />
+                <text className="relation" x={(wide / 2 + x) / 2} y={(high / 2 + y) / 2}>{shortened(relations)}<title>{relations.join(", ")}</title></text>
                 <Node id={id} x={x} y={y} />
               </g>
             );
           })}
-          <g className="middle"><Node id={about} x={WIDE / 2} y={HIGH / 2} /></g>
+          <g className="middle"><Node id={about} x={wide / 2} y={high / 2} /></g>
         </svg>
       )}
-      {near.size > MOST && <p className="quiet">{`${near.size - MOST} more`}</p>}
+      {near.size > most && <p className="quiet">{`${near.size - most} more`}</p>}
     </figure>
   );
 }

@@ -1,7 +1,7 @@
 /** The plan: what is done, at work, next; plans that were given up are grey. */
 
 import { useEffect, useRef } from "react";
-import { isFinished, nextStep, type Plan, type PlanStep } from "../core/plans";
+import { isFinished, kinOf, nextOf, type Plan, type PlanStep } from "../core/plans";
 import { lanesOf } from "../core/why";
 import { session, useMoment, useSelection } from "../session";
 
@@ -33,10 +33,11 @@ function PlanView({ plan, number, open }: { plan: Plan; number: number; open: bo
   const finished = isFinished(plan);
   const done = plan.steps.filter((step) => step.state === "done").length;
   const end = plan.ended === null ? "" : finished ? "carried out" : "given up";
+  const past = plan.ended !== null || number < moment.plans.length - 1 && moment.running.get(plan.at ?? "-") !== number;
   const form = session.history.plots.get(moment.bound.get(plan.at ?? "-") ?? "");
   const lanes = open && form?.generated ? lanesOf(form, plan.names) : [];
   return (
-    <article className={`one-plan ${plan.ended === null ? "" : "past"}`} aria-label={`${plan.name} ${end}`}>
+    <article className={`one-plan ${past ? "past" : ""}`} aria-label={`${plan.name} ${end}`}>
       <button className="head" onClick={() => session.select({ kind: "plan", plan: number })}>
         <b>{plan.name}</b>
         <span className="strip" aria-hidden="true">
@@ -50,7 +51,7 @@ function PlanView({ plan, number, open }: { plan: Plan; number: number; open: bo
           {lanes.map((lane) => (
             <div key={lane.name} className="lane">
               <h3>{lane.name}</h3>
-              <Steps plan={plan} number={number} which={lane.steps} />
+              <Steps plan={plan} number={number} which={lane.steps} lane={lane.name} />
             </div>
           ))}
         </div>
@@ -60,20 +61,37 @@ function PlanView({ plan, number, open }: { plan: Plan; number: number; open: bo
   );
 }
 
-function Steps({ plan, number, which }: { plan: Plan; number: number; which: readonly number[] }) {
-  const next = nextStep(plan);
+function Steps({ plan, number, which, lane = "" }: { plan: Plan; number: number; which: readonly number[]; lane?: string }) {
+  const next = nextOf(plan, which);
+  const selection = useSelection();
+  const chosen = selection?.kind === "step" && selection.plan === number ? selection.step : null;
   return (
     <ol>
       {which.map((i) => (
-        <Step key={i} plan={number} number={i} step={plan.steps[i]!} next={i === next} />
+        <Step
+          key={i} plan={number} number={i} step={plan.steps[i]!} next={i === next} lane={lane} chosen={i === chosen}
+          kin={chosen === null ? null : kinOf(plan, i, chosen)}
+        />
       ))}
     </ol>
   );
 }
 
-function Step({ plan, number, step, next }: { plan: number; number: number; step: PlanStep; next: boolean }) {
+const KIN = { provider: "provides for the step selected", user: "relies on the step selected" } as const;
+
+interface StepProps {
+  readonly plan: number;
+  readonly number: number;
+  readonly step: PlanStep;
+  readonly next: boolean;
+  /** Who takes it, if the lane says so: that is not said again. */
+  readonly lane: string;
+  readonly chosen: boolean;
+  readonly kin: "provider" | "user" | null;
+}
+
+function Step({ plan, number, step, next, lane, chosen, kin }: StepProps) {
   const moment = useMoment();
-  const selection = useSelection();
   const row = useRef<HTMLButtonElement>(null);
   const running = step.state === "running";
   useEffect(() => {
@@ -81,17 +99,18 @@ function Step({ plan, number, step, next }: { plan: number; number: number; step
   }, [running]);
   const state = next ? "next" : step.state;
   const taken = step.since === null ? null : (step.until ?? moment.t) - step.since;
-  const chosen = selection?.kind === "step" && selection.plan === plan && selection.step === number;
   const [action, ...rest] = step.text.slice(1, -1).split(" ");
   return (
     <li>
       <button
-        ref={row} className={`step ${state}`} aria-pressed={chosen} aria-label={`${number + 1} ${step.text}: ${state}`}
+        ref={row} className={`step ${state} ${kin ?? ""}`} aria-pressed={chosen} title={step.text}
+        aria-label={`${number + 1} ${step.text}: ${state}${kin ? `, ${KIN[kin]}` : ""}`}
         onClick={() => session.select({ kind: "step", plan, step: number })}
       >
         <span className="sign" aria-hidden="true">{next ? "›" : SIGNS[step.state]}</span>
         <span className="number">{number + 1}</span>
-        <span className="text"><b>{action}</b> {rest.join(" ")}</span>
+        <span className="text"><b>{action}</b> <span className="args">{(rest[0] === lane ? rest.slice(1) : rest).join(" ")}</span></span>
+        {kin && <span className={`kin ${kin}`} title={KIN[kin]}>{kin === "provider" ? "provides ↓" : "relies ↑"}</span>}
         {step.tries > 1 && <span className="badge" title={`begun ${step.tries} times`}>{`${step.tries}×`}</span>}
         {taken !== null && <span className="quiet">{`${taken.toFixed(1)} s`}</span>}
       </button>

@@ -2,7 +2,7 @@
 
 import { useEffect, useRef } from "react";
 import type { Mark } from "../core/history";
-import { session, SPEEDS, useShown } from "../session";
+import { session, SPEEDS, useKind, useShown } from "../session";
 
 const JUMPS: readonly (readonly [Mark, string, string, string])[] = [
   ["failure", "failure", "[", "]"],
@@ -12,6 +12,7 @@ const JUMPS: readonly (readonly [Mark, string, string, string])[] = [
 
 export function Timeline() {
   const { moment, last, playing, following, speed, live } = useShown();
+  const kind = useKind();
   const going = playing || following;
   return (
     <footer aria-label="Time">
@@ -45,7 +46,7 @@ export function Timeline() {
       <output className="clock" aria-label="Time of the run">
         <b>{seconds(moment.t)}</b> <span className="quiet">{`${moment.seq} / ${last}`}</span>
       </output>
-      <div className="jumps">
+      {kind !== "store" && <div className="jumps">
         {JUMPS.map(([mark, name, back, on]) => (
           <span key={mark} className={`jump ${mark}`}>
             <button aria-label={`Previous ${name}`} title={back} onClick={() => session.jump(mark, -1)}>‹</button>
@@ -53,7 +54,7 @@ export function Timeline() {
             <button aria-label={`Next ${name}`} title={on} onClick={() => session.jump(mark, 1)}>›</button>
           </span>
         ))}
-      </div>
+      </div>}
     </footer>
   );
 }

@@ -50,8 +50,8 @@ export function WhyStep({ plan: at, number }: { plan: number; number: number }) 
         <span className="quiet">{`step ${number + 1} of ${plan.name} · ${step.state}`}</span>
         <p><code>{step.text}</code></p>
       </div>
-      <Links plan={plan} number={number} />
-      {name !== undefined && <Needed plan={plan} name={name} />}
+      <Links at={at} number={number} />
+      {plan.links.length === 0 && name !== undefined && <Needed plan={plan} name={name} />}
       <Brought plan={plan} number={number} />
       {name !== undefined && <HowDone plan={plan} name={name} />}
     </div>
@@ -59,9 +59,16 @@ export function WhyStep({ plan: at, number }: { plan: number; number: number }) 
 }
 
 /** What it provides to whom, and who provides what it needs: the plan's causal links, if the record has them. */
-function Links({ plan, number }: { plan: Plan; number: number }) {
-  const goal = plan.steps.length + 1;
-  const who = (one: number) => (one === 0 ? "what holds already" : one === goal ? "the goal" : `${one} ${plan.steps[one - 1]?.text}`);
+export function Links({ at, number }: { at: number; number: number }) {
+  const { facts, plans } = useMoment();
+  const plan = plans[at]!;
+  const who = (one: number) => {
+    if (one === 0) return "what holds already";
+    if (one > plan.steps.length) return "the goal";
+    const select = () => session.select({ kind: "step", plan: at, step: one - 1 });
+    return <button className="link" onClick={select}>{`${one} ${plan.steps[one - 1]!.text}`}</button>;
+  };
+  const comes = (one: number) => ["waiting", "running"].includes(plan.steps[one - 1]?.state ?? "");
   const provides = plan.links.filter(([provider]) => provider === number + 1);
   const needs = plan.links.filter(([, , user]) => user === number + 1);
   if (plan.links.length === 0) return null;
@@ -69,11 +76,26 @@ function Links({ plan, number }: { plan: Plan; number: number }) {
     <>
       <h3>Provides</h3>
       {provides.length === 0 && <p className="quiet">nothing that the plan needs</p>}
-      <ul className="plain">{provides.map(([, fact, user], i) => <li key={i}><code>{fact}</code>{" for "}{who(user)}</li>)}</ul>
+      <ul className="plain links">{provides.map(([, fact, user], i) => <li key={i}><Shortly fact={fact} /><span>{"for "}{who(user)}</span></li>)}</ul>
       <h3>Relies on</h3>
-      <ul className="plain">{needs.map(([provider, fact], i) => <li key={i}><code>{fact}</code>{" from "}{who(provider)}</li>)}</ul>
+      {needs.length === 0 && <p className="quiet">nothing that could change</p>}
+      <ul className="plain links">{needs.map(([provider, fact], i) => <li key={i}><Shortly fact={fact} holds={comes(provider) ? null : holdsNow(fact, facts)} /><span>{"from "}{who(provider)}</span></li>)}</ul>
     </>
   );
+}
+
+/** Of `(imply IF THEN)`, as goals have them, the end says enough. */
+function Shortly({ fact, holds = null }: { fact: string; holds?: boolean | null }) {
+  const then = fact.startsWith("(imply ") ? /\([^()]*\)\)$/.exec(fact)?.[0] : undefined;
+  const text = then === undefined ? fact : `… ${then.slice(0, -1)}`;
+  return <code title={fact} className={String(holds)}>{holds === null ? text : `${holds ? "✓" : "✕"} ${text}`}</code>;
+}
+
+/** Of a fact or its negation; what else there may be is not judged here. */
+function holdsNow(text: string, facts: ReadonlyMap<string, unknown>): boolean | null {
+  const negated = /^\(not (\([^()]*\))\)$/.exec(text)?.[1];
+  if (negated) return !facts.has(negated);
+  return /^\([^()<>=]*\)$/.test(text) ? facts.has(text) : null;
 }
 
 function Needed({ plan, name }: { plan: Plan; name: string }) {
@@ -87,7 +109,7 @@ function Needed({ plan, name }: { plan: Plan; name: string }) {
       <h3>Begins once</h3>
       <ul className="facts">
         {facts.map((fact) => {
-          const holds = fact.startsWith("(not ") ? !moment.facts.has(fact.slice(5, -1)) : moment.facts.has(fact);
+          const holds = holdsNow(fact, moment.facts) ?? false;
           return <li key={fact} className={holds ? "true" : "false"}><code>{`${holds ? "✓" : "✕"} ${fact}`}</code></li>;
         })}
       </ul>

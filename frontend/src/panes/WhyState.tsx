@@ -4,6 +4,7 @@ import { splitPath, statesOf, type PlotForm, type StateForm } from "../core/plot
 import type { DecisionRec, Named } from "../core/records";
 import { session, useMoment } from "../session";
 import { Values } from "./parts";
+import { Links } from "./WhyPlan";
 import { seconds } from "./Timeline";
 import { Decision } from "./WhyRecord";
 
@@ -15,6 +16,8 @@ export function WhyState({ path }: { path: string }) {
   const state = plot && statesOf(plot).find((one) => one.name === name);
   const since = moment.active.get(path);
   const content = history.plots.get(moment.bound.get(path) ?? "");
+  const plan = moment.running.get(holder);
+  const step = plan === undefined ? undefined : moment.plans[plan]!.names.get(name);
   const decision = moment.decisions.get(path) ?? lastDecision(path, moment.seq);
   return (
     <div aria-label="State">
@@ -24,6 +27,7 @@ export function WhyState({ path }: { path: string }) {
         {state?.form.about && <p className="quiet">{state.form.about}</p>}
       </div>
       {state?.form.goal && <><h3>Goal</h3><code className="block">{state.form.goal}</code></>}
+      {plan !== undefined && step !== undefined && <Links at={plan} number={step} />}
       {content && <Running path={path} content={content} />}
       {moment.variables.has(holder) && <><h3>{`Variables of ${plot?.plot ?? "its plot"}`}</h3><Values values={used(moment.variables.get(holder)!)} /></>}
       {decision !== undefined && <><h3>Decision</h3><Decision rec={history.record(decision) as DecisionRec} /></>}

@@ -11,10 +11,11 @@ export function World() {
   const moment = useMoment();
   const things = moment.scene?.things ?? [];
   const busy = new Set([...moment.working.values()].flatMap((one) => Object.values(one.arguments ?? {}).map(String)));
+  const ever = session.history.marks.scene.length > 0;
   return (
     <section className="pane world" aria-label="World">
       <h2>World</h2>
-      {things.length === 0 ? <p className="quiet note">This run draws no world.</p> : <Scene things={things} busy={busy} moving={driving(busy, things)} />}
+      {things.length === 0 ? <p className={`quiet note ${ever ? "" : "none"}`}>{ever ? "Nothing has been seen yet." : "This run draws no world."}</p> : <Scene things={things} busy={busy} moving={driving(busy, things)} />}
     </section>
   );
 }
@@ -28,9 +29,9 @@ function driving(busy: ReadonlySet<string>, things: readonly Thing[]): Thing | n
 
 const Scene = memo(function Scene({ things, busy, moving }: { things: readonly Thing[]; busy: ReadonlySet<string>; moving: Thing | null }) {
   const left = Math.min(...things.map((t) => t.x - (t.width ?? 0.3) / 2)) - MARGIN;
-  const right = Math.max(...things.map((t) => t.x + (t.width ?? 0.3) / 2)) + MARGIN;
+  const right = Math.max(...things.map(rightOf)) + MARGIN;
   const low = Math.min(...things.map((t) => t.y - (t.depth ?? 0.3) / 2)) - MARGIN - 0.3;
-  const high = Math.max(...things.map((t) => t.y + (t.depth ?? 0.3) / 2)) + MARGIN + 0.1;
+  const high = Math.max(...things.map((t) => t.y + (t.depth ?? 0.3) / 2)) + MARGIN + (things.some((t) => t.width === undefined) ? 0.35 : 0.1);
   const depths = nesting(things);
   const order = [...things].sort((a, b) => rank(a) - rank(b) || (depths.get(a.id) ?? 0) - (depths.get(b.id) ?? 0));
   const robot = things.find((thing) => thing.shape === "robot");
@@ -60,6 +61,12 @@ const Scene = memo(function Scene({ things, busy, moving }: { things: readonly T
     </svg>
   );
 });
+
+/** With room for its label: that of an item leans to the right, that of a place begins at its left. */
+function rightOf(thing: Thing): number {
+  if (thing.width === undefined) return thing.x + 0.25 + (thing.in === undefined ? thing.label.length * 0.05 : 0);
+  return Math.max(thing.x + thing.width / 2, thing.x - thing.width / 2 + thing.label.length * 0.12);
+}
 
 function rank(thing: Thing): number {
   return thing.width !== undefined ? 0 : thing.shape === "robot" ? 1 : 2;

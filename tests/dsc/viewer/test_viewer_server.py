@@ -165,21 +165,12 @@ def test_what_is_known_of_one_thing(run, page) -> None:
         ("/query", {"seq": 9, "expression": "(hand-fre)"}, "did you mean 'hand-free'"),
         ("/query", {"seq": True, "expression": "(hand-free)"}, "'seq' is the number of a record"),
         ("/facts", {"seq": 9, "about": "nobody"}, "there is no object 'nobody'"),
-        ("/svg", {"seq": 9, "path": "cleer"}, "no plot runs in the state 'cleer'"),
         ("/query", [1], "a request is one JSON object"),
     ],
 )
 def test_what_makes_no_sense_is_said_in_one_line(page, path, asked, message) -> None:
     answer = page.post(path, json=asked)
     assert (answer.status_code, message in answer.json()["error"]) == (400, True)
-
-
-def test_a_chart_is_drawn_with_its_active_states_marked(run, page) -> None:
-    log, _ = run
-    step = next(seq for seq in range(1, len(log) + 1) if log.record(seq)["type"] == "step")
-    svg = page.post("/svg", json={"seq": step, "path": ""})
-    assert svg.headers["content-type"].startswith("image/svg+xml")
-    assert svg.text.count('class="active"') == 2  # the composite `work`, and the state in it
 
 
 def test_control_is_refused_unless_it_was_allowed(page) -> None:
@@ -200,5 +191,5 @@ def test_a_trace_file_is_read_and_a_damaged_one_refused_with_its_line(run, tmp_p
     with pytest.raises(InputError, match="jsonl:3: this is not record 2"):
         read_trace(path)
     path.write_text("{}\n", encoding="utf-8")
-    with pytest.raises(InputError, match="jsonl:1: a trace begins with"):
+    with pytest.raises(InputError, match="jsonl:1: neither a store nor a trace"):
         read_trace(path)
