@@ -298,6 +298,7 @@ class Sequencer:
 
     def _idle(self) -> bool:
         """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
+        if self._open_ended or not self._inbox.empty():
+            return False
         in_vain = self._reactor.in_vain
-        coming = self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.timers.periods <= in_vain
-        return not self._open_ended and self._inbox.empty() and not coming
+        return not (self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.timers.periods <= in_vain)
