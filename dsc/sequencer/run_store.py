@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -144,7 +145,7 @@ class RunStore:
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
-        configuration = text_of(reactor.machine.state.configuration())
+        configuration = _configuration_text(reactor.machine.state.configuration())
         self._connection.execute(_STEP, (
             self._run, self._number, now, self._before, self._knowledge.version, text_of(form), configuration,
             self._present.reactor(reactor), self._new_records(),
@@ -200,3 +201,9 @@ class RunStore:
         (epoch,) = self._connection.execute("SELECT epoch FROM fence").fetchone()
         if epoch != self._epoch:
             raise StoreError("another sequencer has taken this run over", place=Place(str(self.path)))
+
+
+@lru_cache(maxsize=1024)
+def _configuration_text(configuration: tuple[str, ...]) -> str:
+    """Most runs come to the same ones again and again."""
+    return text_of(configuration)
