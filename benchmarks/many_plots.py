@@ -14,12 +14,14 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_real
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import RunEnd, Sequencer
-from dsc.skills import Component, Outcome, SkillCall, skill
+from dsc.skills import skill
 from knowledge_base import KnowledgeBase, Schema
 
 SCHEMA = Schema.parse("(define (domain bench))")

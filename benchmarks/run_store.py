@@ -25,6 +25,8 @@ from many_plots import Crowd, crowd
 from many_plots import table as crowded
 from timing import Figures, Job, Pace, measure, ratio
 
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
@@ -33,7 +35,7 @@ from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_real
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, SkillCall, skill
+from dsc.skills import skill
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.journal.file import Durability
 

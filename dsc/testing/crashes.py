@@ -14,11 +14,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from dsc.calls import Outcome, SkillCall
 from dsc.chance import choose, uniform
+from dsc.components.component import Component
 from dsc.sequencer.run_store import Boundary
 from dsc.sequencer.run_tables import archive
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, SkillCall
 from knowledge_base.errors import StoreError
 
 KILLED = "killed"

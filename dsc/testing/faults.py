@@ -14,11 +14,12 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import Any, NoReturn, TypeVar
 
+from dsc.calls import Outcome, SkillCall
 from dsc.chance import choose, uniform
+from dsc.components.component import Component
 from dsc.components.life import Life, LifeCycle
 from dsc.engine.steps import Start, Step
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, SkillCall
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 
