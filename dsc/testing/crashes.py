@@ -166,7 +166,7 @@ class _Heir(Generic[_Result]):
         self._results: list[_Result] = []
         for lock in folder.glob("*-lock"):
             lock.unlink()  # as on a file system that knows no locks
-        thread = threading.Thread(target=lambda: self._results.append(live(folder)))
+        thread = threading.Thread(target=lambda: self._results.append(live(folder)), daemon=True)
         thread.start()
         thread.join()
         self._left = _told(store)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import soak
+import soak_run
 from soak_run import Outcome, Planners, Trial
 
 FAULTS = 0.1
@@ -59,3 +61,11 @@ def test_a_broken_promise_is_counted_once_for_each_run():
     lines = soak.summary([Outcome(1, wrong=wrong), Outcome(2, how="goal reached", lives=2)])
     assert lines[0] == "outcomes: no report 1, goal reached 1"
     assert "no report 1, hangs 1" in lines[-1]
+
+
+def test_what_goes_on_and_on_is_a_hang(planners, tmp_path, monkeypatch):
+    monkeypatch.setattr(soak_run, "MOST_STEPS", 3)
+    outcome = Trial(0, FAULTS, planners, tmp_path).run()
+    assert outcome.wrong == [("hangs", "more than 3 macrosteps")]
+    with pytest.raises(soak_run.HangError, match="it still goes on after 1 s"), soak_run.no_longer_than(1):
+        sum(itertools.repeat(0))
