@@ -56,8 +56,8 @@ conformance: $(VENV)/.test   ## SCION's SCXML charts, fetched with npm into .con
 sweep-pddl: $(VENV)/.engines   ## the PDDL files that come with unified-planning: read, planned for, plans checked by their validator (WRITE=1 writes the docs)
 	$(BIN)/python -W ignore tests/conformance/pddl_sweep.py $(if $(WRITE),--write)
 
-soak: $(VENV)/.run   ## 200 seeds of the clean-up table with faults: is every report true? (SEEDS=N FAULTS=P)
-	$(BIN)/python benchmarks/clean_up_seeds.py --seeds $(or $(SEEDS),200) --faults $(or $(FAULTS),0.2)
+soak: $(VENV)/.run   ## simulated runs of the clean-up table with faults and crashes: does every promise hold? (RUNS=N FIRST=SEED FAULTS=P)
+	$(BIN)/python benchmarks/soak.py --runs $(or $(RUNS),1000) --first $(or $(FIRST),0) --faults $(or $(FAULTS),0.1)
 
 kill-kb: $(VENV)/.test   ## kill -9 a process that writes a store, for each durability: is all that it acknowledged there? (KILLS=N)
 	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/test_kb_kill.py
@@ -83,8 +83,8 @@ bench-planning: $(VENV)/.engines   ## tables of 5 to 50 items: each engine alone
 bench-kb: $(BENCH)/.peers   ## what facts, questions, updates and conditions cost: an index by hand, this knowledge base, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/kb.py $(if $(WRITE),--write)
 
-bench-run: $(VENV)/.run   ## what a macrostep costs without a store and with one, as ratios to the engine and to a bare commit
-	$(BIN)/python benchmarks/run_store.py
+bench-run: $(VENV)/.run   ## what a macrostep costs without a store and with one; 1,000 plots at once (WRITE=1 writes the docs)
+	$(BIN)/python benchmarks/run_store.py $(if $(WRITE),--write)
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg

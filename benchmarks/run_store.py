@@ -1,9 +1,11 @@
 """What a macrostep costs a running chart, without a store and with one, as ratios.
 
-`python benchmarks/run_store.py [--quick] [--folder F]` times, in turn, the engine alone, a hop through an
+`python benchmarks/run_store.py [--quick] [--folder F] [--write]` times, in turn, the engine alone, a hop through an
 `asyncio.Queue`, the sequencer without a store, with one at each durability, and one bare SQLite commit of a row at
 each. Two charts: an event from outside that leads from one state to the other, and a skill's answer that leads to the
-next skill. The last column is what the store adds to the macrostep, as a ratio to the bare commit.
+next skill. The last columns are what the sequencer adds to the engine, as a ratio to the hop, and what the store adds
+to the macrostep, as a ratio to the bare commit. Then 1, 100 and 1,000 plots at once, see `many_plots`. `--write` puts
+all that into docs/speed.md.
 """
 
 from __future__ import annotations
@@ -13,10 +15,14 @@ import asyncio
 import sqlite3
 import statistics
 import tempfile
+from collections.abc import Iterable
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+import page
+from many_plots import Crowd, crowd
+from many_plots import table as crowded
 from timing import Figures, Job, Pace, measure, ratio
 
 from dsc.calls import Outcome, SkillCall
@@ -152,28 +158,69 @@ def _commits(prepared: tuple[int, sqlite3.Connection]) -> None:
     connection.close()
 
 
-def table(title: str, figures: Figures) -> None:
-    print(f"\n{title}\n\n| a macrostep | us | x engine | x hop | its store, x bare commit |\n|---|---|---|---|---|")
+def table(figures: Figures) -> str:
+    """A row for each job."""
+    lines = ["| a macrostep | us | a second | x engine | its shell, x hop | its store, x bare commit |"]
+    lines += ["|---|---|---|---|---|---|"]
     for name, rounds in figures.items():
         bare = name.replace("with a store", "a bare commit")
-        store = zip(rounds, figures[SHELL], figures[bare], strict=True)
-        against = f"{statistics.median((a - b) / c for a, b, c in store):.1f}" if bare != name else ""
-        print(
-            f"| {name} | {1e6 * statistics.median(rounds):.1f} | {ratio(figures, name, ENGINE):.1f} | "
-            f"{ratio(figures, name, HOP):.1f} | {against} |"
+        shell = zip(rounds, figures[ENGINE], figures[HOP], strict=True)
+        store = zip(rounds, figures[SHELL], figures[bare], strict=True) if bare != name else ()
+        micro = 1e6 * statistics.median(rounds)
+        lines.append(
+            f"| {name} | {micro:.1f} | {1e6 / micro:,.0f} | {ratio(figures, name, ENGINE):.1f} | "
+            f"{_more(shell) if name == SHELL else ''} | {_more(store)} |"
         )
+    return "\n".join(lines)
+
+
+def _more(rounds: Iterable[tuple[float, float, float]]) -> str:
+    """What one adds to another, as a ratio to a third."""
+    ratios = [(one - other) / unit for one, other, unit in rounds]
+    return f"{statistics.median(ratios):.1f}" if ratios else ""
+
+
+def targets(events: Figures, crowds: list[Crowd]) -> str:
+    """What was aimed at."""
+    rows = [("the shell, x a hop", 3.0, _added(events, SHELL, ENGINE, HOP))]
+    for one, most in (("process", 5.0), ("power", 1.3)):
+        found = _added(events, f"with a store, {one}", SHELL, f"a bare commit, {one}")
+        rows.append((f"the store, x a bare commit, {one}", most, found))
+    rows.append((f"p99 of {crowds[-1].plots} plots, x p50 of one", 20.0, crowds[-1].at(0.99) / crowds[0].at(0.5)))
+    lines = ["| target | at most | measured | |", "|---|---|---|---|"]
+    for name, most, found in rows:
+        lines.append(f"| {name} | {most} | {found:.1f} | {'met' if found <= most else 'missed'} |")
+    return "\n".join(lines)
+
+
+def _added(figures: Figures, one: str, other: str, unit: str) -> float:
+    return float(_more(zip(figures[one], figures[other], figures[unit], strict=True)))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a moment for each, to see that it works")
     parser.add_argument("--folder", type=Path, default=Path(), help="where files are made: the disk matters")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/speed.md")
     options = parser.parse_args()
     pace = Pace(2, 0.02) if options.quick else Pace(9, 0.3)
+    sizes, beats = ((1, 5), 2) if options.quick else ((1, 100, 1000), 20)
+    crowds = []
+    for size in sizes:  # first, while nothing else is in memory
+        with tempfile.TemporaryDirectory(dir=options.folder) as folder:
+            crowds.append(crowd(size, beats, Path(folder)))
     with tempfile.TemporaryDirectory(dir=options.folder) as folder:
         bench = Bench(Path(folder))
-        table("An event from outside", measure(bench.jobs(EVENTS.name), pace))
-        table("A skill's answer, and the next skill", measure(bench.jobs(ANSWERS.name), pace))
+        events, answers = (measure(bench.jobs(plot.name), pace) for plot in (EVENTS, ANSWERS))
+    parts = {
+        "An event from outside:": table(events), "A skill's answer, and the next skill:": table(answers),
+        "Plots at once, one event a second each, each with a store (`process`):": crowded(crowds),
+        "Targets, for an event from outside:": targets(events, crowds),
+    }  # fmt: skip
+    text = "\n\n".join(f"{title}\n\n{part}" for title, part in parts.items())
+    print(text)
+    if options.write:
+        page.put(text, "run")
 
 
 if __name__ == "__main__":

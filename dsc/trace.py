@@ -11,9 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import IO, Any
 
+from dsc.json_text import text_by
+
 FORMAT = "dsc-trace"
 VERSION = 1
-_encode = json.JSONEncoder(ensure_ascii=False).encode  # `json.dumps` would make an encoder for each record
+_encode = text_by(json.JSONEncoder(ensure_ascii=False))  # `json.dumps` would make an encoder for each record
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,8 @@ class Trace:
     def record(self, type_: str, /, **data: Any) -> int:
         """Add a record, caused by the current `cause`; returns its seq."""
         self._seq += 1
+        if not self._listeners:
+            return self._seq
         made = Record(self._seq, self._now(), type_, self.cause, data)
         for listener in self._listeners:
             listener(made)

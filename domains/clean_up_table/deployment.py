@@ -185,8 +185,6 @@ def _wired(
     store: Path | None = None,
     durability: Durability = "process",
 ) -> CleanUpTable:
-    domain = PlanningDomain.from_pddl(HOME / "domain.pddl")
-
     def believed(surface: str) -> list[str]:
         knowledge = executive.knowledge
         lying = [str(found["item"]) for found in knowledge.query("(lies-at ?item ?at)", {"at": surface})]
@@ -197,7 +195,7 @@ def _wired(
     components = robot(profile)(world, believed)
     configure(components, profile)
     executive = Executive(
-        domain, adapted(plots(), profile), components, None, planner,
+        domain(), adapted(plots(), profile), components, None, planner,
         foresight=Physics(), store=store, durability=durability,
     )  # fmt: skip
     executive.knowledge.apply(initial_knowledge(world), "deployment", key="deployment")
@@ -240,6 +238,12 @@ def robot(profile: Profile | None) -> Callable[[World, Believed], list[Component
 def plots() -> tuple[ActionPlot, ...]:
     """The plots of this domain; read once, since plots never change."""
     return tuple(load_library(HOME / "plots"))
+
+
+@cache
+def domain() -> PlanningDomain:
+    """The planning domain; read once, too."""
+    return PlanningDomain.from_pddl(HOME / "domain.pddl")
 
 
 class _SceneWriter:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from domains.simulation import choose, uniform
+from dsc.chance import choose, uniform
 from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from domains.clean_up_table.items import HAND, Item
 from domains.clean_up_table.places import DESTINATIONS
 from domains.clean_up_table.results import Attribute, Result, Sighting, gone, not_possible
 from domains.clean_up_table.room import Room
-from domains.simulation import choose
+from dsc.chance import choose
 
 _OUTCOMES = {GRASP_FAILED: "grasp_failed", NO_INVERSE_KINEMATICS: "no_ik"}
 

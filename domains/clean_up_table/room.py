@@ -15,7 +15,7 @@ from domains.clean_up_table.items import CAN, CUP, Inventory, Item, new_item
 from domains.clean_up_table.places import OPERATOR, PLACES, SURFACES
 from domains.clean_up_table.results import Result
 from domains.clean_up_table.scene import scene
-from domains.simulation import choose
+from dsc.chance import choose
 from knowledge_base.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -50,6 +50,9 @@ class Room:
         self.said: list[str] = []
         self.done: dict[str, Result] = {}
         self.departure = "", robot_at
+
+    def catch_up(self) -> None:
+        """Take in what happened to this world elsewhere, if that can be."""
 
     def executed(self, action_id: str, result: Result) -> None:
         """An action was done, and this came of it."""
@@ -175,14 +178,23 @@ class Room:
         Raises:
             InputError: this is not the state of a world.
         """
+        room = cls()
+        room.become(state)
+        return room
+
+    def become(self, state: Mapping[str, Any]) -> None:
+        """Be as the room whose `state` this is.
+
+        Raises:
+            InputError: this is not the state of a world.
+        """
         try:
-            room = cls((Item(**item) for item in state["items"]), robot_at=state["robot_at"])
-            room.trips = state["trips"]
-            room.said = list(state["said"])
-            room.faults = Faults.from_json(state["faults"])
+            Room.__init__(self, (Item(**item) for item in state["items"]), robot_at=state["robot_at"])
+            self.trips = state["trips"]
+            self.said = list(state["said"])
+            self.faults = Faults.from_json(state["faults"])
             drive, place = state["departure"]
-            room.departure = drive, place
-            room.done = {name: Result.from_json(data) for name, data in state["done"].items()}
+            self.departure = drive, place
+            self.done = {name: Result.from_json(data) for name, data in state["done"].items()}
         except (AttributeError, KeyError, TypeError, ValueError) as wrong:
             raise InputError(f"this is not the state of a clean-up-table world: {wrong!r}") from wrong
-        return room

@@ -29,6 +29,7 @@ def _verb(
 
     @functools.wraps(body)
     def once(world: _World, action_id: str, /, *args: _Arguments.args, **named: _Arguments.kwargs) -> Result:
+        world.catch_up()
         if action_id not in world.done:
             world.executed(action_id, body(world, action_id, *args, **named))
         return world.done[action_id]

@@ -1,4 +1,7 @@
-"""A world that goes on when the robot's program dies: each executed action is in a file before anybody hears of it."""
+"""A world that goes on when the robot's program dies: each executed action is in a file before anybody hears of it.
+
+There is one world, however many programs believe that the robot is theirs: what another one did in it is read first.
+"""
 
 from __future__ import annotations
 
@@ -33,6 +36,7 @@ class LastingWorld(World):
     """A world in a file, from when `create` or `open` is called until `close`."""
 
     _file: sqlite3.Connection | None = None
+    _seen = 0
 
     def create(self, path: Path) -> None:
         """Keep this world in a file from now on, in the place of what is there; raises `StoreError`."""
@@ -44,13 +48,21 @@ class LastingWorld(World):
                 self._file.execute(statement)
             self._file.execute("INSERT INTO world VALUES (?)", (self._present(),))
             self._file.execute("COMMIT")
+            self._seen = self._version()
 
     @classmethod
     def open(cls, path: Path) -> Self:
         """The world as it was left; raises `StoreError`."""
         lasting = cls.from_state(_read(path))
         lasting._file = sqlite3.connect(path, isolation_level=None)  # noqa: SLF001  of its own class
+        lasting._seen = lasting._version()  # noqa: SLF001
         return lasting
+
+    def catch_up(self) -> None:
+        """Take in what was done through another program."""
+        if self._file is not None and self._version() != self._seen:
+            self._seen = self._version()
+            self.become(_state(self._file))
 
     def executed(self, action_id: str, result: Result) -> None:
         """Write what became of the action, and the world after it, as one; no action is written twice."""
@@ -66,6 +78,12 @@ class LastingWorld(World):
         if self._file is not None:
             self._file.close()
 
+    def _version(self) -> int:
+        """It is another one after somebody else has written the file."""
+        assert self._file is not None  # noqa: S101  as above
+        (version,) = self._file.execute("PRAGMA data_version").fetchone()
+        return int(version)
+
     def _present(self) -> str:
         """Everything but what was done, of which there is ever more."""
         return json.dumps({name: value for name, value in self.state().items() if name != "done"})
@@ -75,8 +93,12 @@ def _read(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise StoreError("the world of the run is not there", place=Place(str(path)))
     with _reported(path, "read"), closing(sqlite3.connect(path)) as file:
-        (state,) = file.execute("SELECT state FROM world").fetchone()
-        done = {action_id: json.loads(result) for action_id, result in file.execute("SELECT * FROM done")}
+        return _state(file)
+
+
+def _state(file: sqlite3.Connection) -> dict[str, Any]:
+    (state,) = file.execute("SELECT state FROM world").fetchone()
+    done = {action_id: json.loads(result) for action_id, result in file.execute("SELECT * FROM done")}
     return {**json.loads(state), "done": done}
 
 

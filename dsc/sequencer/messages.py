@@ -58,6 +58,8 @@ Message = SkillMessage | TimerMessage | KnowledgeMessage | LateMessage | SendLat
 
 def plain(event: Event) -> Event:
     """The event with attributes of its own; raises `InputError` if they are no plain data."""
+    if not event.attributes:
+        return event
     try:
         attributes = json.loads(json.dumps(dict(event.attributes), allow_nan=False))
     except (TypeError, ValueError) as error:

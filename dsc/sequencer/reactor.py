@@ -87,7 +87,8 @@ class Reactor:
             event = self._received(message)
             before = self.machine.state
             step = self.machine.send(event, self._situation())
-            self._note_periods(message, in_vain=step.state == before and _is_vain(step))
+            in_vain = isinstance(message, TimerMessage) and step.state == before and _is_vain(step)
+            self._note_periods(message, in_vain=in_vain)
             output = self._commit(step)
             if event is not None and not step.handled:
                 self._unhandled(message, event)

@@ -16,6 +16,7 @@ from dsc.calls import Outcome
 from dsc.engine.state import NOTHING, FrameState, MachineState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
+from dsc.json_text import text_by
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.run_tables import RunRow
 from dsc.trace import Record
@@ -28,7 +29,7 @@ message is awaited until the component has taken it."""
 
 _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
-_encode = json.JSONEncoder(separators=(",", ":")).encode  # `json.dumps` would make one each time
+_encode = text_by(json.JSONEncoder(separators=(",", ":")))  # `json.dumps` would make one each time
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output
@@ -23,6 +24,9 @@ from knowledge_base.store import KnowledgeBase
 _STEP = "INSERT INTO steps VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
 _BEGIN = "INSERT INTO runs (plot, arguments, version, header, plots, domain) VALUES (?, ?, ?, ?, ?, ?)"
 _MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE place = (SELECT max(place) FROM steps)"
+
+Boundary = Literal["before commit", "after commit"]
+"""Where a process that dies makes a difference: either nothing of the macrostep was, or nothing has left yet."""
 
 
 class RunStore:
@@ -58,6 +62,7 @@ class RunStore:
         self._domain = domain or {}
         self._run = self._number = self._before = 0
         self._records: list[str] = []
+        self._listeners: list[Callable[[Boundary], None]] = []
         self._short = Shortener(self._put_form)
         self._present = Present(self._short)
         with knowledge.together() as connection:
@@ -73,6 +78,10 @@ class RunStore:
         """A record of the trace, to be kept with the next macrostep."""
         self._records.append(record.to_line())
 
+    def listen(self, listener: Callable[[Boundary], None]) -> None:
+        """Tell `listener` from now on when something is about to be committed, and when it has been."""
+        self._listeners.append(listener)
+
     @contextmanager
     def writing(self) -> Iterator[None]:
         """One transaction: what is committed to the knowledge inside, and what is written with the methods below.
@@ -85,10 +94,12 @@ class RunStore:
                 self._require_right()
                 self._before = self._knowledge.version
                 yield
+                self._tell("before commit")
         except BaseException:
             self.lost = True
             raise
         self.begun = True
+        self._tell("after commit")
 
     def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> int:
         """Make a new run; the knowledge is what is known at its start.
@@ -134,7 +145,7 @@ class RunStore:
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
-        configuration = text_of(reactor.machine.state.configuration())
+        configuration = _configuration_text(reactor.machine.state.configuration())
         self._connection.execute(_STEP, (
             self._run, self._number, now, self._before, self._knowledge.version, text_of(form), configuration,
             self._present.reactor(reactor), self._new_records(),
@@ -173,6 +184,10 @@ class RunStore:
         self.last_late = max(late, default=0)
         return kept
 
+    def _tell(self, boundary: Boundary) -> None:
+        for listener in self._listeners:
+            listener(boundary)
+
     def _new_records(self) -> str:
         """What was heard since the last time, one record a line."""
         text = "".join([f"{line}\n" for line in self._records])
@@ -186,3 +201,9 @@ class RunStore:
         (epoch,) = self._connection.execute("SELECT epoch FROM fence").fetchone()
         if epoch != self._epoch:
             raise StoreError("another sequencer has taken this run over", place=Place(str(self.path)))
+
+
+@lru_cache(maxsize=1024)
+def _configuration_text(configuration: tuple[str, ...]) -> str:
+    """Most runs come to the same ones again and again."""
+    return text_of(configuration)

@@ -191,6 +191,14 @@ def has_run(path: Path) -> bool:
         return _has_tables(connection) and bool(runs.runs())
 
 
+def is_unfinished(path: Path) -> bool:
+    """Whether a run was begun in that file that has not come to its end; raises `StoreError` as `has_run`."""
+    if not has_run(path):
+        return False
+    with archive(path) as runs:
+        return runs.run().ended is None
+
+
 def unfinished(runs: RunArchive) -> RunRow:
     """The run that has not come to its end; raises `StoreError` if there is none."""
     for run in reversed(runs.runs()):

@@ -59,6 +59,10 @@ class Sequencer:
             run ends with a problem instead of waiting for ever.
         store: keeps the run, so that it can be taken up again after a crash; its knowledge is `knowledge`.
         part_of: stands before the action ids that components see; an id of another run, if this one is part of it.
+
+    Attributes:
+        library, knowledge, trace, store: as given.
+        dispatcher: carries actions to components.
     """
 
     def __init__(
@@ -78,7 +82,7 @@ class Sequencer:
         self.trace = trace or Trace(clock.now)
         self._reactor: Reactor = Reactor(library, knowledge, self.trace)
         self._clock = clock
-        self._store = store
+        self.store = store
         if store is not None:
             self.trace.listen(store.hear)
         self._inbox: asyncio.Queue[Message] = asyncio.Queue()
@@ -213,9 +217,9 @@ class Sequencer:
         return end
 
     def _keep_end(self) -> None:
-        if self._store is not None and self._store.begun and not self._store.lost:
-            with self._store.writing():
-                self._store.end(finished=self.machine.state.finished, problem=self._reactor.problem)
+        if self.store is not None and self.store.begun and not self.store.lost:
+            with self.store.writing():
+                self.store.end(finished=self.machine.state.finished, problem=self._reactor.problem)
 
     async def _take_up(self, kept: Kept) -> None:
         self._reactor.restore(kept)
@@ -227,7 +231,7 @@ class Sequencer:
     # -- macrosteps: commit, then dispatch ---------------------------------------------------------------
 
     def _start(self, plot: str, arguments: Mapping[str, Any]) -> None:
-        store, reactor = self._store, self._reactor
+        store, reactor = self.store, self._reactor
         if store is None:
             reactor.tracer.world(self.knowledge)
             self._carry_out(reactor.start(plot, arguments))
@@ -243,10 +247,10 @@ class Sequencer:
 
     def _take(self, message: Message) -> None:
         message = self._reactor.believed(message)
-        if self._store is None:
+        if self.store is None:
             output = self._reactor.react(message)
         else:
-            with self._store.writing():
+            with self.store.writing():
                 output = self._reactor.react(message)
                 self._keep_step(message, output)
         if isinstance(message, SkillMessage) and message.final:
@@ -255,22 +259,22 @@ class Sequencer:
 
     def _leave(self) -> None:
         """Nothing is dispatched that could not be committed: a store that was lost has somebody else's run."""
-        if self._store is None:
+        if self.store is None:
             output = self._reactor.leave()
-        elif self._store.lost or not self._store.begun or self.machine.state.root is None:
+        elif self.store.lost or not self.store.begun or self.machine.state.root is None:
             return
         else:
-            with self._store.writing():
+            with self.store.writing():
                 output = self._reactor.leave()
                 self._keep_step(None, output)
         self._carry_out(output)
 
     def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:
-        assert self._store is not None  # noqa: S101
+        assert self.store is not None  # noqa: S101
         under_way = self.dispatcher.telling.under_way
-        self._store.step(self._clock.now(), message, output, self._reactor, under_way)
+        self.store.step(self._clock.now(), message, output, self._reactor, under_way)
         for component, memory in self.dispatcher.memories():
-            self._store.memory(component, memory)
+            self.store.memory(component, memory)
 
     def _carry_out(self, output: Iterable[Output]) -> None:
         try:
@@ -287,13 +291,14 @@ class Sequencer:
             return
         self._last_late += 1
         late, due = LateMessage(message, self._last_late), self._clock.now() + after
-        if self._store is not None and self._store.begun:
-            with self._store.writing():
-                self._store.late(late, due)
+        if self.store is not None and self.store.begun:
+            with self.store.writing():
+                self.store.late(late, due)
         self._coming.wait_for(late, due)
 
     def _idle(self) -> bool:
         """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
+        if self._open_ended or not self._inbox.empty():
+            return False
         in_vain = self._reactor.in_vain
-        coming = self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.timers.periods <= in_vain
-        return not self._open_ended and self._inbox.empty() and not coming
+        return not (self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.timers.periods <= in_vain)

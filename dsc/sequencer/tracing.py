@@ -48,6 +48,8 @@ class StepTracer:
 
     def event(self, event: Event, source: str, original: str | None = None) -> int:
         """An event that came in; `original` is the skill's own name for it where the chart uses another."""
+        if not self._trace.heard:
+            return self._trace.record("event")
         attributes = {name: _told_once(value) for name, value in event.attributes.items()}
         data: dict[str, Any] = {"name": event.name, "source": source, "attributes": attributes}
         if original not in (None, event.name):
@@ -68,25 +70,12 @@ class StepTracer:
         """A macrostep in which something happened: new plots before it, the rules that answered after it."""
         if not step.moved:
             return None
-        heard = self._trace.heard  # else nobody wants to know what plots look like, which takes a while to say
-        if heard:
+        if self._trace.heard:  # else nobody wants to know what plots look like, or what happened, which takes a while
             self._plots(step)
-        seq = self._trace.record(
-            "step",
-            microsteps=[
-                {
-                    "event": micro.event.name if micro.event else None,
-                    "taken": [
-                        {"from": taken.source, "on": taken.trigger, "to": taken.target} for taken in micro.taken
-                    ],
-                    "exited": list(micro.exited),
-                    "entered": list(micro.entered),
-                    **(_bound(micro) if heard else {}),
-                }
-                for micro in step.microsteps
-            ],
-            **self._changed_variables(step),
-        )
+            said = {"microsteps": list(map(_micro, step.microsteps)), **self._changed_variables(step)}
+        else:
+            said = {}
+        seq = self._trace.record("step", **said)
         self._trace.cause = seq
         for taken in (taken for micro in step.microsteps for taken in micro.taken if taken.rule):
             self._trace.record("rule", rule=taken.rule, state=taken.source)
@@ -140,8 +129,6 @@ class StepTracer:
 
     def _changed_variables(self, step: Step) -> dict[str, Any]:
         """Parameters and variables that are new or have another value than before, by path of the plot's holder."""
-        if not self._trace.heard:
-            return {}
         before, self._frames = self._frames, dict(_frames(step.state.root, ""))
         changed = {path: _news(before.get(path), frame) for path, frame in self._frames.items()}
         said = {path: values for path, values in changed.items() if values}
@@ -153,6 +140,16 @@ class StepTracer:
             if digest not in self.known_plots:
                 self.known_plots.add(digest)
                 self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
+
+
+def _micro(micro: Microstep) -> dict[str, Any]:
+    return {
+        "event": micro.event.name if micro.event else None,
+        "taken": [{"from": taken.source, "on": taken.trigger, "to": taken.target} for taken in micro.taken],
+        "exited": list(micro.exited),
+        "entered": list(micro.entered),
+        **_bound(micro),
+    }
 
 
 def _bound(micro: Microstep) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""For tests of plots: rehearsals without a robot, stand-ins, questions about steps, and what was covered.
+"""For tests of plots: rehearsals, stand-ins, questions about steps, coverage; faults, crashes and what must hold.
 
 Nothing else of the project imports it.
 """
@@ -13,7 +13,20 @@ if TYPE_CHECKING:
     from dsc.testing.answers import Answer as Answer
     from dsc.testing.answers import Call as Call
     from dsc.testing.coverage import Coverage as Coverage
+    from dsc.testing.crashes import Crashes as Crashes
     from dsc.testing.dry_run import DryRun as DryRun
+    from dsc.testing.faults import Fault as Fault
+    from dsc.testing.faults import Faults as Faults
+    from dsc.testing.invariants import Invariant as Invariant
+    from dsc.testing.invariants import KeptRun as KeptRun
+    from dsc.testing.invariants import claims_nothing_false as claims_nothing_false
+    from dsc.testing.invariants import comes_to_an_end as comes_to_an_end
+    from dsc.testing.invariants import executed_once as executed_once
+    from dsc.testing.invariants import kept_run as kept_run
+    from dsc.testing.invariants import knows as knows
+    from dsc.testing.invariants import one_history as one_history
+    from dsc.testing.invariants import replays as replays
+    from dsc.testing.invariants import violations as violations
     from dsc.testing.predicates import chose as chose
     from dsc.testing.predicates import configured as configured
     from dsc.testing.predicates import consumed as consumed
@@ -38,23 +51,36 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Answer": "answers",
         "Call": "answers",
         "Coverage": "coverage",
+        "Crashes": "crashes",
         "DryRun": "dry_run",
+        "Fault": "faults",
+        "Faults": "faults",
+        "Invariant": "invariants",
+        "KeptRun": "invariants",
         "Rehearsal": "rehearsal",
         "ScriptedSkills": "scripted",
         "chose": "predicates",
+        "claims_nothing_false": "invariants",
+        "comes_to_an_end": "invariants",
         "configured": "predicates",
         "consumed": "predicates",
         "emitted": "predicates",
         "ends_with": "stubs",
         "entered": "predicates",
+        "executed_once": "invariants",
         "exited": "predicates",
         "ignored": "predicates",
+        "kept_run": "invariants",
+        "knows": "invariants",
+        "one_history": "invariants",
         "rehearse": "rehearsal",
+        "replays": "invariants",
         "started": "predicates",
         "switched": "predicates",
         "told": "predicates",
         "took": "predicates",
         "trail": "predicates",
+        "violations": "invariants",
         "world": "worlds",
     },
 )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import random
+import hashlib
+from collections import Counter
 
+from dsc.chance import uniform
 from dsc.components.transport import LocalTransport
 
 
@@ -20,15 +22,20 @@ class LossyTransport(LocalTransport):
 
     def __init__(self, seed: int, *, loss: float = 0.2, double: float = 0.2, delay: float = 0.1) -> None:
         super().__init__()
-        self._random = random.Random(seed)  # noqa: S311  # fates, no secrets
+        self._seed = seed
         self._loss = loss
         self._double = double
         self._delay = delay
+        self._sent: Counter[str] = Counter()
 
     def send(self, sender: str, to: str, frame: bytes) -> None:
-        """Let the frame meet its fate."""
-        if self._random.random() < self._loss:
+        """Let the frame meet its fate, which is its own: the same frame sent again meets another."""
+        name = hashlib.blake2b(f"{sender} {to} ".encode() + frame, digest_size=8).hexdigest()
+        self._sent[name] += 1
+        subject = f"{name} {self._sent[name]}"
+        if uniform(self._seed, subject, "loss") < self._loss:
             return
-        for _ in range(1 + (self._random.random() < self._double)):
-            late = self._random.uniform(0, self._delay)
+        doubled = uniform(self._seed, subject, "double") < self._double
+        for copy in range(1 + doubled):
+            late = self._delay * uniform(self._seed, subject, f"delay {copy}")
             asyncio.get_running_loop().call_later(late, self.deliver, sender, to, frame)

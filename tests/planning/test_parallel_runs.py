@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 from order_strategies import Planned, planned
 from trace_replay import Replay
 
-from domains.simulation import uniform
 from dsc import ActionPlot, Component, Outcome, skill
+from dsc.chance import uniform
 from dsc.trace import Record
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay

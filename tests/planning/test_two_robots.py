@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from trace_replay import Replay
 
-from domains.simulation import uniform
+from dsc.chance import uniform
 from knowledge_base.overlay import Overlay
 from planning.engines.planner import PlannerProcess
 

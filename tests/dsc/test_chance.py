@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from domains.simulation import choose, uniform
+from dsc.chance import choose, uniform
 
 
 @given(seed=st.integers(), action_id=st.text(max_size=20), purpose=st.text(max_size=5))

@@ -1,0 +1,141 @@
+"""What must hold of every run that is kept, however it went; asked of its store, also while it goes on."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.sequencer.replay import replay
+from dsc.sequencer.run_tables import StepRow, archive
+from dsc.trace import Record
+from knowledge_base.facts import Fact
+from knowledge_base.store import KnowledgeBase
+
+
+@dataclass(frozen=True, slots=True)
+class KeptRun:
+    """The last run of a store.
+
+    Attributes:
+        path: the store.
+        ended: `finished` and `problem`, how it came to its end; `None` while it has not.
+        steps: its macrosteps.
+        knowledge: what is known now; read only.
+    """
+
+    path: Path
+    ended: Mapping[str, Any] | None
+    steps: tuple[StepRow, ...]
+    knowledge: KnowledgeBase
+
+    @property
+    def records(self) -> Iterator[Record]:
+        """The records of its trace, in order."""
+        return (record for step in self.steps for record in step.records)
+
+    @property
+    def started(self) -> list[str]:
+        """The ids of the actions that were started, in order, as far as it is committed."""
+        return [one.data["id"] for one in self.records if one.type == "action" and one.data["action"] == "start"]
+
+
+Invariant = Callable[[KeptRun], Iterable[str]]
+"""Says what is wrong; nothing if it holds."""
+
+
+@contextmanager
+def kept_run(store: Path) -> Iterator[KeptRun]:
+    """The last run of a store, to be looked at; raises `StoreError` if there is none."""
+    with archive(store) as runs:
+        run = runs.run()
+        steps = tuple(runs.steps(run.number))
+    with KnowledgeBase.open(None, store, read_only=True) as knowledge:
+        yield KeptRun(store, run.ended, steps, knowledge)
+
+
+def violations(store: Path, invariants: Iterable[Invariant]) -> list[str]:
+    """All that is wrong with the last run of a store; raises `StoreError` if there is none."""
+    with kept_run(store) as run:
+        return [wrong for invariant in invariants for wrong in invariant(run)]
+
+
+def comes_to_an_end(seconds: float) -> Invariant:
+    """It has ended, within so many seconds of run time."""
+
+    def invariant(run: KeptRun) -> Iterable[str]:
+        last = run.steps[-1].time
+        if run.ended is None:
+            yield f"the run has not come to its end at second {last:g}"
+        if last > seconds:
+            yield f"the run has lasted {last:g} s, more than {seconds:g} s"
+
+    return invariant
+
+
+def executed_once(executed: Iterable[str]) -> Invariant:
+    """What the robot did, by action id, was committed before, and is done once."""
+    counts = Counter(iter(executed))
+
+    def invariant(run: KeptRun) -> Iterable[str]:
+        started = Counter(run.started)
+        for action_id, times in counts.items():
+            if times > 1:
+                yield f"the action {action_id} was executed {times} times"
+            if action_id not in started:
+                yield f"the action {action_id} was executed, and nothing is kept of its start"
+        for action_id, times in started.items():
+            if times > 1:
+                yield f"the action id {action_id} was given out {times} times"
+
+    return invariant
+
+
+def knows(facts: Iterable[Fact], predicates: Iterable[str]) -> Invariant:
+    """Of these predicates exactly those facts are known that hold in the world."""
+    true, judged = frozenset(facts), frozenset(predicates)
+
+    def invariant(run: KeptRun) -> Iterable[str]:
+        believed = {one for one in run.knowledge.snapshot().facts if one.predicate in judged}
+        for wrong in sorted(map(str, believed - true)):
+            yield f"it is known that {wrong}, which is not so"
+        for missing in sorted(map(str, true - believed)):
+            yield f"it is not known that {missing}, which is so"
+
+    return invariant
+
+
+def claims_nothing_false(claims: Callable[[KeptRun], bool], *, reached: bool) -> Invariant:
+    """The goal is claimed only when it is reached in the world."""
+
+    def invariant(run: KeptRun) -> Iterable[str]:
+        if claims(run) and not reached:
+            yield "the goal is claimed, and not reached"
+
+    return invariant
+
+
+def one_history(run: KeptRun) -> Iterable[str]:
+    """Its macrosteps follow one another: nobody else has written any beside."""
+    numbers = [step.number for step in run.steps]
+    if numbers != list(range(1, len(numbers) + 1)):
+        yield f"its macrosteps are numbered {numbers}"
+
+
+def replays(library: Library | None = None) -> Invariant:
+    """The messages that were taken lead to the same once more.
+
+    Args:
+        library: the plots it was begun with, which are read from the store if left out.
+    """
+
+    def invariant(run: KeptRun) -> Iterable[str]:
+        divergence = replay(run.path, library=library).divergence
+        if divergence is not None:
+            yield f"its replay: {divergence}"
+
+    return invariant

@@ -1,0 +1,61 @@
+"""For tests of programs that plan: a planner that fails, hangs and lies, from a seed.
+
+Nothing else of the project imports it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+
+from dsc.testing.faults import Fault, Faults
+from planning.engines.planner import Planner
+from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome, TimedOut
+from planning.strips import Problem
+
+_ENGINE = "faulty"
+_FAULTS = (Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_LIES)
+
+
+async def _nothing(_: str) -> None:
+    pass
+
+
+class FaultyPlanner:
+    """A `Planner` with faults: of a problem it always makes the same, so that a resumed run meets them again.
+
+    It fails; it hangs, until its time is over, which takes no real time here; or it lies: the last step of its plan is
+    missing.
+
+    Args:
+        planner: finds the plans.
+        faults: which problems are hit.
+        reached: is told `while planning`, see `Crashes.reached`.
+    """
+
+    def __init__(
+        self, planner: Planner, faults: Faults, reached: Callable[[str], Awaitable[None]] = _nothing
+    ) -> None:
+        self._planner = planner
+        self._faults = faults
+        self._reached = reached
+
+    async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
+        """As the planner's, if nothing hits the problem."""
+        await self._reached("while planning")
+        fault = self._faults.draw(_subject(problem), _FAULTS)
+        if fault is Fault.PLANNER_FAILS:
+            return EngineFailed(_ENGINE, "it was to fail")
+        if fault is Fault.PLANNER_HANGS:
+            return TimedOut(_ENGINE, seconds)
+        outcome = await self._planner.solve(problem, seconds)
+        if fault is Fault.PLANNER_LIES and isinstance(outcome, PlanFound) and not outcome.plan.schedule:
+            return replace(outcome, plan=Plan(outcome.plan.steps[:-1]))
+        return outcome
+
+
+def _subject(problem: Problem) -> str:
+    facts = [sorted(map(str, part)) for part in (problem.init, problem.goal)]
+    text = f"{facts} {sorted((str(name), value) for name, value in problem.numbers.items())} {len(problem.actions)}"
+    return f"problem {hashlib.blake2b(text.encode(), digest_size=8).hexdigest()}"

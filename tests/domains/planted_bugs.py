@@ -1,0 +1,84 @@
+"""Bugs that a durable executive must not have, planted one at a time: what the soak is good for is seen by these."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from domains.clean_up_table.report import FAILURES
+from dsc.sequencer.dispatcher import Dispatcher
+from dsc.sequencer.messages import SkillMessage
+from dsc.sequencer.run_store import RunStore
+
+
+def a_new_id_on_retry(monkeypatch):
+    """What was under way when the program died is asked for anew, and so done again."""
+    take_up = Dispatcher.take_up
+
+    def taken_up_anew(self, start, earlier):
+        take_up(self, replace(start, action_id=f"{start.action_id}-again"), earlier)
+
+    monkeypatch.setattr(Dispatcher, "take_up", taken_up_anew)
+
+
+class _Later:
+    """A connection that only notes what is to be written."""
+
+    def __init__(self):
+        self.noted = []
+
+    def execute(self, *statement):
+        self.noted.append(("execute", statement))
+
+    def executemany(self, statement, rows):
+        self.noted.append(("executemany", (statement, list(rows))))
+
+    def written(self, connection):
+        for how, what in self.noted:
+            getattr(connection, how)(*what)
+        self.noted.clear()
+
+
+def dispatch_before_commit(monkeypatch):
+    """A macrostep is kept together with the next one, and its actions do not wait for that."""
+    later, step, end = _Later(), RunStore.step, RunStore.end
+
+    def put_off(self, *args):
+        connection = self._connection
+        later.written(connection)
+        self._connection = later
+        step(self, *args)
+        self._connection = connection
+
+    def kept(self, **how):
+        later.written(self._connection)
+        end(self, **how)
+
+    monkeypatch.setattr(RunStore, "step", put_off)
+    monkeypatch.setattr(RunStore, "end", kept)
+    monkeypatch.setattr(RunStore, "take_up", _forgetting(RunStore.take_up, later))
+
+
+def _forgetting(take_up, later):
+    """A program that has died has forgotten what it has noted."""
+
+    def taken_up(self, library):
+        later.noted.clear()
+        return take_up(self, library)
+
+    return taken_up
+
+
+def no_fence(monkeypatch):
+    """Whoever writes a run goes on writing it, whoever has taken it over."""
+    monkeypatch.setattr(RunStore, "_require_right", lambda self: None)
+
+
+def failures_not_recorded(monkeypatch):
+    """Only what goes well is kept."""
+    step = RunStore.step
+
+    def hopeful(self, now, message, *more):
+        if not (isinstance(message, SkillMessage) and message.outcome.event in FAILURES):
+            step(self, now, message, *more)
+
+    monkeypatch.setattr(RunStore, "step", hopeful)

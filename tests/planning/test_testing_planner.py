@@ -1,0 +1,59 @@
+"""A planner that fails, hangs and lies: the executive believes nothing of it, and says what was wrong."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from test_testing_with_plans import DOMAIN, LIGHT_UP, PLOTS, Lamps, OnePlan
+
+from dsc.testing import Answer, Fault, Faults, ScriptedSkills, world
+from planning import Executive
+from planning.testing import FaultyPlanner
+
+PLANNER = [Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_LIES]
+
+
+def run(faults, *reached):
+    knowledge, records = world(DOMAIN.schema, "a b - lamp"), []
+    skills = ScriptedSkills(knowledge, {"lamps.light": Answer("lit", observed="(on ?lamp)")}, like=[Lamps()])
+    robot = Executive(DOMAIN, PLOTS, skills.components, knowledge, FaultyPlanner(OnePlan(), faults, *reached))
+    robot.listen(records.append)
+    with robot:
+        end = robot.run(LIGHT_UP.name)
+    return end, [record.data["reason"] for record in records if record.type == "plan.none"], skills.calls
+
+
+@pytest.mark.parametrize(
+    ("fault", "why"),
+    [
+        (Fault.PLANNER_FAILS, "faulty: it was to fail"),
+        (Fault.PLANNER_HANGS, "no plan within"),
+        (Fault.PLANNER_LIES, "the plan found does not lead to the goal"),
+    ],
+)
+def test_whatever_it_does_the_run_ends_and_says_why(fault, why):
+    faults = Faults(1, 1.0, {fault})
+    end, reasons, calls = run(faults)
+    assert end.finished
+    assert reasons
+    assert all(why in reason for reason in reasons)
+    assert calls == []
+    assert faults.counts() == {fault: 1}  # the same problem is hit in the same way
+
+
+def test_nothing_hits_a_planner_without_faults():
+    _, reasons, calls = run(Faults(1, 0.0, PLANNER))
+    assert reasons == []
+    assert {call.arguments["lamp"] for call in calls} == {"a", "b"}
+
+
+def test_somebody_is_told_that_it_is_asked():
+    heard = []
+
+    async def reached(boundary):
+        await asyncio.sleep(0)
+        heard.append(boundary)
+
+    run(Faults(1, 0.0), reached)
+    assert set(heard) == {"while planning"}
