@@ -77,6 +77,8 @@ class Trace:
     def record(self, type_: str, /, **data: Any) -> int:
         """Add a record, caused by the current `cause`; returns its seq."""
         self._seq += 1
+        if not self._listeners:
+            return self._seq
         made = Record(self._seq, self._now(), type_, self.cause, data)
         for listener in self._listeners:
             listener(made)

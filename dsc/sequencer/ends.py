@@ -13,6 +13,8 @@ from dsc.skills import Component, Outcome
 
 def encoded(value: Any) -> Any:
     """Plain data of its own, so that nothing is shared by accident."""
+    if isinstance(value, dict) and not value:  # most skills take and say nothing
+        return {}
     return json.loads(json.dumps(value))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,7 @@ class RunStore:
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
-        configuration = text_of(reactor.machine.state.configuration())
+        configuration = _paths_text(reactor.machine.state.configuration())
         self._connection.execute(_STEP, (
             self._run, self._number, now, self._before, self._knowledge.version, text_of(form), configuration,
             self._present.reactor(reactor), self._new_records(),
@@ -144,6 +145,7 @@ class RunStore:
         if message is not None:
             self._present.taken(self._connection, message)
         self._present.asked(self._connection, output, self._number, now, reactor)
+        self._before = self._knowledge.version  # the next macrostep may be part of the same transaction
 
     def memory(self, component: str, memory: Any) -> None:
         """What a component has to remember."""
@@ -186,3 +188,9 @@ class RunStore:
         (epoch,) = self._connection.execute("SELECT epoch FROM fence").fetchone()
         if epoch != self._epoch:
             raise StoreError("another sequencer has taken this run over", place=Place(str(self.path)))
+
+
+@lru_cache(maxsize=256)
+def _paths_text(configuration: tuple[str, ...]) -> str:
+    """Most runs come back to the same few configurations."""
+    return text_of(configuration)

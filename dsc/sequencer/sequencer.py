@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from dsc.events import GAVE_UP, NO_PLAN, RESERVED, Event
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
+from dsc.sequencer.inbox import Inbox
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, plain
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.resuming import require_components, take_up
@@ -24,6 +25,10 @@ from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
+
+
+MOST_TOGETHER = 100
+"""How many macrosteps one commit may hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +86,10 @@ class Sequencer:
         self._store = store
         if store is not None:
             self.trace.listen(store.hear)
-        self._inbox: asyncio.Queue[Message] = asyncio.Queue()
-        self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait, part_of)
+        self._inbox = Inbox()
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put, part_of)
         self._open_ended = open_ended
-        self._coming = Coming(clock, self._inbox.put_nowait)
+        self._coming = Coming(clock, self._inbox.put)
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
@@ -116,7 +121,7 @@ class Sequencer:
             "active": list(self.machine.state.configuration()),
             "working": [f"{start.component}.{start.skill}" for start in self.dispatcher.started()],
             "in_use": sorted(self.dispatcher.in_use),
-            "waiting": self._inbox.qsize(),
+            "waiting": len(self._inbox),
             "knowledge_version": self.knowledge.version,
         }
 
@@ -189,7 +194,9 @@ class Sequencer:
                 if self._idle():
                     reactor.problem = "nothing is going on and nothing can happen any more"
                     break
-                message = await self._inbox.get()
+                if not self._inbox:
+                    await self._inbox.filled()
+                message = self._inbox.take()
                 for wait in self._before_events:
                     await wait()
                 self._take(message)
@@ -249,9 +256,26 @@ class Sequencer:
             with self._store.writing():
                 output = self._reactor.react(message)
                 self._keep_step(message, output)
+                for _ in range(MOST_TOGETHER - 1):
+                    if not self._may_wait(message, output):
+                        break
+                    message = self._inbox.take()
+                    output = self._reactor.react(message)
+                    self._keep_step(message, output)
         if isinstance(message, SkillMessage) and message.final:
             (self.dispatcher.stop if message.goes_on else self.dispatcher.settle)(message.start)
         self._carry_out(output)
+
+    def _may_wait(self, message: Message, output: Collection[Output]) -> bool:
+        """Whether the commit of a macrostep can wait for the next one.
+
+        Not if anything leaves after it; nor with answers of components, each of which is kept at once.
+        """
+        if output or not self._inbox or self._before_events:
+            return False
+        if isinstance(message, SkillMessage) or isinstance(self._inbox.first, SkillMessage):
+            return False
+        return not self.machine.state.finished and self._reactor.problem is None
 
     def _leave(self) -> None:
         """Nothing is dispatched that could not be committed: a store that was lost has somebody else's run."""
@@ -283,7 +307,7 @@ class Sequencer:
 
     def _hand_in(self, message: Event | KnowledgeMessage, after: float) -> None:
         if after <= 0:
-            self._inbox.put_nowait(message)
+            self._inbox.put(message)
             return
         self._last_late += 1
         late, due = LateMessage(message, self._last_late), self._clock.now() + after
@@ -294,6 +318,6 @@ class Sequencer:
 
     def _idle(self) -> bool:
         """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
-        in_vain = self._reactor.in_vain
-        coming = self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.timers.periods <= in_vain
-        return not self._open_ended and self._inbox.empty() and not coming
+        if self._open_ended or self._inbox or self._coming or self.dispatcher.waiting:
+            return False
+        return self.dispatcher.timers.periods <= self._reactor.in_vain

@@ -48,6 +48,8 @@ class StepTracer:
 
     def event(self, event: Event, source: str, original: str | None = None) -> int:
         """An event that came in; `original` is the skill's own name for it where the chart uses another."""
+        if not self._trace.heard:
+            return self._trace.record("event")
         attributes = {name: _told_once(value) for name, value in event.attributes.items()}
         data: dict[str, Any] = {"name": event.name, "source": source, "attributes": attributes}
         if original not in (None, event.name):
@@ -68,9 +70,10 @@ class StepTracer:
         """A macrostep in which something happened: new plots before it, the rules that answered after it."""
         if not step.moved:
             return None
-        heard = self._trace.heard  # else nobody wants to know what plots look like, which takes a while to say
-        if heard:
-            self._plots(step)
+        if not self._trace.heard:  # what plots look like and what rules did takes a while to say
+            self._trace.cause = self._trace.record("step")
+            return self._trace.cause
+        self._plots(step)
         seq = self._trace.record(
             "step",
             microsteps=[
@@ -81,7 +84,7 @@ class StepTracer:
                     ],
                     "exited": list(micro.exited),
                     "entered": list(micro.entered),
-                    **(_bound(micro) if heard else {}),
+                    **_bound(micro),
                 }
                 for micro in step.microsteps
             ],
@@ -94,7 +97,7 @@ class StepTracer:
 
     def decisions(self, step: Step) -> None:
         """What dynamic states chose in this macrostep, and why."""
-        for made in step.decisions:
+        for made in step.decisions if self._trace.heard else ():
             decision = made.decision
             self._trace.record(
                 "decision",
@@ -111,7 +114,7 @@ class StepTracer:
 
     def knowledge(self, change: Change) -> None:
         """A committed change of the knowledge base, if any; what nothing else led to is itself a cause."""
-        if not change.delta:
+        if not (change.delta and self._trace.heard):
             return
         said = delta_form(change.delta)
         seq = self._trace.record("knowledge", version=change.version, author=change.author, **said)
@@ -140,8 +143,6 @@ class StepTracer:
 
     def _changed_variables(self, step: Step) -> dict[str, Any]:
         """Parameters and variables that are new or have another value than before, by path of the plot's holder."""
-        if not self._trace.heard:
-            return {}
         before, self._frames = self._frames, dict(_frames(step.state.root, ""))
         changed = {path: _news(before.get(path), frame) for path, frame in self._frames.items()}
         said = {path: values for path, values in changed.items() if values}
