@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
 from dsc.events import GAVE_UP, NO_PLAN, RESERVED, Event
+from dsc.sequencer import together
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
@@ -25,10 +26,6 @@ from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
-
-
-MOST_TOGETHER = 100
-"""How many macrosteps one commit may hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,28 +251,20 @@ class Sequencer:
             output = self._reactor.react(message)
         else:
             with self._store.writing():
-                output = self._reactor.react(message)
-                self._keep_step(message, output)
-                for _ in range(MOST_TOGETHER - 1):
-                    if not self._may_wait(message, output):
+                output = self._react_and_keep(message)
+                for _ in range(together.MOST - 1):
+                    if self._before_events or not together.may_wait(message, output, self._reactor, self._inbox):
                         break
                     message = self._inbox.take()
-                    output = self._reactor.react(message)
-                    self._keep_step(message, output)
+                    output = self._react_and_keep(message)
         if isinstance(message, SkillMessage) and message.final:
             (self.dispatcher.stop if message.goes_on else self.dispatcher.settle)(message.start)
         self._carry_out(output)
 
-    def _may_wait(self, message: Message, output: Collection[Output]) -> bool:
-        """Whether the commit of a macrostep can wait for the next one.
-
-        Not if anything leaves after it; nor with answers of components, each of which is kept at once.
-        """
-        if output or not self._inbox or self._before_events:
-            return False
-        if isinstance(message, SkillMessage) or isinstance(self._inbox.first, SkillMessage):
-            return False
-        return not self.machine.state.finished and self._reactor.problem is None
+    def _react_and_keep(self, message: Message) -> tuple[Output, ...]:
+        output = self._reactor.react(message)
+        self._keep_step(message, output)
+        return output
 
     def _leave(self) -> None:
         """Nothing is dispatched that could not be committed: a store that was lost has somebody else's run."""

@@ -1,27 +1,19 @@
-"""What a macrostep costs a running chart, without a store and with one, as ratios.
-
-`python benchmarks/run_store.py [--quick] [--folder F]` times, in turn, the engine alone, a hop through an
-`asyncio.Queue`, the sequencer without a store, with one at each durability, and one bare SQLite commit of a row at
-each. Two charts: an event from outside that leads from one state to the other, and a skill's answer that leads to the
-next skill. The last column is what the store adds to the macrostep, as a ratio to the bare commit.
-"""
+"""What is timed of a run: engine, queue, sequencer and store, each alone or one around the other."""
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import sqlite3
-import statistics
-import tempfile
 from itertools import count
 from pathlib import Path
 from typing import Any
 
-from timing import Figures, Job, Pace, measure, ratio
+from timing import Job
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
+from dsc.engine.steps import Start
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_real
@@ -32,7 +24,7 @@ from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.journal.file import Durability
 
 SCHEMA = Schema.parse("(define (domain bench))")
-PING = Event("ping")
+PING, STOP = Event("ping"), Event("stop")
 EVENTS = ActionPlot.model_validate({
     "plot": "events", "receives": {"ping": None, "stop": None}, "parameters": {"n": "number"},
     "states": {
@@ -51,7 +43,9 @@ ANSWERS = ActionPlot.model_validate({
 })  # fmt: skip
 LIBRARY = Library([EVENTS, ANSWERS])
 DURABILITIES: tuple[Durability, ...] = ("process", "power")
-ENGINE, HOP, SHELL = "the engine alone", "one asyncio.Queue hop", "without a store"
+ENGINE, HOP, NO_STORE = "engine alone", "queue hop", "no store"
+ONE, MANY, ANSWER = "an event, one at a time", "events that wait together", "a skill's answer and the next skill"
+CASES = (ONE, MANY, ANSWER)
 ROW = "x" * 400
 """About as much as a macrostep writes."""
 
@@ -66,6 +60,11 @@ class Robot(Component):
         return Outcome("did")
 
 
+def bare(durability: Durability) -> str:
+    """The column of one commit without anything around it."""
+    return f"bare commit, {durability}"
+
+
 class Bench:
     """The jobs; files are made in `folder`, a new one whenever a job is prepared."""
 
@@ -73,14 +72,15 @@ class Bench:
         self._folder = folder
         self._numbers = count()
 
-    def jobs(self, plot: str) -> dict[str, Job]:
-        jobs = {ENGINE: Job(_engine), HOP: Job(_hops), SHELL: self._run(plot, None)}
+    def jobs(self, case: str) -> dict[str, Job]:
+        """Everybody who is timed in a case, by column."""
+        jobs = {ENGINE: Job(_answered if case == ANSWER else _moved), HOP: Job(_hops), NO_STORE: self._run(case, None)}
         for durability in DURABILITIES:
-            jobs[f"with a store, {durability}"] = self._run(plot, durability)
-            jobs[f"a bare commit, {durability}"] = Job(_commits, prepare=lambda n, d=durability: (n, self._bare(d)))
+            jobs[durability] = self._run(case, durability)
+            jobs[bare(durability)] = Job(_commits, prepare=lambda n, d=durability: (n, self._bare(d)))
         return jobs
 
-    def _run(self, plot: str, durability: Durability | None) -> Job:
+    def _run(self, case: str, durability: Durability | None) -> Job:
         def prepare(times: int) -> Any:
             if durability is None:
                 return times, KnowledgeBase(SCHEMA), None
@@ -92,12 +92,16 @@ class Bench:
             times, kb, store = prepared
 
             async def main() -> None:
-                sequencer = Sequencer(LIBRARY, kb, [Robot()], LoopClock(), store=store)
-                if plot == EVENTS.name:
+                sequencer = Sequencer(LIBRARY, kb, [Robot()], LoopClock(), store=store, open_ended=case == ONE)
+                plot = ANSWERS if case == ANSWER else EVENTS
+                running = asyncio.get_running_loop().create_task(sequencer.run(plot.name, {"n": times}))
+                if case == ONE:
+                    await _one_at_a_time(sequencer, times)
+                elif case == MANY:
                     for _ in range(times):
                         sequencer.post(PING)
-                    sequencer.post(Event("stop"))
-                end = await sequencer.run(plot, {"n": times})
+                    sequencer.post(STOP)
+                end = await running
                 assert end.finished, end
 
             run_real(main())
@@ -116,11 +120,30 @@ class Bench:
         return self._folder / f"{next(self._numbers)}.kb"
 
 
-def _engine(times: int) -> None:
+async def _one_at_a_time(sequencer: Sequencer, times: int) -> None:
+    """Each event waits until the macrostep of the one before is over: there and back, which is two hops."""
+    done: asyncio.Queue[None] = asyncio.Queue()
+    sequencer.listen(lambda _: done.put_nowait(None))
+    await done.get()  # the start
+    for _ in range(times):
+        sequencer.post(PING)
+        await done.get()
+    sequencer.post(STOP)
+
+
+def _moved(times: int) -> None:
     kb, machine = KnowledgeBase(SCHEMA), Machine(LIBRARY)
     machine.start(EVENTS.name, {"n": times}, KnowledgeSituation(kb, LIBRARY))
     for _ in range(times):
         machine.send(PING, KnowledgeSituation(kb, LIBRARY))
+
+
+def _answered(times: int) -> None:
+    kb, machine = KnowledgeBase(SCHEMA), Machine(LIBRARY)
+    step = machine.start(ANSWERS.name, {"n": times + 1}, KnowledgeSituation(kb, LIBRARY))
+    for _ in range(times):
+        start = next(one for one in step.output if isinstance(one, Start))
+        step = machine.send(Event("did", to=start.activation), KnowledgeSituation(kb, LIBRARY))
 
 
 def _hops(times: int) -> None:
@@ -148,31 +171,3 @@ def _commits(prepared: tuple[int, sqlite3.Connection]) -> None:
         connection.execute("INSERT INTO rows (text) VALUES (?)", (ROW,))
         connection.execute("COMMIT")
     connection.close()
-
-
-def table(title: str, figures: Figures) -> None:
-    print(f"\n{title}\n\n| a macrostep | us | x engine | x hop | its store, x bare commit |\n|---|---|---|---|---|")
-    for name, rounds in figures.items():
-        bare = name.replace("with a store", "a bare commit")
-        store = zip(rounds, figures[SHELL], figures[bare], strict=True)
-        against = f"{statistics.median((a - b) / c for a, b, c in store):.1f}" if bare != name else ""
-        print(
-            f"| {name} | {1e6 * statistics.median(rounds):.1f} | {ratio(figures, name, ENGINE):.1f} | "
-            f"{ratio(figures, name, HOP):.1f} | {against} |"
-        )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="a moment for each, to see that it works")
-    parser.add_argument("--folder", type=Path, default=Path(), help="where files are made: the disk matters")
-    options = parser.parse_args()
-    pace = Pace(2, 0.02) if options.quick else Pace(9, 0.3)
-    with tempfile.TemporaryDirectory(dir=options.folder) as folder:
-        bench = Bench(Path(folder))
-        table("An event from outside", measure(bench.jobs(EVENTS.name), pace))
-        table("A skill's answer, and the next skill", measure(bench.jobs(ANSWERS.name), pace))
-
-
-if __name__ == "__main__":
-    main()
