@@ -10,6 +10,8 @@ from typing import Any
 
 from timing import Job
 
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
@@ -19,7 +21,7 @@ from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_real
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, SkillCall, skill
+from dsc.skills import skill
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.journal.file import Durability
 

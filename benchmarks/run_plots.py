@@ -22,12 +22,14 @@ from typing import Any
 from rows import Target, number
 from run_jobs import PING, SCHEMA, STOP
 
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_real
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, SkillCall, skill
+from dsc.skills import skill
 from knowledge_base import KnowledgeBase
 
 PLOT = ActionPlot.model_validate({

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from dsc.calls import Outcome as Outcome
+    from dsc.calls import SkillCall as SkillCall
+    from dsc.components.component import Component as Component
     from dsc.components.functions import component_of as component_of
     from dsc.components.ports import event as event
     from dsc.components.ports import query as query
@@ -18,9 +21,6 @@ if TYPE_CHECKING:
     from dsc.primitive import primitive_plot as primitive_plot
     from dsc.sequencer.sequencer import RunEnd as RunEnd
     from dsc.sequencer.sequencer import Sequencer as Sequencer
-    from dsc.skills import Component as Component
-    from dsc.skills import Outcome as Outcome
-    from dsc.skills import SkillCall as SkillCall
     from dsc.skills import skill as skill
     from dsc.text.plots import load_library as load_library
     from dsc.text.plots import load_plot as load_plot
@@ -33,15 +33,15 @@ __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
     {
         "ActionPlot": "model.plot",
-        "Component": "skills",
+        "Component": "components.component",
         "Event": "events",
         "Library": "dynamic.library",
         "Machine": "engine.machine",
-        "Outcome": "skills",
+        "Outcome": "calls",
         "Record": "trace",
         "RunEnd": "sequencer.sequencer",
         "Sequencer": "sequencer.sequencer",
-        "SkillCall": "skills",
+        "SkillCall": "calls",
         "component_of": "components.functions",
         "event": "components.ports",
         "load_library": "text.plots",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from dsc.components.component import Component
 from dsc.components.parameters import check_relations, known
 from dsc.model.plot import ActionPlot, Parameter
 from dsc.model.profile import Profile
-from dsc.skills import Component
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import Constant

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
@@ -19,7 +20,7 @@ from dsc.model.states import Budget
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import RunEnd, Sequencer
-from dsc.skills import Component, signatures
+from dsc.skills import signatures
 from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
 from dsc.validation import raise_findings, validate_library

@@ -19,7 +19,7 @@ from knowledge_base.schema import agreed_names
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from dsc.skills import Component
+    from dsc.components.component import Component
     from knowledge_base.schema import Schema, Signature
     from planning.domain import PlanningDomain
 

@@ -19,12 +19,12 @@ from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_know
 from domains.clean_up_table.world import World
 from domains.clean_up_table.world_file import LastingWorld, beside
 from domains.tally import Tally
+from dsc.components.component import Component
 from dsc.model.plot import ActionPlot
 from dsc.model.profile import Profile
 from dsc.profiles import adapted, configure
 from dsc.sequencer.run_tables import archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
-from dsc.skills import Component
 from dsc.text.plots import load_library
 from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError, UnknownNameError

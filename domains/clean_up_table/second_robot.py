@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 from domains.clean_up_table.places import PLACES, distance
 from domains.clean_up_table.skills import ITEM_AT, ITEM_IN, NOT_POSSIBLE, ONCE, Arm, Base, Camera, outcome_of, seconds
+from dsc.calls import Outcome, SkillCall
 from dsc.components.parameters import Parameter
-from dsc.skills import Outcome, SkillCall, skill
+from dsc.skills import skill
 
 if TYPE_CHECKING:
     from domains.clean_up_table.results import Result

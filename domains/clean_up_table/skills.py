@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 from domains.clean_up_table.observations import initial_knowledge, learned
 from domains.clean_up_table.places import PLACES, distance
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
 from dsc.components.parameters import Parameter
-from dsc.skills import Component, Outcome, SkillCall, skill
+from dsc.skills import skill
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

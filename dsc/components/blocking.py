@@ -18,7 +18,7 @@ from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dsc.skills import Outcome, SkillCall
+    from dsc.calls import Outcome, SkillCall
 
 STOPPING = 2.0
 """Real seconds for a body that was told to stop."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from dsc.skills import DECLARED, Component, SkillBody, SkillSignature, signature_of
+from dsc.components.component import Component
+from dsc.skills import DECLARED, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError
 
 

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, SkillCall, SkillSignature, check_arguments
+from dsc.skills import SkillSignature, check_arguments
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.expression import Constant
 from knowledge_base.schema import Schema

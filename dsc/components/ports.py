@@ -21,7 +21,9 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from dsc.skills import TAKES, Component, Declared, Outcome, SkillBody, SkillCall
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import TAKES, Component
+from dsc.skills import Declared, SkillBody
 
 ANSWERED = "answered"
 """The outcome of a query; its attributes are the answer."""

@@ -15,11 +15,13 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
+from dsc.components.component import Component
 from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError
 from dsc.components.heartbeats import Heart
 from dsc.components.life import Life
 from dsc.components.transport import Transport
-from dsc.skills import Clock, Component, Ended, Outcome, SkillCall, SkillSignature, Status
+from dsc.skills import SkillSignature
 from knowledge_base.exchange.forms import delta_form, delta_of
 
 WATCH = 1.0

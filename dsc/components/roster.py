@@ -11,7 +11,7 @@ from dsc.components.life import Life
 from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
-    from dsc.skills import Component
+    from dsc.components.component import Component
 
 _Result = TypeVar("_Result")
 

@@ -22,7 +22,9 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Repeat, Retry
 
-from dsc.skills import AfterCrash, Component, Declared, Outcome, SkillBody, SkillCall
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
+from dsc.skills import AfterCrash, Declared, SkillBody
 from knowledge_base.facts import Delta
 
 PERIOD = 0.1

@@ -13,7 +13,9 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
+from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.blocking import DeadlineError
+from dsc.components.component import Component
 from dsc.components.roster import Roster
 from dsc.components.stopping import GRACE, give_up, give_up_after
 from dsc.engine.steps import (
@@ -33,7 +35,6 @@ from dsc.sequencer.messages import SkillMessage, TimerMessage
 from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
 from dsc.sequencer.telling import CLOSING, Telling, failure
 from dsc.sequencer.timers import Timers
-from dsc.skills import Clock, Component, Ended, Outcome, SkillCall, Status
 from knowledge_base.errors import InputError, UnknownNameError
 
 DEFAULT_WITHIN = 300.0

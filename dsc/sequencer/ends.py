@@ -6,9 +6,10 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from dsc.calls import Outcome
+from dsc.components.component import Component
 from dsc.engine.steps import Start
 from dsc.events import SKILL_ERROR, TIMED_OUT
-from dsc.skills import Component, Outcome
 
 
 def encoded(value: Any) -> Any:

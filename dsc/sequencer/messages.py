@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+from dsc.calls import Outcome
 from dsc.engine.steps import SendLater, Start, StartTimer
 from dsc.events import NO_ATTRIBUTES, Event
-from dsc.skills import Outcome
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 

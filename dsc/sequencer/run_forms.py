@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dsc.calls import Outcome
 from dsc.engine.state import NOTHING, FrameState, MachineState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.run_tables import RunRow
-from dsc.skills import Outcome
 from dsc.trace import Record
 from knowledge_base.exchange.forms import delta_form, delta_of
 

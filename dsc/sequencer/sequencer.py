@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
@@ -21,7 +22,6 @@ from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.resuming import require_components, take_up
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
-from dsc.skills import Component
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta

@@ -6,10 +6,11 @@ from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
+from dsc.calls import Ended, Status
+from dsc.components.component import Component
 from dsc.engine.steps import Start
 from dsc.errors import UncertainActionError
 from dsc.sequencer.clock import LoopClock
-from dsc.skills import Component, Ended, Status
 
 
 @dataclass(frozen=True, slots=True)

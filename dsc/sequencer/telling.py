@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable
 
+from dsc.components.component import Component
 from dsc.components.life import Life
 from dsc.components.stopping import GRACE
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
 from dsc.sequencer.ends import encoded
-from dsc.skills import Component
 
 CLOSING = GRACE
 """Seconds for components to take what they were last told, and for cancelled skills to stop."""

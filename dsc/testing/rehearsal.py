@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import RunEnd, Sequencer
-from dsc.skills import Component
 from dsc.testing.answers import Call, Replies
 from dsc.testing.scripted import ScriptedSkills
 from dsc.testing.worlds import change_of, world

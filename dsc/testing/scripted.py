@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from dsc.skills import Component, Outcome, SkillCall, SkillSignature, check_arguments
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
+from dsc.skills import SkillSignature, check_arguments
 from dsc.testing.answers import Answer, Call, Replies, RepliesOfSkill, check_outcome
 from dsc.testing.worlds import change_of
 from knowledge_base.errors import ParseError, UnknownNameError

@@ -19,6 +19,8 @@ from typing import Any
 
 import pytest
 
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
 from dsc.components.heartbeats import BEAT, SILENCE, Heart
 from dsc.components.life import Life
@@ -27,7 +29,7 @@ from dsc.components.pushing import Publisher, Subscription
 from dsc.components.remote import Host, RemoteComponent
 from dsc.components.transport import Transport
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.skills import Component, Outcome, SkillCall, skill
+from dsc.skills import skill
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 

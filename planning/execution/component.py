@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
+from dsc.calls import Ended, Outcome, SkillCall, Status
+from dsc.components.component import Component
 from dsc.sequencer.reactor import CHART
-from dsc.skills import Component, Ended, Outcome, SkillCall, Status, skill
+from dsc.skills import skill
 from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from dsc.skills import Outcome
+from dsc.calls import Outcome
 from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation import holds
 from planning.execution.carried import Carried

@@ -8,8 +8,8 @@ from contextlib import aclosing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dsc.calls import Outcome
 from dsc.sequencer.taking_up import PastClock
-from dsc.skills import Outcome
 from knowledge_base.language.printer import to_text
 from knowledge_base.overlay import Overlay
 from planning.execution.course import Course, cost_of, shortest_end

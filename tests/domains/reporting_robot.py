@@ -7,7 +7,7 @@ import json
 from typing import TYPE_CHECKING
 
 from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
-from dsc.skills import Outcome, SkillCall
+from dsc.calls import Outcome, SkillCall
 from knowledge_base.facts import Delta, Fact, fact
 
 if TYPE_CHECKING:

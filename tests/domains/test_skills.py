@@ -15,7 +15,7 @@ import domains.clean_up_table
 from domains.clean_up_table.items import new_item
 from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.world import World
-from dsc.skills import SkillCall
+from dsc.calls import SkillCall
 from knowledge_base.exchange.action_text import ActionText
 from knowledge_base.exchange.domain_text import parse_domain
 from knowledge_base.facts import Fact, fact

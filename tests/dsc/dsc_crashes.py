@@ -13,12 +13,14 @@ from pathlib import Path
 from dsc_charts import plot
 from dsc_runs import SCHEMA
 
+from dsc.calls import Outcome
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.run_tables import archive
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, skill
+from dsc.skills import skill
 from dsc.trace import Trace
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.store import KnowledgeBase

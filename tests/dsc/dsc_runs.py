@@ -7,10 +7,12 @@ import threading
 
 from dsc_charts import plot
 
+from dsc.calls import Outcome
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, skill
+from dsc.skills import skill
 from dsc.trace import Trace
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.schema import Schema

@@ -12,10 +12,12 @@ import time
 import pytest
 from dsc_runs import Arm, Ran
 
+from dsc.calls import Outcome, SkillCall
 from dsc.components import blocking
+from dsc.components.component import Component
 from dsc.components.functions import component_of
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
-from dsc.skills import Component, Outcome, SkillCall, skill
+from dsc.skills import skill
 from knowledge_base.errors import InputError
 
 

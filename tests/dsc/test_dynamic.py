@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from dsc_charts import FakeSituation, plot
 
+from dsc.calls import Outcome
+from dsc.components.component import Component
 from dsc.dynamic.library import MOST_BOUND, Library
 from dsc.dynamic.outcomes import outcomes_of
 from dsc.dynamic.selection import ACHIEVE
@@ -13,7 +15,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.situation import Decision
 from dsc.events import Event
 from dsc.primitive import primitive_plot
-from dsc.skills import Component, Outcome, skill
+from dsc.skills import skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term

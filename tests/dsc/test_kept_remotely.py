@@ -9,6 +9,8 @@ from dsc_charts import plot
 from dsc_crashes import copied
 from dsc_runs import SCHEMA
 
+from dsc.calls import Outcome
+from dsc.components.component import Component
 from dsc.components.ports import event
 from dsc.components.remote import Host, RemoteComponent
 from dsc.components.transport import LocalTransport
@@ -17,7 +19,7 @@ from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.run_tables import archive
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Component, Outcome, skill
+from dsc.skills import skill
 from dsc.trace import Trace
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.store import KnowledgeBase

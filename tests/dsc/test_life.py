@@ -8,12 +8,14 @@ from typing import ClassVar
 import pytest
 from dsc_charts import plot
 
+from dsc.calls import Outcome
+from dsc.components.component import ALWAYS, Component
 from dsc.components.life import Life, LifeCycle
 from dsc.dynamic.library import Library
 from dsc.events import Event
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import ALWAYS, Component, Outcome, skill
+from dsc.skills import skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase

@@ -8,9 +8,11 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import Ran
 
+from dsc.calls import Outcome
+from dsc.components.component import Component
 from dsc.components.ports import event, query, takes
 from dsc.dynamic.library import Library
-from dsc.skills import Component, Outcome, skill
+from dsc.skills import skill
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError, UnknownNameError
 

@@ -9,6 +9,7 @@ from dsc_crashes import Crashes, Robot, Run, copied
 from dsc_kept_charts import CHARTS, handed_in
 from dsc_runs import SCHEMA, Ran
 
+from dsc.calls import Ended, Outcome, Status
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.events import Event
@@ -16,7 +17,7 @@ from dsc.sequencer.replay import replay
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.run_tables import archive, has_run, records_of
 from dsc.sequencer.sequencer import RunEnd
-from dsc.skills import Ended, Outcome, Status, skill
+from dsc.skills import skill
 from knowledge_base.errors import StoreError, UnknownNameError
 from knowledge_base.store import KnowledgeBase
 

@@ -8,11 +8,12 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import SCHEMA, SLOW, Arm, Ran
 
+from dsc.calls import Outcome
 from dsc.dynamic.library import Library
 from dsc.events import Event
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import Outcome, skill
+from dsc.skills import skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.store import KnowledgeBase

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 from dsc_runs import SLOW, Arm, Ran
 
+from dsc.calls import Outcome
+from dsc.components.component import Component
 from dsc.sequencer.clock import run_simulated
-from dsc.skills import Component, Outcome, check_arguments, skill
+from dsc.skills import check_arguments, skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, fact
 

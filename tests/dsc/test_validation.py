@@ -8,11 +8,13 @@ from pathlib import Path
 import pytest
 from dsc_charts import plot
 
+from dsc.calls import Outcome
+from dsc.components.component import Component
 from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
 from dsc.model.plot import ActionPlot
-from dsc.skills import Component, Outcome, skill
+from dsc.skills import skill
 from dsc.text.plots import load_library, parse_plot
 from dsc.validation import raise_findings, validate_library, validate_plot
 from knowledge_base.schema import Schema

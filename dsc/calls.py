@@ -1,0 +1,78 @@
+"""What passes between the sequencer and a component: a call, how it ended, and what is known of it after a crash."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Protocol
+
+from knowledge_base.facts import Delta
+
+
+class Clock(Protocol):
+    """Time as skills and the sequencer see it: simulated or real, always injected."""
+
+    def now(self) -> float:
+        """Seconds of run time."""
+        ...
+
+    async def sleep(self, seconds: float) -> None:
+        """Let `seconds` of run time pass."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a skill ended: its outcome event, the event's attributes, and what was observed meanwhile.
+
+    `observed` is applied to the knowledge base, with the component as author, before the event is handled.
+    """
+
+    event: str
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    observed: Delta = field(default_factory=Delta)
+
+
+@dataclass(frozen=True, slots=True)
+class SkillCall:
+    """One execution of a skill.
+
+    Attributes:
+        action_id: names this execution; stable across restarts, never used for another one.
+        clock: the only time a skill may use.
+        report: hands over an intermediate event while the skill goes on (e.g. progress, a perception).
+        deadline: second of run time at which the skill is cancelled.
+        give_up: says that something of the skill goes on that cannot be stopped.
+
+    When a run is resumed after a crash, a call may come again with the same id. Its clock then begins when the
+    action was started, and what was reported before is not heard twice: a skill that acts once for an id simply
+    goes the same way.
+    """
+
+    action_id: str
+    clock: Clock
+    report: Callable[[Outcome], None]
+    deadline: float = math.inf
+    give_up: Callable[[str], None] = lambda _: None
+
+    @property
+    def remaining(self) -> float:
+        """Seconds of run time until the deadline."""
+        return self.deadline - self.clock.now()
+
+
+class Status(Enum):
+    """What a component says about an action that may have been under way when the run was broken off."""
+
+    RUNNING = "running"
+    UNKNOWN = "unknown"
+    NOT_BEGUN = "not begun"
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The action came to its end, and how."""
+
+    outcome: Outcome

@@ -1,0 +1,217 @@
+"""What is deployed: something with skills, parameters, modes and a life."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Awaitable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, cast
+
+from dsc.calls import Ended, Outcome, SkillCall, Status
+from dsc.components.activations import Activations
+from dsc.components.life import Life, LifeCycle
+from dsc.components.parameters import Parameter, check_relations, known
+from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
+from knowledge_base.errors import UnknownNameError
+
+NEUTRAL = "neutral"
+"""The mode at rest."""
+ALWAYS = ""
+"""Stands for every mode in `Component.needs`."""
+TAKES = "__dsc_takes__"
+"""Where `takes` notes what it declares."""
+
+
+class Component:
+    """Base of all components.
+
+    Attributes:
+        name: how charts address it; it may be chosen at deployment.
+        domain: what it brings to the planning domain: a PDDL file, or PDDL text; `None` for nothing.
+        concurrent: whether it can carry out several skills at once. Steps of a plan that use one which cannot never
+            overlap; what plots start side by side is their own affair.
+        modes: the sub-states it has while Alive, besides `neutral`; if it names none, any may be asked for.
+        declares: its parameters with type, range and who may change them; if it names none, any may be set.
+        relations: conditions between its parameters that always hold.
+        needs: mode -> names of the components it needs then; `ALWAYS`: in every mode.
+        activations: who has activated its events.
+        life: where it is in its life; `self.life.become(Life.FATAL_ERROR, "no power")` when the device is gone.
+    """
+
+    name: str = ""
+    domain: ClassVar[Path | str | None] = None
+    concurrent: bool = False
+    modes: ClassVar[tuple[str, ...]] = ()
+    declares: ClassVar[Mapping[str, Parameter]] = {}
+    relations: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    def __init__(self, name: str | None = None) -> None:
+        self.name = name or self.name or type(self).__name__.lower()
+        self.mode = NEUTRAL
+        self.parameters: dict[str, Any] = {
+            name: one.default for name, one in self.declares.items() if one.default is not None
+        }
+        self.life = LifeCycle()
+        self._starting = False
+        self.activations = Activations()
+
+    def skills(self) -> dict[str, SkillSignature]:
+        """The signatures of all decorated methods, by skill name."""
+        return dict(signatures(type(self), self.name))  # type: ignore[arg-type]  # mypy: classes are hashable
+
+    def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Awaitable[Outcome]:
+        """Start the named skill; the sequencer's dispatcher awaits and may cancel it.
+
+        Raises:
+            UnknownNameError: the component has no such skill.
+            InputError: an argument is missing or unknown.
+        """
+        signatures = self.skills()
+        signature = signatures.get(skill_name)
+        if signature is None:
+            raise UnknownNameError(
+                f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
+            )
+        check_arguments(signature, arguments)
+        body = self.body(skill_name)
+        declared: Declared = getattr(body, DECLARED)
+        return declared.carry_out(self, body, call, arguments)
+
+    def body(self, skill_name: str) -> SkillBody:
+        """What carries out a skill of that name, which exists."""
+        return cast(SkillBody, getattr(self, skill_name))
+
+    async def configure(self, parameter: str, value: object) -> None:
+        """The *param* port: set a named parameter; override to react.
+
+        Raises:
+            UnknownNameError: the component declares its parameters, and this is none.
+            InputError: the value does not fit what is declared, or a relation.
+        """
+        if self.declares:
+            declared = known(self.name, parameter, self.declares)
+            value = declared.check(f"{self.name}.{parameter}", value)
+            check_relations(self.name, self.relations, {**self.parameters, parameter: value})
+        self.parameters[parameter] = value
+
+    async def switch(self, mode: str) -> None:
+        """The *state* port: enter a mode (`neutral` is at rest); override to react."""
+        self.mode = mode
+
+    async def take(self, port: str, message: Mapping[str, Any]) -> None:
+        """The *send* port: a one-way message, for the method of that name that is decorated with `takes`.
+
+        Raises:
+            UnknownNameError: there is no such method.
+            InputError: something is missing in the message or unknown.
+        """
+        taking = {n: m for n, m in inspect.getmembers(type(self), inspect.isfunction) if hasattr(m, TAKES)}
+        if port not in taking:
+            raise UnknownNameError(f"component '{self.name}' takes no '{port}'", found=port, valid=taking)
+        check_arguments(signature_of(self.name, port, taking[port], getattr(taking[port], TAKES)), message)
+        await getattr(self, port)(**message)
+
+    def update(self, event: str, *values: Any) -> None:
+        """Put a new value before all who have activated the event; those who come later are told it, too.
+
+        Raises:
+            UnknownNameError: the component has no such event.
+        """
+        events = [name for name, signature in self.skills().items() if signature.pattern == "event"]
+        if event not in events:
+            raise UnknownNameError(f"component '{self.name}' has no event '{event}'", found=event, valid=events)
+        self.activations.update(event, values)
+
+    async def start(self) -> None:
+        """From Init to Alive: override to open devices; what is raised means FatalError."""
+
+    async def stop(self) -> None:
+        """To Shutdown: override to close devices."""
+
+    async def activate(self, active: bool) -> None:  # noqa: FBT001
+        """Somebody needs it from now on, or nobody any more: override to take resources and to free them (S4.1)."""
+
+    async def come_alive(self) -> None:
+        """Start if it is in Init; who comes meanwhile waits for the same start."""
+        if self.life.state is not Life.INIT:
+            return
+        if self._starting:
+            await self.life.until(lambda life: life is not Life.INIT)
+            return
+        self._starting = True
+        try:
+            await self.start()
+        except Exception as error:  # noqa: BLE001  # whatever it is, the component cannot work
+            self.life.become(Life.FATAL_ERROR, f"{type(error).__name__}: {error}")
+        else:
+            self.life.become(Life.ALIVE)
+        finally:
+            self._starting = False
+
+    async def change_mode(self, mode: str) -> None:
+        """What `switch` in a chart does: a mode, or `init` (start anew) and `shutdown`.
+
+        Raises:
+            UnknownNameError: the component says which modes it has, and this is none.
+        """
+        if mode == Life.INIT:
+            self.life.become(Life.INIT)
+            await self.come_alive()
+        elif mode == Life.SHUTDOWN:
+            await self.stop()
+            self.life.become(Life.SHUTDOWN)
+        elif self.modes and mode not in (NEUTRAL, *self.modes):
+            valid = (NEUTRAL, *self.modes)
+            raise UnknownNameError(f"component '{self.name}' has no mode '{mode}'", found=mode, valid=valid)
+        else:
+            await self.switch(mode)
+
+    def needed(self) -> tuple[str, ...]:
+        """Names of the components it needs in its present mode."""
+        return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
+
+    async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
+        """What became of an action that this process did not start; override to ask the robot.
+
+        `RUNNING` and `NOT_BEGUN` let the skill be executed with that id; it then awaits the action's end, or
+        does it. What may be done about an `UNKNOWN` one, the skill's `after_crash` says.
+        """
+        return Status.UNKNOWN
+
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:
+        """Stop an action, if it still goes on, that was cancelled just before the run was broken off.
+
+        Whether the cancellation has reached the robot is not known. Override it where actions go on when this
+        process dies; those that are part of it have ended with it.
+        """
+
+    async def forget(self, action_id: str) -> None:
+        """Nobody will ask for the action's end any more: it has been taken and, with a store, is kept.
+
+        Override it where ends are remembered for that.
+        """
+
+    def remember(self) -> Any:
+        """Plain data to be kept, for `recall` after a restart; asked with each macrostep that is committed."""
+        return None
+
+    def recall(self, memory: Any) -> None:
+        """Be as when `memory` was kept; called before anything else after a restart."""
+
+    @property
+    def remembers(self) -> bool:
+        """Whether there is anything to remember: most components are not asked again and again."""
+        return type(self).remember is not Component.remember
+
+    async def diagnose(self) -> dict[str, Any]:
+        """The *diagnose* port: how it is, as plain data; override to add what only it knows."""
+        return {
+            "component": self.name,
+            "life": str(self.life.state),
+            "reason": self.life.reason,
+            "mode": self.mode,
+            "parameters": dict(self.parameters),
+            "needs": list(self.needed()),
+            "skills": sorted(self.skills()),
+        }
