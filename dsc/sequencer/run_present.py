@@ -74,6 +74,7 @@ class Present:
         """A new run begins."""
         for statement in _CLEAR:
             connection.execute(statement)
+        self._reactor = {}
 
     def restored(self, kept: Kept) -> None:
         """This is what the tables have."""
