@@ -83,8 +83,8 @@ bench-planning: $(VENV)/.engines   ## tables of 5 to 50 items: each engine alone
 bench-kb: $(BENCH)/.peers   ## what facts, questions, updates and conditions cost: an index by hand, this knowledge base, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/kb.py $(if $(WRITE),--write)
 
-bench-run: $(VENV)/.run   ## what a macrostep costs without a store and with one; 1,000 plots at once (WRITE=1 writes the docs)
-	$(BIN)/python benchmarks/run_store.py $(if $(WRITE),--write)
+bench-run: $(VENV)/.run   ## a macrostep without a store and with one, and 1,000 plots at once, as ratios (QUICK=1, PLOTS=N, SECONDS=N, WRITE=1 writes the docs)
+	$(BIN)/python benchmarks/run.py $(if $(QUICK),--quick) $(if $(PLOTS),--plots $(PLOTS)) $(if $(SECONDS),--seconds $(SECONDS)) $(if $(WRITE),--write)
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg

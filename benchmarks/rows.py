@@ -70,15 +70,20 @@ class Row:
 
 def table(rows: list[Row], columns: list[str]) -> str:
     """A Markdown table that can be read as it stands."""
-    head = ["case", *columns, "lead", "target"]
+    led = any(row.lead is not None for row in rows)
+    head = ["case", *columns, *(["lead"] if led else []), "target"]
     lines = [
-        [f"{row.case}, {row.unit}", *(str(row.cells.get(name, "")) for name in columns), _lead(row), _targets(row)]
+        [f"{row.case}, {row.unit}", *_cells(row, columns), *([_lead(row)] if led else []), _targets(row)]
         for row in rows
     ]
     widths = [max(len(line[n]) for line in (head, *lines)) for n in range(len(head))]
     rule = ["-" * width for width in widths]
     text = ["| " + " | ".join(map(str.ljust, line, widths)) + " |" for line in (head, rule, *lines)]
     return "\n".join(text)
+
+
+def _cells(row: Row, columns: list[str]) -> list[str]:
+    return [str(row.cells.get(name, "")) for name in columns]
 
 
 def _lead(row: Row) -> str:

@@ -42,6 +42,9 @@ with `no_plan` and `gave_up`."""
 EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
 """Events that are nobody else's; the other two are passed on by who plans."""
 
+NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
+"""Of most events; shared, as nobody can change it."""
+
 
 class Event(NamedTuple):
     """Something that happened; a named tuple, since many are made and a frozen dataclass takes four times as long.
@@ -57,7 +60,7 @@ class Event(NamedTuple):
     """
 
     name: str
-    attributes: Mapping[str, Any] = MappingProxyType({})
+    attributes: Mapping[str, Any] = NO_ATTRIBUTES
     to: int | None = None
     exact: bool = False
     frame: int | None = None

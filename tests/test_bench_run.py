@@ -1,22 +1,26 @@
-"""`make bench-run` works: every way to run has its figures, and its ratios."""
+"""`make bench-run` works: every way to run has its figures and ratios, and many plots at once are all served."""
 
-import re
+import json
 import subprocess
 import sys
 from pathlib import Path
 
-BENCH = Path(__file__).parent.parent / "benchmarks" / "run_store.py"
+BENCH = Path(__file__).parent.parent / "benchmarks" / "run.py"
 
 
-def test_every_way_to_run_a_chart_is_timed(tmp_path):
-    command = [sys.executable, BENCH, "--quick", "--folder", tmp_path]
-    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    rows = re.findall(r"^\| (.*?) \| ([\d.]+) \| [\d,]+ \| ([\d.]+) \|", printed, flags=re.MULTILINE)
-    assert [name for name, *_ in rows] == 2 * [
-        "the engine alone", "one asyncio.Queue hop", "without a store", "with a store, process",
-        "a bare commit, process", "with a store, power", "a bare commit, power",
-    ]  # fmt: skip
-    assert all(float(us) > 0 for _, us, *_ in rows)
-    assert re.findall(r"^\| (\d+) \| [\d.]+ \| [\d.]+ \|", printed, flags=re.MULTILINE) == ["1", "5"]
-    assert len(re.findall(r"\| (met|missed) \|", printed)) == 4
+def test_every_way_to_run_a_chart_is_timed_and_many_plots_at_once(tmp_path):
+    command = [sys.executable, BENCH, "--quick", "--json", "--plots", "5", "--seconds", "1", "--folder", tmp_path]
+    measured = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    *cases, answers = measured["rows"]
+    assert len(cases) == 3
+    for case in cases:
+        assert list(case["cells"]) == [
+            "engine alone", "queue hop", "no store", "process", "bare commit, process", "power", "bare commit, power",
+        ]  # fmt: skip
+        assert all(case["cells"][name]["value"] > 0 for name in ("engine alone", "queue hop", "bare commit, power"))
+        assert [one["bound"] for one in case["targets"]] == [3, 5, 1.3]
+        assert [case["cells"][name]["times"] is not None for name in ("no store", "process", "power")] == 3 * [True]
+    assert list(answers["cells"]) == ["no store", "process", "power"]
+    assert [(one["plots"], one["fewest"], one["most"]) for one in measured["plots"]] == 2 * [(1, 20, 20), (5, 1, 1)]
+    assert all(one["p50"] <= one["p99"] <= one["longest"] for one in measured["plots"])
     assert not list(tmp_path.iterdir())

@@ -69,7 +69,7 @@ class Dispatcher:
         self._answered_for: set[str] = set()
         self._clock = clock
         self._post = post
-        self._running: dict[str, tuple[Start, asyncio.Task[None]]] = {}
+        self._running: dict[str, tuple[Start, asyncio.Task[None], float]] = {}  # with the seconds it may take
         self._ending: set[asyncio.Task[None]] = set()
         self.telling = Telling()
         self.timers = Timers(clock, post)
@@ -80,7 +80,7 @@ class Dispatcher:
 
     def started(self) -> tuple[Start, ...]:
         """The skills that are being carried out, or whose answer has not been taken yet."""
-        return tuple(start for start, _ in self._running.values())
+        return tuple([start for start, _, _ in self._running.values()])
 
     @property
     def in_use(self) -> frozenset[str]:
@@ -93,10 +93,7 @@ class Dispatcher:
 
         Periods, which always are, do not count; nor do events that were activated without a bound and may never come.
         """
-        return self.timers.waiting or any(map(self._will_end, self.started()))
-
-    def _will_end(self, start: Start) -> bool:
-        return math.isfinite(self._within(start))
+        return self.timers.waiting or any(math.isfinite(within) for _, _, within in self._running.values())
 
     def _within(self, start: Start) -> float:
         """Seconds that it may take; an event lasts as long as the state that activated it."""
@@ -154,7 +151,7 @@ class Dispatcher:
         """Cancel a skill; nobody waits for its answer any more."""
         if start.action_id not in self._running:
             return
-        _, task = self._running.pop(start.action_id)
+        _, task, _ = self._running.pop(start.action_id)
         self._ending.add(task)
         task.add_done_callback(self._ending.discard)
         task.cancel()
@@ -185,7 +182,7 @@ class Dispatcher:
             What components could not take, as far as no skill has failed because of it; and which skills did not
             stop when they were told to.
         """
-        for activation in {start.activation for start, _ in self._running.values()}:
+        for activation in {start.activation for start in self.started()}:
             self._cancel(activation)
         self.timers.close()
         tasks = [*self._ending, *self.telling.tasks()]
@@ -200,31 +197,33 @@ class Dispatcher:
 
     def _start(self, start: Start, earlier: Earlier | None = None) -> None:
         component = self.component(start.component)
-        task = asyncio.get_running_loop().create_task(self._execute(component, start, earlier))
-        self._running[start.action_id] = (start, task)
         within = self._within(start)
+        task = asyncio.get_running_loop().create_task(self._execute(component, start, within, earlier))
+        self._running[start.action_id] = (start, task, within)
         if math.isfinite(within):
             left = within if earlier is None else earlier.began + within - self._clock.now()
-            give_up_after(task, left + GRACE, lambda: self._overdue(start))
+            give_up_after(task, left + GRACE, lambda: self._overdue(start, within))
 
-    def _overdue(self, start: Start) -> None:
+    def _overdue(self, start: Start, within: float) -> None:
         """It swallowed that its time is over; the chart need not wait for it."""
         if start.action_id in self._running:
             self._not_stopped(start)
             self._answered_for.add(start.action_id)
-            self._post(SkillMessage(start, late(start, self._within(start)), final=True))
+            self._post(SkillMessage(start, late(start, within), final=True))
 
     def _not_stopped(self, start: Start) -> None:
         skill = f"{start.component}.{start.skill}"
         self._given_up.append(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
 
-    async def _execute(self, component: Component, start: Start, earlier: Earlier | None) -> None:
-        outcome = await self._outcome(component, start, earlier)
+    async def _execute(self, component: Component, start: Start, within: float, earlier: Earlier | None) -> None:
+        outcome = await self._outcome(component, start, within, earlier)
         if start.action_id in self._answered_for:
             return
         self._post(SkillMessage(start, outcome, final=True))
 
-    async def _outcome(self, component: Component, start: Start, earlier: Earlier | None) -> Outcome:
+    async def _outcome(
+        self, component: Component, start: Start, within: float, earlier: Earlier | None
+    ) -> Outcome:
         heard = 0
 
         def report(outcome: Outcome) -> None:
@@ -235,7 +234,7 @@ class Dispatcher:
                 self._post(SkillMessage(start, declared(component, start, outcome), final=False))
 
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
-        deadline = clock.now() + self._within(start)
+        deadline = clock.now() + within
         call = SkillCall(self._id(start), clock, report, deadline, self._given_up.append)
         bound = self._clock.timeout_at(deadline)
         try:
@@ -257,7 +256,7 @@ class Dispatcher:
             return broken(start, "CancelledError: it cancelled itself")
         except Exception as error:  # noqa: BLE001  # whatever a skill does wrong must not end the run
             if bound.expired() or isinstance(error, DeadlineError):
-                return late(start, self._within(start))
+                return late(start, within)
             return broken(start, f"{type(error).__name__}: {error}")
 
     def _cancel(self, activation: int) -> None:

@@ -14,6 +14,8 @@ from dsc.events import SKILL_ERROR, TIMED_OUT
 
 def encoded(value: Any) -> Any:
     """Plain data of its own, so that nothing is shared by accident."""
+    if isinstance(value, dict) and not value:  # most skills take and say nothing
+        return {}
     return json.loads(json.dumps(value))
 
 

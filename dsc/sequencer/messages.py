@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from dsc.calls import Outcome
 from dsc.engine.steps import SendLater, Start, StartTimer
-from dsc.events import Event
+from dsc.events import NO_ATTRIBUTES, Event
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 
@@ -59,7 +59,7 @@ Message = SkillMessage | TimerMessage | KnowledgeMessage | LateMessage | SendLat
 def plain(event: Event) -> Event:
     """The event with attributes of its own; raises `InputError` if they are no plain data."""
     if not event.attributes:
-        return event
+        return event if event.attributes is NO_ATTRIBUTES else event._replace(attributes=NO_ATTRIBUTES)
     try:
         attributes = json.loads(json.dumps(dict(event.attributes), allow_nan=False))
     except (TypeError, ValueError) as error:

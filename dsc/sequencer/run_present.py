@@ -25,6 +25,7 @@ from dsc.sequencer.messages import LateMessage, Message, SkillMessage, TimerMess
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import (
     Awaited,
+    Form,
     Kept,
     Pending,
     Shortener,
@@ -43,7 +44,7 @@ _INSERT = "INSERT INTO pending VALUES (?, ?, ?, ?, ?, 0, ?, 0)"
 _CANCELLED = "UPDATE pending SET cancelled = 1 WHERE place = ?"
 _FORGET = "DELETE FROM pending WHERE place = ?"
 _REPORTED = "UPDATE pending SET reports = reports + 1 WHERE place = ?"
-_FRAME = "INSERT OR REPLACE INTO frames VALUES (?, ?)"
+_FRAME = "INSERT INTO frames VALUES (?, ?) ON CONFLICT DO UPDATE SET frame = excluded.frame"  # REPLACE takes longer
 _CLEAR = ("DELETE FROM frames", "DELETE FROM pending", "DELETE FROM memory")
 _SELECT_PENDING = "SELECT place, kind, step, at, what, reports, cause, cancelled FROM pending ORDER BY place"
 _LAST_REACTOR = "SELECT reactor FROM steps ORDER BY place DESC LIMIT 1"
@@ -66,11 +67,14 @@ class Present:
         self._telling: dict[int, Told] = {}  # by place: of this it is not known whether it has been taken
         self._last_place = 0
         self._memory: dict[str, str] = {}
+        self._reactor: Form = {}
+        self._reactor_text = ""
 
     def clear(self, connection: sqlite3.Connection) -> None:
         """A new run begins."""
         for statement in _CLEAR:
             connection.execute(statement)
+        self._reactor = {}
 
     def restored(self, kept: Kept) -> None:
         """This is what the tables have."""
@@ -97,14 +101,17 @@ class Present:
     def reactor(self, reactor: Reactor) -> str:
         """What else the reactor remembers."""
         state = reactor.machine.state
-        return text_of({
+        form = {
             "root": state.root.serial if state.root else None,
             "serials": state.serials,
             "finished": state.finished,
             "emitted": events_form(reactor.emitted, self._short),
             "in_vain": sorted(reactor.in_vain),
             "problem": reactor.problem,
-        })  # fmt: skip
+        }
+        if form != self._reactor:  # most events change none of it
+            self._reactor, self._reactor_text = form, text_of(form)
+        return self._reactor_text
 
     def memory(self, connection: sqlite3.Connection, component: str, memory: Any) -> None:
         """Write what a component has to remember, if it is not what it was."""

@@ -145,7 +145,7 @@ class RunStore:
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
-        configuration = _configuration_text(reactor.machine.state.configuration())
+        configuration = _paths_text(reactor.machine.state.configuration())
         self._connection.execute(_STEP, (
             self._run, self._number, now, self._before, self._knowledge.version, text_of(form), configuration,
             self._present.reactor(reactor), self._new_records(),
@@ -155,6 +155,7 @@ class RunStore:
         if message is not None:
             self._present.taken(self._connection, message)
         self._present.asked(self._connection, output, self._number, now, reactor)
+        self._before = self._knowledge.version  # the next macrostep may be part of the same transaction
 
     def memory(self, component: str, memory: Any) -> None:
         """What a component has to remember."""
@@ -203,7 +204,7 @@ class RunStore:
             raise StoreError("another sequencer has taken this run over", place=Place(str(self.path)))
 
 
-@lru_cache(maxsize=1024)
-def _configuration_text(configuration: tuple[str, ...]) -> str:
-    """Most runs come to the same ones again and again."""
+@lru_cache(maxsize=256)
+def _paths_text(configuration: tuple[str, ...]) -> str:
+    """Most runs come back to the same few configurations."""
     return text_of(configuration)

@@ -12,9 +12,11 @@ from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
 from dsc.events import GAVE_UP, NO_PLAN, RESERVED, Event
+from dsc.sequencer import together
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
+from dsc.sequencer.inbox import Inbox
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, plain
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.resuming import require_components, take_up
@@ -85,10 +87,10 @@ class Sequencer:
         self.store = store
         if store is not None:
             self.trace.listen(store.hear)
-        self._inbox: asyncio.Queue[Message] = asyncio.Queue()
-        self.dispatcher = Dispatcher(components, clock, self._inbox.put_nowait, part_of)
+        self._inbox = Inbox()
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put, part_of)
         self._open_ended = open_ended
-        self._coming = Coming(clock, self._inbox.put_nowait)
+        self._coming = Coming(clock, self._inbox.put)
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
@@ -120,7 +122,7 @@ class Sequencer:
             "active": list(self.machine.state.configuration()),
             "working": [f"{start.component}.{start.skill}" for start in self.dispatcher.started()],
             "in_use": sorted(self.dispatcher.in_use),
-            "waiting": self._inbox.qsize(),
+            "waiting": len(self._inbox),
             "knowledge_version": self.knowledge.version,
         }
 
@@ -193,7 +195,9 @@ class Sequencer:
                 if self._idle():
                     reactor.problem = "nothing is going on and nothing can happen any more"
                     break
-                message = await self._inbox.get()
+                if not self._inbox:
+                    await self._inbox.filled()
+                message = self._inbox.take()
                 for wait in self._before_events:
                     await wait()
                 self._take(message)
@@ -251,11 +255,20 @@ class Sequencer:
             output = self._reactor.react(message)
         else:
             with self.store.writing():
-                output = self._reactor.react(message)
-                self._keep_step(message, output)
+                output = self._react_and_keep(message)
+                for _ in range(together.MOST - 1):
+                    if self._before_events or not together.may_wait(message, output, self._reactor, self._inbox):
+                        break
+                    message = self._inbox.take()
+                    output = self._react_and_keep(message)
         if isinstance(message, SkillMessage) and message.final:
             (self.dispatcher.stop if message.goes_on else self.dispatcher.settle)(message.start)
         self._carry_out(output)
+
+    def _react_and_keep(self, message: Message) -> tuple[Output, ...]:
+        output = self._reactor.react(message)
+        self._keep_step(message, output)
+        return output
 
     def _leave(self) -> None:
         """Nothing is dispatched that could not be committed: a store that was lost has somebody else's run."""
@@ -287,7 +300,7 @@ class Sequencer:
 
     def _hand_in(self, message: Event | KnowledgeMessage, after: float) -> None:
         if after <= 0:
-            self._inbox.put_nowait(message)
+            self._inbox.put(message)
             return
         self._last_late += 1
         late, due = LateMessage(message, self._last_late), self._clock.now() + after
@@ -298,7 +311,6 @@ class Sequencer:
 
     def _idle(self) -> bool:
         """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
-        if self._open_ended or not self._inbox.empty():
+        if self._open_ended or self._inbox or self._coming or self.dispatcher.waiting:
             return False
-        in_vain = self._reactor.in_vain
-        return not (self.dispatcher.waiting or bool(self._coming) or not self.dispatcher.timers.periods <= in_vain)
+        return self.dispatcher.timers.periods <= self._reactor.in_vain

@@ -83,7 +83,7 @@ class StepTracer:
 
     def decisions(self, step: Step) -> None:
         """What dynamic states chose in this macrostep, and why."""
-        for made in step.decisions:
+        for made in step.decisions if self._trace.heard else ():
             decision = made.decision
             self._trace.record(
                 "decision",
@@ -100,7 +100,7 @@ class StepTracer:
 
     def knowledge(self, change: Change) -> None:
         """A committed change of the knowledge base, if any; what nothing else led to is itself a cause."""
-        if not change.delta:
+        if not (change.delta and self._trace.heard):
             return
         said = delta_form(change.delta)
         seq = self._trace.record("knowledge", version=change.version, author=change.author, **said)

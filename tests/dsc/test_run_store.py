@@ -112,6 +112,36 @@ def test_nothing_is_started_that_is_not_committed(tmp_path):
     assert all(committed == [started] for started, committed in seen)
 
 
+def test_events_that_let_nothing_leave_are_committed_together_and_with_what_leaves_then(tmp_path):
+    seen = []
+
+    def committed():
+        with archive(tmp_path / "run.kb") as runs:
+            return len(list(runs.steps(1)))
+
+    class Watching(Robot):
+        @skill(outcomes={"did": {}}, after_crash="same_id")
+        async def work(self, call):
+            seen.append(committed())
+            return Outcome("did")
+
+    def prepare(sequencer):
+        for name in ("on", "on", "go"):
+            sequencer.post(Event(name))
+        sequencer.listen(lambda step: seen.append(committed() if step.event is not None else 0))
+
+    chart = """
+        plot: p
+        receives: {on: null, go: null}
+        states:
+          a: {on: {on: a, go: b}}
+          b: {entry: {trigger: robot.work}, on: {did: e}}
+          e: {final: true}
+    """
+    assert Run(tmp_path, [chart], robot=Watching(), prepare=prepare).end.finished
+    assert seen == [0, 1, 1, 1, 4, 4]  # the start alone; three events at once; the action, and then its answer
+
+
 def test_what_is_in_force_is_told_again_before_anything_goes_on(tmp_path):
     chart = """
         plot: p

@@ -457,3 +457,27 @@ def test_what_is_wrong_is_refused_at_once_however_late_it_would_come():
             sequencer.change(Delta(added=(Fact("nonsense"),)), "me", after=5)
 
     assert Ran(GRASP, prepare=prepare).at == pytest.approx(2)
+
+
+def test_plots_that_share_knowledge_see_what_the_others_told_with_their_next_event():
+    kb = KnowledgeBase(SCHEMA)
+    library = Library([plot("""
+        plot: p
+        receives: {say: null, look: null}
+        states:
+          a: {on: {say: {to: a, tell: (p)}, look: [{to: e, when: (p)}, a]}}
+          e: {final: true}
+    """)])
+
+    async def main():
+        clock = LoopClock()
+        one, other = (Sequencer(library, kb, [], clock, open_ended=True) for _ in range(2))
+        other.post(Event("look"))
+        one.post(Event("say"), after=1)
+        other.post(Event("look"), after=2)
+        one.post(Event("look"), after=3)
+        return await asyncio.gather(one.run("p"), other.run("p")), clock.now()
+
+    ends, at = run_simulated(main())
+    assert [end.finished for end in ends] == [True, True]
+    assert at == pytest.approx(3)

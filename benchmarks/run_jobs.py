@@ -1,0 +1,175 @@
+"""What is timed of a run: engine, queue, sequencer and store, each alone or one around the other."""
+
+from __future__ import annotations
+
+import asyncio
+import sqlite3
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from timing import Job
+
+from dsc.calls import Outcome, SkillCall
+from dsc.components.component import Component
+from dsc.dynamic.library import Library
+from dsc.dynamic.situation import KnowledgeSituation
+from dsc.engine.machine import Machine
+from dsc.engine.steps import Start
+from dsc.events import Event
+from dsc.model.plot import ActionPlot
+from dsc.sequencer.clock import LoopClock, run_real
+from dsc.sequencer.run_store import RunStore
+from dsc.sequencer.sequencer import Sequencer
+from dsc.skills import skill
+from knowledge_base import KnowledgeBase, Schema
+from knowledge_base.journal.file import Durability
+
+SCHEMA = Schema.parse("(define (domain bench))")
+PING, STOP = Event("ping"), Event("stop")
+EVENTS = ActionPlot.model_validate({
+    "plot": "events", "receives": {"ping": None, "stop": None}, "parameters": {"n": "number"},
+    "states": {
+        "a": {"on": {"ping": "b", "stop": "e"}}, "b": {"on": {"ping": "a", "stop": "e"}}, "e": {"final": True},
+    },
+})  # fmt: skip
+ANSWERS = ActionPlot.model_validate({
+    "plot": "answers", "parameters": {"n": "number"}, "variables": {"k": {"type": "number", "initial": 1}},
+    "states": {
+        "a": {
+            "entry": [{"trigger": "robot.work"}],
+            "on": {"did": [{"to": "a", "when": "(< ?k ?n)", "assign": {"k": "(+ ?k 1)"}}, "e"]},
+        },
+        "e": {"final": True},
+    },
+})  # fmt: skip
+LIBRARY = Library([EVENTS, ANSWERS])
+DURABILITIES: tuple[Durability, ...] = ("process", "power")
+ENGINE, HOP, NO_STORE = "engine alone", "queue hop", "no store"
+ONE, MANY, ANSWER = "an event, one at a time", "events that wait together", "a skill's answer and the next skill"
+CASES = (ONE, MANY, ANSWER)
+ROW = "x" * 400
+"""About as much as a macrostep writes."""
+
+
+class Robot(Component):
+    """Its work is done at once."""
+
+    name = "robot"
+
+    @skill(outcomes={"did": {}}, after_crash="repeat")
+    async def work(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+        return Outcome("did")
+
+
+def bare(durability: Durability) -> str:
+    """The column of one commit without anything around it."""
+    return f"bare commit, {durability}"
+
+
+class Bench:
+    """The jobs; files are made in `folder`, a new one whenever a job is prepared."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._numbers = count()
+
+    def jobs(self, case: str) -> dict[str, Job]:
+        """Everybody who is timed in a case, by column."""
+        jobs = {ENGINE: Job(_answered if case == ANSWER else _moved), HOP: Job(_hops), NO_STORE: self._run(case, None)}
+        for durability in DURABILITIES:
+            jobs[durability] = self._run(case, durability)
+            jobs[bare(durability)] = Job(_commits, prepare=lambda n, d=durability: (n, self._bare(d)))
+        return jobs
+
+    def _run(self, case: str, durability: Durability | None) -> Job:
+        def prepare(times: int) -> Any:
+            if durability is None:
+                return times, KnowledgeBase(SCHEMA), None
+            path = self._file()
+            kb = KnowledgeBase.open(SCHEMA, path, durability)
+            return times, kb, RunStore(kb, path)
+
+        def run(prepared: Any) -> None:
+            times, kb, store = prepared
+
+            async def main() -> None:
+                sequencer = Sequencer(LIBRARY, kb, [Robot()], LoopClock(), store=store, open_ended=case == ONE)
+                plot = ANSWERS if case == ANSWER else EVENTS
+                running = asyncio.get_running_loop().create_task(sequencer.run(plot.name, {"n": times}))
+                if case == ONE:
+                    await _one_at_a_time(sequencer, times)
+                elif case == MANY:
+                    for _ in range(times):
+                        sequencer.post(PING)
+                    sequencer.post(STOP)
+                end = await running
+                assert end.finished, end
+
+            run_real(main())
+            kb.close()
+
+        return Job(run, prepare=prepare)
+
+    def _bare(self, durability: Durability) -> sqlite3.Connection:
+        connection = sqlite3.connect(self._file(), isolation_level=None)
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute(f"PRAGMA synchronous = {'FULL' if durability == 'power' else 'NORMAL'}")
+        connection.execute("CREATE TABLE rows (number INTEGER PRIMARY KEY, text TEXT)")
+        return connection
+
+    def _file(self) -> Path:
+        return self._folder / f"{next(self._numbers)}.kb"
+
+
+async def _one_at_a_time(sequencer: Sequencer, times: int) -> None:
+    """Each event waits until the macrostep of the one before is over: there and back, which is two hops."""
+    done: asyncio.Queue[None] = asyncio.Queue()
+    sequencer.listen(lambda _: done.put_nowait(None))
+    await done.get()  # the start
+    for _ in range(times):
+        sequencer.post(PING)
+        await done.get()
+    sequencer.post(STOP)
+
+
+def _moved(times: int) -> None:
+    kb, machine = KnowledgeBase(SCHEMA), Machine(LIBRARY)
+    machine.start(EVENTS.name, {"n": times}, KnowledgeSituation(kb, LIBRARY))
+    for _ in range(times):
+        machine.send(PING, KnowledgeSituation(kb, LIBRARY))
+
+
+def _answered(times: int) -> None:
+    kb, machine = KnowledgeBase(SCHEMA), Machine(LIBRARY)
+    step = machine.start(ANSWERS.name, {"n": times + 1}, KnowledgeSituation(kb, LIBRARY))
+    for _ in range(times):
+        start = next(one for one in step.output if isinstance(one, Start))
+        step = machine.send(Event("did", to=start.activation), KnowledgeSituation(kb, LIBRARY))
+
+
+def _hops(times: int) -> None:
+    async def main() -> None:
+        there: asyncio.Queue[int] = asyncio.Queue()
+        back: asyncio.Queue[int] = asyncio.Queue()
+
+        async def answer() -> None:
+            for _ in range(times // 2 + 1):
+                back.put_nowait(await there.get())
+
+        task = asyncio.get_running_loop().create_task(answer())
+        for number in range(times // 2 + 1):  # two hops each
+            there.put_nowait(number)
+            await back.get()
+        await task
+
+    run_real(main())
+
+
+def _commits(prepared: tuple[int, sqlite3.Connection]) -> None:
+    times, connection = prepared
+    for _ in range(times):
+        connection.execute("BEGIN IMMEDIATE")
+        connection.execute("INSERT INTO rows (text) VALUES (?)", (ROW,))
+        connection.execute("COMMIT")
+    connection.close()
