@@ -150,7 +150,7 @@ def _fleet(what: str, folder: Path | None, plots: int, seconds: float, rate: flo
                 for one, robot in zip(runs, robots, strict=True):
                     await _past(one, robot, chance.randrange(PAST) if folder and plots > 1 else 10)
                 gc.collect()
-                gc.freeze()  # as an `Executive` does: what is there stays, and need not be looked through again and again
+                gc.freeze()  # as an `Executive` does: what is there stays, and need not be looked through
                 held = (_memory() - before) / plots
                 group.create_task(_events(runs, robots, clock, round(seconds * rate), rate, chance))
             return held
