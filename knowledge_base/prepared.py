@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from threading import RLock
 from typing import Any
 
@@ -12,16 +12,20 @@ from knowledge_base.facts import Value
 from knowledge_base.inputs import require_params, shown
 from knowledge_base.language.asking import asked, queried
 from knowledge_base.language.author import MISSING
+from knowledge_base.language.check import Free
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.source import Source, condition_source, query_source
 from knowledge_base.questions import Questions
+from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
 
 Binding = dict[str, Value]
 """One answer of a query: variables' names (without `?`) with their values."""
 Asking = Callable[..., bool]
 Querying = Callable[..., list[Binding]]
+
+Names = tuple[str, ...]
 
 _Key = tuple[str | int, ...]
 _MOST_KEPT = 4096
@@ -44,8 +48,82 @@ class Prepared:
     ask: Asking
 
 
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """A way to ask: is it true, or who makes it true.
+
+    Attributes:
+        free: what free variables without a value are.
+        checked: reads and checks a text.
+        write: makes a plain question source.
+        closure: a function of world and bindings that answers any.
+        sources: what was written, once for all worlds of a schema, past ones too.
+    """
+
+    free: Free
+    checked: Callable[[Questions, str | Expression, Mapping[str, Value], WorldState], Expression]
+    write: Callable[[Expression, Schema, Names], Source | None]
+    closure: Callable[[Expression, Schema, Names], Callable[[WorldState, Mapping[str, Value]], Any]]
+    sources: IdentityCache[Expression, dict[Names, Source | None]] = field(default_factory=IdentityCache)
+
+    def source(self, e: Expression, schema: Schema, names: Names) -> Source | None:
+        """The source of the question; `None` if it is not plain."""
+        written = self.sources.find(e, schema)
+        if written is None:
+            written = self.sources.keep(e, schema, {})
+        if names not in written:
+            written[names] = self.write(e, schema, names)
+        return written[names]
+
+
+_ASK = _Way("error", Questions.condition, condition_source, lambda e, schema, _: asked(e, schema).holds)
+_QUERY = _Way("answers", Questions.query, query_source, lambda e, schema, names: queried(e, schema, names).answers)
+
+
+class _Ready:
+    """The questions that were asked of a world in one way, as functions of their parameters' values."""
+
+    def __init__(self, way: _Way, state: WorldState, lock: RLock, questions: Questions) -> None:
+        self._way = way
+        self._state = state
+        self._lock = lock
+        self._questions = questions
+        self._kept: dict[_Key, tuple[object, Callable[..., Any]]] = {}  # who lives has its identity for itself
+
+    def of(self, text: str | Expression, params: Mapping[str, Value]) -> Callable[..., Any]:
+        """The function for that question; made when it is asked for the first time."""
+        key = (text if type(text) is str else id(text), *params)
+        found = self._kept.get(key)
+        if found is None:
+            with self._lock:
+                if len(self._kept) >= _MOST_KEPT:
+                    self._kept.clear()
+                given = self._questions.given(text, params, self._state, self._way.free)
+                found = self._kept[key] = text, self._made(text, given)
+        return found[1]
+
+    def _made(self, text: str | Expression, params: Mapping[str, Value]) -> Callable[..., Any]:
+        way, state, lock, names = self._way, self._state, self._lock, tuple(params)
+        e = way.checked(self._questions, text, params, state)
+
+        def judge(values: tuple[Value, ...]) -> None:
+            _given(names, tuple(value for value in values if value is not MISSING))
+
+        source = way.source(e, state.schema, names)
+        if source is not None:
+            return source.bound(state, lock=lock, judge=judge)
+        answer = way.closure(e, state.schema, names)
+
+        def question(*values: Value) -> Any:
+            given = _given(names, values)
+            with lock:
+                return answer(state, given)
+
+        return question
+
+
 class ReadyQuestions:
-    """The questions that were asked of a world, as functions of their parameters' values.
+    """The questions that were asked of a world.
 
     Plain ones are answered by generated code (`language.source`), the others by closures.
 
@@ -53,44 +131,16 @@ class ReadyQuestions:
         state: the world; it stays the same object while it changes.
         lock: held while it changes.
         questions: reads and checks texts.
+
+    Attributes:
+        asking: gives, for a text and parameters, a function of their values that says whether the condition is true;
+            errors as for `View.ask`.
+        querying: one that gives the values of the other free variables; errors as for `View.query`.
     """
 
     def __init__(self, state: WorldState, lock: RLock, questions: Questions) -> None:
-        self._state = state
-        self._lock = lock
-        self._questions = questions
-        self._asks: dict[_Key, tuple[object, Asking]] = {}  # a question lives as long as its identity is a key
-        self._queries: dict[_Key, tuple[object, Querying]] = {}
-
-    def asking(self, text: str | Expression, params: Mapping[str, Value]) -> Asking:
-        """A function of the parameters' values that says whether the condition is true.
-
-        Raises:
-            UnknownNameError, SchemaError, InputError: as for `View.ask`.
-        """
-        key = (text if type(text) is str else id(text), *params)
-        found = self._asks.get(key)
-        if found is None:
-            with self._lock:
-                given = self._questions.given(text, params, self._state, "error")
-                found = self._asks[key] = text, self._ask(text, given)
-                _limit(self._asks)
-        return found[1]
-
-    def querying(self, text: str | Expression, params: Mapping[str, Value]) -> Querying:
-        """A function of the parameters' values that gives those of the other free variables.
-
-        Raises:
-            UnknownNameError, SchemaError, InputError: as for `View.query`.
-        """
-        key = (text if type(text) is str else id(text), *params)
-        found = self._queries.get(key)
-        if found is None:
-            with self._lock:
-                given = self._questions.given(text, params, self._state, "answers")
-                found = self._queries[key] = text, self._query(text, given)
-                _limit(self._queries)
-        return found[1]
+        self.asking: Callable[..., Asking] = _Ready(_ASK, state, lock, questions).of
+        self.querying: Callable[..., Querying] = _Ready(_QUERY, state, lock, questions).of
 
     def prepared(self, text: str | Expression, parameters: Iterable[str]) -> Prepared:
         """The question with a place for each of its parameters; errors as for `querying`."""
@@ -109,42 +159,6 @@ class ReadyQuestions:
 
         return Prepared(text, names, query, ask)
 
-    def _ask(self, text: str | Expression, params: Mapping[str, Value]) -> Asking:
-        names, state, lock = tuple(params), self._state, self._lock
-        e = self._questions.condition(text, params, state)
-        source = _source(_conditions, condition_source, e, state, names)
-        if source is not None:
-            return self._bound(source, names)
-        holds = asked(e, state.schema).holds
-
-        def ask(*values: Value) -> bool:
-            given = _given(names, values)
-            with lock:
-                return holds(state, given)
-
-        return ask
-
-    def _query(self, text: str | Expression, params: Mapping[str, Value]) -> Querying:
-        names, state, lock = tuple(params), self._state, self._lock
-        e = self._questions.query(text, params, state)
-        source = _source(_queries, query_source, e, state, names)
-        if source is not None:
-            return self._bound(source, names)
-        answers = queried(e, state.schema, names).answers
-
-        def query(*values: Value) -> list[Binding]:
-            given = _given(names, values)
-            with lock:
-                return answers(state, given)
-
-        return query
-
-    def _bound(self, source: Source, names: tuple[str, ...]) -> Callable[..., Any]:
-        def judge(values: tuple[Value, ...]) -> None:
-            _given(names, tuple(value for value in values if value is not MISSING))
-
-        return source.bound(self._state, lock=self._lock, judge=judge)
-
 
 def _given(names: tuple[str, ...], values: tuple[Value, ...]) -> dict[str, Value]:
     """The values by the parameters' names, judged."""
@@ -154,30 +168,3 @@ def _given(names: tuple[str, ...], values: tuple[Value, ...]) -> dict[str, Value
     given = dict(zip(names, values, strict=True))
     require_params(given)
     return given
-
-
-_Sources = dict[tuple[str, ...], Source | None]
-_conditions: IdentityCache[Expression, _Sources] = IdentityCache()
-_queries: IdentityCache[Expression, _Sources] = IdentityCache()
-
-
-def _source(
-    cache: IdentityCache[Expression, _Sources],
-    write: Callable[..., Source | None],
-    e: Expression,
-    state: WorldState,
-    names: tuple[str, ...],
-) -> Source | None:
-    """Written once for all worlds of a schema, past ones too."""
-    schema = state.schema
-    written = cache.find(e, schema)
-    if written is None:
-        written = cache.keep(e, schema, {})
-    if names not in written:
-        written[names] = write(e, schema, names)
-    return written[names]
-
-
-def _limit(kept: dict[_Key, Any]) -> None:
-    if len(kept) > _MOST_KEPT:
-        kept.clear()

@@ -9,7 +9,17 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 from domains.clean_up_table.places import PLACES, distance
-from domains.clean_up_table.skills import ITEM_AT, ITEM_IN, NOT_POSSIBLE, ONCE, Arm, Base, Camera, outcome_of, seconds
+from domains.clean_up_table.skills import (
+    Arm,
+    Base,
+    Camera,
+    drives,
+    outcome_of,
+    picks_up,
+    recognises,
+    seconds,
+    takes_out,
+)
 from dsc.calls import Outcome, SkillCall
 from dsc.components.parameters import Parameter
 from dsc.skills import skill
@@ -28,16 +38,7 @@ class Tracks(Base):
         "patience": seconds(8.0),
     }
 
-    @skill(
-        outcomes={
-            "arrived": {"to": "place"},
-            "no_path": {"to": "place"},
-            "slipped": {"item": "item", "surface": "surface", "to": "place"},
-            "not_possible": NOT_POSSIBLE,
-        },
-        types={"to": "place"},
-        after_crash=ONCE,
-    )
+    @drives
     async def drive(self, call: SkillCall, to: str) -> Outcome:
         """Turn, drive to a place, and if the way is blocked wait and try once more."""
         metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
@@ -59,32 +60,12 @@ class SuctionArm(Arm):
     }
     relations = ("(<= ?lifts (* 0.025 ?vacuum))",)
 
-    @skill(
-        outcomes={
-            "picked_up": ITEM_AT,
-            "grasp_failed": ITEM_AT,
-            "no_ik": ITEM_AT,
-            "gone": ITEM_AT,
-            "not_possible": NOT_POSSIBLE,
-        },
-        types=ITEM_AT,
-        after_crash=ONCE,
-    )
+    @picks_up
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Pick an item, with everything in it, up from a surface."""
         return await self._held(call, lambda action_id: self.world.pick_up(action_id, item, surface))
 
-    @skill(
-        outcomes={
-            "taken_out": ITEM_IN,
-            "grasp_failed": ITEM_IN,
-            "no_ik": ITEM_IN,
-            "gone": ITEM_AT,
-            "not_possible": NOT_POSSIBLE,
-        },
-        types=ITEM_IN,
-        after_crash=ONCE,
-    )
+    @takes_out
     async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Take an item out of its carrier on a surface; `gone` names the carrier."""
         return await self._held(call, lambda action_id: self.world.take_out(action_id, item, carrier, surface))
@@ -108,15 +89,7 @@ class SuctionArm(Arm):
 class PatientCamera(Camera):
     """A camera that looks a second time before it says that nothing is there."""
 
-    @skill(
-        outcomes={
-            "recognised": {"surface": "surface", "count": None},
-            "nothing_found": {"surface": "surface"},
-            "not_possible": NOT_POSSIBLE,
-        },
-        types={"surface": "surface"},
-        after_crash=ONCE,
-    )
+    @recognises
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
         """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
         await call.clock.sleep(self.parameters["recognising"])

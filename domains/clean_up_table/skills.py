@@ -38,6 +38,55 @@ NOT_POSSIBLE: dict[str, str | None] = {"reason": None}
 ONCE: AfterCrash = "same_id"
 """The world does each id once."""
 
+drives = skill(
+    outcomes={
+        "arrived": {"to": "place"},
+        "no_path": {"to": "place"},
+        "slipped": {"item": "item", "surface": "surface", "to": "place"},
+        "not_possible": NOT_POSSIBLE,
+    },
+    types={"to": "place"},
+    after_crash=ONCE,
+)
+"""What every base says of driving."""
+
+picks_up = skill(
+    outcomes={
+        "picked_up": ITEM_AT,
+        "grasp_failed": ITEM_AT,
+        "no_ik": ITEM_AT,
+        "gone": ITEM_AT,
+        "not_possible": NOT_POSSIBLE,
+    },
+    types=ITEM_AT,
+    after_crash=ONCE,
+)
+"""What every arm says of picking up."""
+
+takes_out = skill(
+    outcomes={
+        "taken_out": ITEM_IN,
+        "grasp_failed": ITEM_IN,
+        "no_ik": ITEM_IN,
+        "gone": ITEM_AT,
+        "not_possible": NOT_POSSIBLE,
+    },
+    types=ITEM_IN,
+    after_crash=ONCE,
+)
+"""What every arm says of taking out."""
+
+recognises = skill(
+    outcomes={
+        "recognised": {"surface": "surface", "count": None},
+        "nothing_found": {"surface": "surface"},
+        "not_possible": NOT_POSSIBLE,
+    },
+    types={"surface": "surface"},
+    after_crash=ONCE,
+)
+"""What every camera says of recognising."""
+
 
 class Base(Component):
     """The mobile base."""
@@ -53,16 +102,7 @@ class Base(Component):
         super().__init__(name)
         self.world = world
 
-    @skill(
-        outcomes={
-            "arrived": {"to": "place"},
-            "no_path": {"to": "place"},
-            "slipped": {"item": "item", "surface": "surface", "to": "place"},
-            "not_possible": NOT_POSSIBLE,
-        },
-        types={"to": "place"},
-        after_crash=ONCE,
-    )
+    @drives
     async def drive(self, call: SkillCall, to: str) -> Outcome:
         """Drive to a place; a held item may slip, and then robot and item are at the floor."""
         metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
@@ -86,17 +126,7 @@ class Arm(Component):
         super().__init__(name)
         self.world = world
 
-    @skill(
-        outcomes={
-            "picked_up": ITEM_AT,
-            "grasp_failed": ITEM_AT,
-            "no_ik": ITEM_AT,
-            "gone": ITEM_AT,
-            "not_possible": NOT_POSSIBLE,
-        },
-        types=ITEM_AT,
-        after_crash=ONCE,
-    )
+    @picks_up
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Pick an item, with everything in it, up from a surface."""
         await call.clock.sleep(self.parameters["grasping"])
@@ -123,17 +153,7 @@ class Arm(Component):
         await call.clock.sleep(self.parameters["stacking"])
         return outcome_of(self.world.stack(call.action_id, item, carrier, surface))
 
-    @skill(
-        outcomes={
-            "taken_out": ITEM_IN,
-            "grasp_failed": ITEM_IN,
-            "no_ik": ITEM_IN,
-            "gone": ITEM_AT,
-            "not_possible": NOT_POSSIBLE,
-        },
-        types=ITEM_IN,
-        after_crash=ONCE,
-    )
+    @takes_out
     async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Take an item out of its carrier on a surface; `gone` names the carrier."""
         await call.clock.sleep(self.parameters["grasping"])
@@ -172,15 +192,7 @@ class Camera(Component):
         self.world = world
         self.believed = believed
 
-    @skill(
-        outcomes={
-            "recognised": {"surface": "surface", "count": None},
-            "nothing_found": {"surface": "surface"},
-            "not_possible": NOT_POSSIBLE,
-        },
-        types={"surface": "surface"},
-        after_crash=ONCE,
-    )
+    @recognises
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
         """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
         await call.clock.sleep(self.parameters["recognising"])
