@@ -54,7 +54,9 @@ class KnowledgeBase(Observable):
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
-        self._turn = RLock()  # to change something or ask for the past; taken before the lock, which all who ask need
+        # To change something or ask for the past; taken before the lock, which all who ask need. Without a file there
+        # is no `together` to wait for: then one lock is fairer to those who change among many who ask.
+        self._turn = self._lock if isinstance(self._history, MemoryHistory) else RLock()
 
     @classmethod
     def open(
