@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from threading import RLock
 
 from knowledge_base.facts import Change
+from knowledge_base.turn import Turn
 
 Listener = Callable[[Change], None]
 
@@ -20,7 +20,7 @@ class Announcer:
     while another one delivers leaves its change to that thread.
     """
 
-    def __init__(self, lock: RLock) -> None:
+    def __init__(self, lock: Turn) -> None:
         self._lock = lock
         self._listeners: dict[int, Listener] = {}
         self._next_key = 0

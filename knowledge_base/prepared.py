@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from threading import RLock
 from typing import Any
 
 from knowledge_base.errors import InputError, UnknownNameError
@@ -19,6 +18,7 @@ from knowledge_base.language.source import Source, condition_source, query_sourc
 from knowledge_base.questions import Questions
 from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
+from knowledge_base.turn import Turn
 
 Binding = dict[str, Value]
 """One answer of a query: variables' names (without `?`) with their values."""
@@ -83,7 +83,7 @@ _QUERY = _Way("answers", Questions.query, query_source, lambda e, schema, names:
 class _Ready:
     """The questions that were asked of a world in one way, as functions of their parameters' values."""
 
-    def __init__(self, way: _Way, state: WorldState, lock: RLock, questions: Questions) -> None:
+    def __init__(self, way: _Way, state: WorldState, lock: Turn, questions: Questions) -> None:
         self._way = way
         self._state = state
         self._lock = lock
@@ -138,7 +138,7 @@ class ReadyQuestions:
         querying: one that gives the values of the other free variables; errors as for `View.query`.
     """
 
-    def __init__(self, state: WorldState, lock: RLock, questions: Questions) -> None:
+    def __init__(self, state: WorldState, lock: Turn, questions: Questions) -> None:
         self.asking: Callable[..., Asking] = _Ready(_ASK, state, lock, questions).of
         self.querying: Callable[..., Querying] = _Ready(_QUERY, state, lock, questions).of
 

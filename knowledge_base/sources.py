@@ -7,7 +7,6 @@ and by installed conditions, at the present version; no version, change or journ
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from threading import RLock
 from types import TracebackType
 from typing import Self
 
@@ -18,6 +17,7 @@ from knowledge_base.content import require_content
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.facts import Content, Fact
 from knowledge_base.state import WorldState
+from knowledge_base.turn import Turn
 from knowledge_base.world_graph import WorldGraph
 
 
@@ -93,7 +93,7 @@ class Sources:
         graph: Callable[[], WorldGraph | None],
         installed: Installed,
         announcer: Announcer,
-        lock: RLock,
+        lock: Turn,
     ) -> None:
         self._state, self._graph, self._installed = state, graph, installed
         self._announcer, self._lock = announcer, lock

@@ -3,22 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
 
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.index import FactIndex
 from knowledge_base.schema import Schema
-
-
-@dataclass(slots=True)
-class Stamp:
-    """The version of a world, by which who reads a few facts without a lock knows that they are of one version.
-
-    Attributes:
-        version: `None` while a change is being made.
-    """
-
-    version: int | None = 0
+from knowledge_base.turn import Stamp
 
 
 class WorldState:

@@ -7,7 +7,7 @@ import time as wall
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import RLock, get_ident
+from threading import get_ident
 from types import TracebackType
 from typing import Self, get_args
 
@@ -35,8 +35,9 @@ Now = Callable[[], float]
 class KnowledgeBase(Observable):
     """A world model that may be asked and changed from several threads.
 
-    One lock orders everything: a question sees one version and its answer is a finished list; a change is
-    made as a whole or, with an error, not at all. Listeners are called when the lock is released.
+    One lock orders everything, and all get it in turn (`turn`): a question sees one version and its answer is a
+    finished list; a change is made as a whole or, with an error, not at all. Listeners are called when the lock is
+    released.
 
     Made like this it is in memory only and remembers its last changes; `open` makes one that lasts.
 
@@ -54,9 +55,6 @@ class KnowledgeBase(Observable):
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
-        # To change something or ask for the past; taken before the lock, which all who ask need. Without a file there
-        # is no `together` to wait for: then one lock is fairer to those who change among many who ask.
-        self._turn = self._lock if isinstance(self._history, MemoryHistory) else RLock()
 
     @classmethod
     def open(
@@ -130,7 +128,7 @@ class KnowledgeBase(Observable):
         super().close()
         for source in self.sources():
             source.close()
-        with self._turn, self._lock:
+        with self._lock.changing():
             self._history.close()
 
     def refresh(self) -> int:
@@ -144,7 +142,7 @@ class KnowledgeBase(Observable):
             HistoryError: the writer has compacted what was not taken in yet; open the store anew.
             StoreError: the file cannot be read, or the writer has a longer schema now; likewise.
         """
-        with self._lock:
+        with self._lock.changing():
             self._require_free()
             for change in self._history.later(self._version):
                 self._time = change.time
@@ -173,13 +171,13 @@ class KnowledgeBase(Observable):
         """
         _require_names(author, key)
         try:
-            with self._turn, self._lock:
+            with self._lock.changing():
                 self._require_free()
                 first = self._first(key, expect)
                 transaction = Transaction(Overlay(self._state), self._questions, first)
                 self._writer = (get_ident(), author)
                 try:
-                    with self._announcer.quiet():
+                    with self._announcer.quiet(), self._lock.ajar():
                         yield transaction
                 finally:
                     self._writer = None
@@ -212,7 +210,7 @@ class KnowledgeBase(Observable):
         """
         require_delta(delta)
         _require_names(author, key)
-        with self._turn, self._lock:
+        with self._lock.changing():
             self._require_free()
             change = self._first(key, expect)
             if change is None:
@@ -236,7 +234,7 @@ class KnowledgeBase(Observable):
                 further change is refused, and the file, opened anew, has what was before the block.
             ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
         """
-        with self._turn:
+        with self._lock.alone():
             self._require_free()
             with self._history.together() as connection:
                 yield connection
@@ -284,7 +282,7 @@ class KnowledgeBase(Observable):
             raise InputError("at(...) takes a version or a time")
         if version is None:
             require_time(time)
-        with self._turn:
+        with self._lock.alone():
             if version is None:
                 version = min(self._history.version_at(float(time or 0.0)), self._version)
             self._require_reached(version)
@@ -302,7 +300,7 @@ class KnowledgeBase(Observable):
             HistoryError: some of them are not kept any more, or are not there yet.
             InputError: one of the two is no version, or `until` is before `since`.
         """
-        with self._turn:
+        with self._lock.alone():
             self._require_reached(since)
             until = self._version if until is None else until
             self._require_reached(until)
@@ -319,7 +317,7 @@ class KnowledgeBase(Observable):
             InputError: it is no version.
             StoreError: the file cannot be written, or the knowledge base is closed.
         """
-        with self._turn, self._lock:
+        with self._lock.changing():
             self._require_open()
             version = self._version if keep_since is None else keep_since
             self._require_reached(version)
@@ -345,12 +343,11 @@ class KnowledgeBase(Observable):
         """The change is kept; make it, and queue what others have to be told."""
         effective = change.delta
         departures = self._installed.departures(effective)
-        self._state.stamp.version = None
         self._sources.close_about(effective.removed_nodes)
         self._state.commit(effective)
         if self._graph is not None:
             self._graph.commit(effective)
-        self._version = self._state.stamp.version = change.version
+        self._version = self._state.stamp.newest = change.version
         self._announcer.add(change)
         self._installed.commit(effective, departures, self._version)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from threading import RLock
 
 from knowledge_base.exchange.json import to_json
 from knowledge_base.exchange.problem_text import Metric
@@ -18,6 +17,7 @@ from knowledge_base.prepared import Binding, Prepared, ReadyQuestions
 from knowledge_base.questions import Questions
 from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
+from knowledge_base.turn import Turn
 from knowledge_base.world_graph import Graph, WorldGraph
 
 
@@ -28,7 +28,7 @@ class View:
     """
 
     def __init__(self, state: WorldState, version: int) -> None:
-        self._lock = RLock()
+        self._lock = Turn(state.stamp)
         self._state = state
         self._version = version
         self._questions = Questions()

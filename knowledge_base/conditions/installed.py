@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from threading import RLock
 
 from knowledge_base.announcement import Announcer
 from knowledge_base.conditions.clock import Clock
@@ -27,6 +26,7 @@ from knowledge_base.language.expression import Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.schema import Schema
 from knowledge_base.state import WorldState
+from knowledge_base.turn import Turn
 
 MORE, LESS = 1, -1
 
@@ -56,7 +56,7 @@ Event = tuple[Kind, str, Args, int]
 class Installed:
     """The relations of a knowledge base's conditions by shape; all but `later` and `deliver` under its lock."""
 
-    def __init__(self, world: WorldState, version: int, lock: RLock, announcer: Announcer) -> None:
+    def __init__(self, world: WorldState, version: int, lock: Turn, announcer: Announcer) -> None:
         self.lock = lock
         self.version = version
         self._world = world

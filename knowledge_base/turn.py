@@ -1,0 +1,239 @@
+"""Turns for many who ask and some who change: one lock that neither keeps the other from.
+
+Three rules make the order:
+
+- Who waits for the lock stands in line, first come, first served, whether to ask or to change something. Whoever comes
+  and finds the lock free may go first as long as the first in line has been that for less than `PATIENCE_S`; then all
+  join the line at its end. (To hand the lock from thread to thread each time costs more than most questions do.)
+- Of those who change something only one has the *turn*. It may keep that without the lock (`alone`); others who want to
+  change something wait apart meanwhile, and get the turn in order of arrival.
+- Most questions are answered without the lock as long as the *door* is open (`Stamp.version` is not `None`). A change
+  shuts it from when it stands in line until it is made, so that those questions take their place there, too. Otherwise
+  who asks without pause would hold Python's own lock (GIL), and a change would wait for that, 5 ms each time that it
+  touches a file or gets the lock from another thread.
+
+Re-entrance: a thread that holds the lock may take it again at once, and one that has the turn may take both. A thread
+that holds the lock only to ask cannot change anything; waiting for the turn it would keep out who has it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from threading import Condition, Lock, RLock, get_ident
+from time import monotonic
+from types import TracebackType
+from typing import NamedTuple
+
+from knowledge_base.errors import ConflictError
+
+PATIENCE_S = 0.0005
+"""How long the first in line lets others go first: a few changes' time, some times what handing the lock over takes."""
+
+
+@dataclass(slots=True)
+class Stamp:
+    """The version of a world, by which who reads a few facts without a lock knows that they are of one version.
+
+    Attributes:
+        version: `None` while a change is being made, or waits to be made.
+        newest: the version that was made last.
+    """
+
+    version: int | None = 0
+    newest: int = 0
+
+    def open(self) -> None:
+        """Who reads without the lock may go on."""
+        self.version = self.newest
+
+    def shut(self) -> None:
+        """Who reads has to take the lock."""
+        self.version = None
+
+
+class _Place(NamedTuple):
+    """Where a thread waits; its gate is opened when it is first in line."""
+
+    thread: int
+    gate: Lock
+
+
+def _place() -> _Place:
+    gate = Lock()
+    gate.acquire()
+    return _Place(get_ident(), gate)
+
+
+class Turn:
+    """The lock of a world; used as a context manager by who asks.
+
+    Args:
+        stamp: that of the world, for who reads without the lock.
+        patience_s: how long the first in line lets others go first, in seconds.
+    """
+
+    def __init__(self, stamp: Stamp, patience_s: float = PATIENCE_S) -> None:
+        self._stamp = stamp
+        self._patience_s = patience_s
+        self._lock = RLock()
+        self._owned = Condition(self._lock)  # nobody waits for it; it knows whose the lock is
+        self._guard = Lock()  # for what follows; held for a moment only
+        self._line: deque[_Place] = deque()
+        self._due = 0.0  # when the patience of the first in line is over
+        self._changers: deque[_Place] = deque()
+        self._changer: int | None = None  # who has the turn
+        self._depth = 0  # how often it was taken again
+        self._changes = 0  # how many keep the door shut
+
+    @property
+    def waiting(self) -> tuple[int, int]:
+        """How many threads stand in line, and how many wait for the turn to change something."""
+        with self._guard:
+            return len(self._line), len(self._changers)
+
+    def __enter__(self) -> None:
+        may_go = not self._line or monotonic() < self._due or self._held()
+        if not (may_go and self._lock.acquire(blocking=False)):
+            place = _place()
+            with self._guard:
+                self._join(place)
+            self._enter(place)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._lock.release()
+
+    @contextmanager
+    def changing(self) -> Iterator[None]:
+        """Nobody else changes anything or asks.
+
+        Raises:
+            ConflictError: this thread is inside a question.
+        """
+        self._take()
+        try:
+            yield
+        finally:
+            self._leave()
+            self._open()
+            self._lock.release()
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Nobody else changes anything; who asks may go on.
+
+        Raises:
+            ConflictError: this thread is inside a question.
+        """
+        self._take()
+        self._open()
+        self._lock.release()
+        try:
+            yield
+        finally:
+            self._leave()
+
+    @contextmanager
+    def ajar(self) -> Iterator[None]:
+        """Who reads without the lock may go on; used while changing, as long as nothing is changed."""
+        self._open()
+        try:
+            yield
+        finally:
+            self._shut()
+
+    def _take(self) -> None:
+        """Get the turn and the lock, and shut the door."""
+        mine = self._changer == get_ident()
+        if not mine and self._held():
+            raise ConflictError("a question is being answered in this thread; nothing can be changed meanwhile")
+        self._shut()
+        try:
+            self.__enter__()
+        except BaseException:
+            self._open()
+            raise
+        if mine:
+            self._depth += 1
+        else:
+            self._get_turn()
+
+    def _get_turn(self) -> None:
+        """Have the turn; if somebody is alone, leave the line and stand in it again when the turn has come."""
+        place = _place()
+        with self._guard:
+            if self._changer is None:
+                self._changer = place.thread
+                return
+            self._changers.append(place)
+        self._open()
+        self._lock.release()
+        try:
+            self._enter(place)
+        except BaseException:
+            with self._guard:
+                came = place not in self._changers
+                if not came:
+                    self._changers.remove(place)
+            if came:
+                self._leave()
+                self._open()
+            raise
+
+    def _leave(self) -> None:
+        """Give back the turn, to who has waited longest; that one is in line before this returns."""
+        if self._depth:
+            self._depth -= 1
+            return
+        with self._guard:
+            if not self._changers:
+                self._changer = None
+                return
+            place = self._changers.popleft()
+            self._changer = place.thread
+            self._changes += 1
+            self._stamp.shut()
+            self._join(place)
+
+    def _shut(self) -> None:
+        with self._guard:
+            self._changes += 1
+            self._stamp.shut()
+
+    def _open(self) -> None:
+        with self._guard:
+            self._changes -= 1
+            if not self._changes:
+                self._stamp.open()
+
+    def _join(self, place: _Place) -> None:
+        self._line.append(place)
+        if len(self._line) == 1:
+            self._call_first()
+
+    def _call_first(self) -> None:
+        self._due = monotonic() + self._patience_s
+        self._line[0].gate.release()
+
+    def _enter(self, place: _Place) -> None:
+        """Wait in line; who is first waits for the lock, and opens the gate of the next when it has it."""
+        try:
+            place.gate.acquire()
+            self._lock.acquire()
+        finally:  # also when it is interrupted
+            with self._guard:
+                if place in self._line:
+                    was_first = self._line[0] is place
+                    self._line.remove(place)
+                    if was_first and self._line:
+                        self._call_first()
+
+    def _held(self) -> bool:
+        """Whether this thread holds the lock."""
+        try:
+            self._owned.notify(0)
+        except RuntimeError:
+            return False
+        return True

@@ -1,0 +1,193 @@
+"""Who asks and who changes something take turns; neither keeps out the other, however often it comes."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+
+import pytest
+
+from knowledge_base import ConflictError, Delta, KnowledgeBase, Schema, fact
+from knowledge_base.turn import Stamp, Turn
+
+
+class Crowd:
+    """Threads that come one after the other, and the order in which they get in."""
+
+    def __init__(self) -> None:
+        self.stamp = Stamp()
+        self.turn = Turn(self.stamp, patience_s=0)
+        self.order: list[str] = []
+        self._threads: list[threading.Thread] = []
+
+    def asks(self, name: str, inside: Callable[[], None] | None = None) -> None:
+        self._comes(name, lambda: self.turn, inside)
+
+    def changes(self, name: str, inside: Callable[[], None] | None = None) -> None:
+        self._comes(name, self.turn.changing, inside)
+
+    def _comes(
+        self, name: str, enter: Callable[[], AbstractContextManager[None]], inside: Callable[[], None] | None
+    ) -> None:
+        def work() -> None:
+            with enter():
+                self.order.append(name)
+                if inside is not None:
+                    inside()
+
+        before = sum(self.turn.waiting)
+        thread = threading.Thread(target=work, daemon=True)
+        thread.start()
+        self._threads.append(thread)
+        while sum(self.turn.waiting) == before:
+            time.sleep(0)
+
+    def goes(self) -> list[str]:
+        for thread in self._threads:
+            thread.join(10)
+        assert not any(thread.is_alive() for thread in self._threads)
+        return self.order
+
+
+@pytest.fixture
+def crowd() -> Crowd:
+    return Crowd()
+
+
+def test_first_come_first_served(crowd: Crowd) -> None:
+    with crowd.turn.changing():
+        crowd.changes("change 1")
+        crowd.asks("question 1")
+        crowd.asks("question 2")
+        crowd.changes("change 2")
+        crowd.asks("question 3")
+    assert crowd.goes() == ["change 1", "question 1", "question 2", "change 2", "question 3"]
+
+
+def test_who_asks_again_and_again_waits_for_a_change(crowd: Crowd) -> None:
+    with crowd.turn:
+        crowd.asks("question 1", lambda: crowd.asks("question 3"))
+        crowd.changes("change")
+        crowd.asks("question 2")
+    assert crowd.goes() == ["question 1", "change", "question 2", "question 3"]
+
+
+def test_who_changes_again_and_again_waits_for_a_question(crowd: Crowd) -> None:
+    with crowd.turn.changing():
+        crowd.changes("change 1", lambda: crowd.changes("change 2"))
+        crowd.asks("question")
+    assert crowd.goes() == ["change 1", "question", "change 2"]
+
+
+def test_who_waits_for_the_end_of_a_long_turn_is_next(crowd: Crowd) -> None:
+    with crowd.turn.alone():
+        crowd.changes("change 1", lambda: crowd.changes("change 3"))
+        crowd.changes("change 2")
+        with crowd.turn:
+            crowd.asks("question")
+    assert crowd.goes() == ["question", "change 1", "change 2", "change 3"]
+
+
+def test_alone_means_that_others_ask_and_do_not_change(crowd: Crowd) -> None:
+    asked = threading.Event()
+    with crowd.turn.alone():
+        crowd.changes("change")
+
+        def ask() -> None:
+            with crowd.turn:
+                asked.set()
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        thread.join(10)
+        assert asked.is_set()
+        with crowd.turn.changing():
+            crowd.order.append("own change")
+    assert crowd.goes() == ["own change", "change"]
+
+
+def test_who_reads_without_the_lock_stops_when_a_change_waits(crowd: Crowd) -> None:
+    assert crowd.stamp.version == 0
+    with crowd.turn:
+        crowd.changes("change")
+        assert crowd.stamp.version is None
+    crowd.goes()
+    assert crowd.stamp.version == 0
+
+
+def test_the_lock_and_the_turn_may_be_taken_again(crowd: Crowd) -> None:
+    turn = crowd.turn
+    with turn.alone(), turn.changing(), turn.changing():
+        with turn, turn:
+            crowd.asks("question")
+        with turn:  # although somebody is in line already
+            pass
+    with turn, turn:
+        pass
+    assert crowd.goes() == ["question"]
+    assert turn.waiting == (0, 0)
+
+
+def test_nothing_is_changed_inside_a_question(crowd: Crowd) -> None:
+    with crowd.turn, pytest.raises(ConflictError, match="being answered in this thread"), crowd.turn.changing():
+        pass
+    with crowd.turn.changing():
+        pass
+
+
+def test_who_is_interrupted_while_waiting_keeps_nobody_waiting(crowd: Crowd, monkeypatch) -> None:
+    """An interrupt ends the wait at a gate with an exception."""
+
+    class Interrupted:
+        def __init__(self) -> None:
+            self.taken = False
+
+        def acquire(self) -> None:
+            if self.taken:
+                raise KeyboardInterrupt
+            self.taken = True
+
+        def release(self) -> None: ...
+
+    def waits(enter: Callable[[], AbstractContextManager[None]]) -> None:
+        with pytest.raises(KeyboardInterrupt), enter():
+            pass
+
+    with crowd.turn.changing():
+        with monkeypatch.context() as patch:
+            patch.setattr("knowledge_base.turn.Lock", Interrupted)
+            for enter in (lambda: crowd.turn, crowd.turn.changing):
+                thread = threading.Thread(target=waits, args=(enter,))
+                thread.start()
+                thread.join(10)
+        assert crowd.turn.waiting == (0, 0)
+        crowd.changes("change")
+    assert crowd.goes() == ["change"]
+
+
+@pytest.mark.parametrize("kept", ["in memory", "in a file"])
+def test_writers_get_on_among_readers_that_ask_without_pause(tmp_path, kept: str) -> None:
+    """Both sides are counted in what the other does meanwhile, not in time."""
+    schema = Schema.parse("(define (domain d) (:predicates (p) (q)))")
+    with KnowledgeBase.open(schema, tmp_path / "world.kb" if kept == "in a file" else None) as kb:
+        asked, stop = [0, 0], threading.Event()
+
+        def ask(number: int) -> None:
+            while not stop.is_set():
+                kb.ask("(p)")
+                asked[number] += 1
+
+        readers = [threading.Thread(target=ask, args=(number,)) for number in range(2)]
+        for reader in readers:
+            reader.start()
+        for number in range(200):
+            delta = Delta(added=(fact("p"),)) if number % 2 == 0 else Delta(removed=(fact("p"),))
+            kb.apply(delta, "writer")
+        during = list(asked)
+        stop.set()
+        for reader in readers:
+            reader.join(10)
+        assert kb.version == 200
+        assert all(during)
