@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dsc.model.plot import ActionPlot
     from dsc.text.neighbours import Neighbours
     from knowledge_base.errors import InputError
-    from knowledge_base.schema import Schema
+    from knowledge_base.world.schema import Schema
 
 app = typer.Typer(
     name="plot",
@@ -214,7 +214,7 @@ def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]
 
 
 def _schema(file: Path, domain: Path | None) -> Schema | None:
-    from knowledge_base.schema import Schema
+    from knowledge_base.world.schema import Schema
 
     if domain is not None:
         return Schema.from_pddl(domain)

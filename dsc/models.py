@@ -15,7 +15,7 @@ from dsc.model.rules import Handler, Rule
 from dsc.model.states import DynamicState, State, SubmachineState
 from dsc.skills import SkillSignature
 from knowledge_base.facts import Delta, Fact, fact
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 MODELS = Schema.parse(
     """(define (domain models)

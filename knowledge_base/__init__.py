@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from knowledge_base.computation import Computed as Computed
-    from knowledge_base.computation import computed as computed
     from knowledge_base.conditions.clock import Clock as Clock
     from knowledge_base.conditions.condition import Condition as Condition
     from knowledge_base.conditions.condition import Firing as Firing
@@ -34,15 +32,17 @@ if TYPE_CHECKING:
     from knowledge_base.language.explanation import Explanation as Explanation
     from knowledge_base.language.query_plan import QueryPlan as QueryPlan
     from knowledge_base.language.query_plan import QueryStep as QueryStep
-    from knowledge_base.overlay import Overlay as Overlay
     from knowledge_base.prepared import Binding as Binding
-    from knowledge_base.schema import Schema as Schema
-    from knowledge_base.schema import Signature as Signature
     from knowledge_base.sources import Source as Source
-    from knowledge_base.state import WorldState as WorldState
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
     from knowledge_base.transaction import Transaction as Transaction
     from knowledge_base.view import View as View
+    from knowledge_base.world.computation import Computed as Computed
+    from knowledge_base.world.computation import computed as computed
+    from knowledge_base.world.overlay import Overlay as Overlay
+    from knowledge_base.world.schema import Schema as Schema
+    from knowledge_base.world.schema import Signature as Signature
+    from knowledge_base.world.state import WorldState as WorldState
 
 __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
@@ -50,7 +50,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Binding": "prepared",
         "Change": "facts",
         "Clock": "conditions.clock",
-        "Computed": "computation",
+        "Computed": "world.computation",
         "Condition": "conditions.condition",
         "ConditionCancelledError": "errors",
         "ConflictError": "errors",
@@ -63,15 +63,15 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "InputError": "errors",
         "KnowledgeBase": "store",
         "Missed": "conditions.watch",
-        "Overlay": "overlay",
+        "Overlay": "world.overlay",
         "ParseError": "errors",
         "Place": "errors",
         "QueryPlan": "language.query_plan",
         "QueryStep": "language.query_plan",
-        "Schema": "schema",
+        "Schema": "world.schema",
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",
-        "Signature": "schema",
+        "Signature": "world.schema",
         "Source": "sources",
         "StoreError": "errors",
         "Transaction": "transaction",
@@ -80,8 +80,8 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Value": "facts",
         "View": "view",
         "Watch": "conditions.watch",
-        "WorldState": "state",
-        "computed": "computation",
+        "WorldState": "world.state",
+        "computed": "world.computation",
         "fact": "facts",
     },
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from weakref import WeakSet
 
-from knowledge_base.announcement import Announcer, Listener
+from knowledge_base.conditions.announcement import Announcer, Listener
 from knowledge_base.conditions.clock import Clock
 from knowledge_base.conditions.condition import Condition, Fire
 from knowledge_base.conditions.installed import Installed, terms
@@ -13,8 +13,8 @@ from knowledge_base.conditions.watch import Watch, watch
 from knowledge_base.errors import StoreError
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import Expression
-from knowledge_base.state import WorldState
 from knowledge_base.view import View
+from knowledge_base.world.state import WorldState
 
 
 class Observable(View):

@@ -8,17 +8,17 @@ from typing import Any
 
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.inputs import require_params, shown
 from knowledge_base.language.asking import asked, queried
 from knowledge_base.language.author import MISSING
 from knowledge_base.language.check import Free
 from knowledge_base.language.expression import Expression
+from knowledge_base.language.inputs import require_params, shown
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.source import Source, condition_source, query_source
 from knowledge_base.questions import Questions
-from knowledge_base.schema import Schema
-from knowledge_base.state import WorldState
-from knowledge_base.turn import Turn
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
+from knowledge_base.world.turn import Turn
 
 Binding = dict[str, Value]
 """One answer of a query: variables' names (without `?`) with their values."""

@@ -7,10 +7,10 @@ from functools import lru_cache
 from typing import TypeVar
 
 from knowledge_base.facts import Value
-from knowledge_base.inputs import fitted_names, require_condition, require_params
 from knowledge_base.language.asking import Asked, Queried, asked, queried
 from knowledge_base.language.check import Free, check
 from knowledge_base.language.expression import Expression, free_variables
+from knowledge_base.language.inputs import fitted_names, require_condition, require_params
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.world import World

@@ -10,15 +10,15 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
-from knowledge_base.admission import check_fluent
-from knowledge_base.announcement import Announcer
+from knowledge_base.conditions.announcement import Announcer
 from knowledge_base.conditions.installed import Installed
 from knowledge_base.content import require_content
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.facts import Content, Fact
-from knowledge_base.state import WorldState
-from knowledge_base.turn import Turn
-from knowledge_base.world_graph import WorldGraph
+from knowledge_base.world.admission import check_fluent
+from knowledge_base.world.graph import WorldGraph
+from knowledge_base.world.state import WorldState
+from knowledge_base.world.turn import Turn
 
 
 class Source:

@@ -14,19 +14,19 @@ from typing import Self, get_args
 from knowledge_base.errors import ConflictError, HistoryError, InputError, StoreError
 from knowledge_base.exchange.json import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
-from knowledge_base.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability
 from knowledge_base.journal.history import History, Version, Writer, gone
 from knowledge_base.journal.journal import Journal
 from knowledge_base.journal.memory import MemoryHistory
+from knowledge_base.language.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.observable import Observable
-from knowledge_base.overlay import Overlay
-from knowledge_base.schema import Schema
 from knowledge_base.sources import Source, Sources
-from knowledge_base.state import WorldState
 from knowledge_base.transaction import Transaction
 from knowledge_base.view import View
+from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
 
 Now = Callable[[], float]
 """Tells the time in seconds."""
@@ -35,7 +35,7 @@ Now = Callable[[], float]
 class KnowledgeBase(Observable):
     """A world model that may be asked and changed from several threads.
 
-    One lock orders everything, and all get it in turn (`turn`): a question sees one version and its answer is a
+    One lock orders everything, and all get it in turn (`world.turn`): a question sees one version and its answer is a
     finished list; a change is made as a whole or, with an error, not at all. Listeners are called when the lock is
     released.
 

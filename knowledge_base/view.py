@@ -8,17 +8,17 @@ from knowledge_base.exchange.json import to_json
 from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.exchange.problem_writer import problem_to_text
 from knowledge_base.facts import Content, Fact, Value
-from knowledge_base.inputs import require_params
 from knowledge_base.language.evaluation import Explanation, explain
 from knowledge_base.language.expression import TRUE, Expression
+from knowledge_base.language.inputs import require_params
 from knowledge_base.language.query_plan import QueryPlan, plan_query
-from knowledge_base.overlay import Overlay
 from knowledge_base.prepared import Binding, Prepared, ReadyQuestions
 from knowledge_base.questions import Questions
-from knowledge_base.schema import Schema
-from knowledge_base.state import WorldState
-from knowledge_base.turn import Turn
-from knowledge_base.world_graph import Graph, WorldGraph
+from knowledge_base.world.graph import Graph, WorldGraph
+from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
+from knowledge_base.world.turn import Turn
 
 
 class View:
@@ -47,7 +47,7 @@ class View:
 
     @property
     def graph(self) -> Graph:
-        """The world as a graph, read-only; see `world_graph` for its form.
+        """The world as a graph, read-only; see `world.graph` for its form.
 
         It is made when it is first asked for. That of a `KnowledgeBase` follows every commit from then on; other
         threads must not commit while it is being walked.

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
-from knowledge_base.exchange.action_text import ActionText
-from knowledge_base.exchange.domain_text import AxiomText, DomainText, parse_domain, read_domain
 from knowledge_base.exchange.domain_writer import action_to_text, axiom_to_text, domain_to_text
 from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
 from knowledge_base.language.effect import Add, Delete, Effect, effect_leaves, substitute_effect
@@ -26,14 +24,16 @@ from knowledge_base.language.expression import (
     substitute,
 )
 from knowledge_base.language.timed import Duration, Timed
-from knowledge_base.schema import ROOT_TYPE, Schema
+from knowledge_base.pddl.action_text import ActionText
+from knowledge_base.pddl.domain_text import AxiomText, DomainText, parse_domain, read_domain
+from knowledge_base.world.schema import ROOT_TYPE, Schema
 from planning.fragments import merged_text, searched, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from knowledge_base.computation import Computed
     from knowledge_base.facts import Delta
+    from knowledge_base.world.computation import Computed
     from planning.plan import PlanStep
 
 _MOST_GROUND = 1024  # steps; a plan for 50 items has about 130

@@ -24,11 +24,11 @@ from dsc.skills import signatures
 from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
 from dsc.validation import raise_findings, validate_library
-from knowledge_base.compatibility import require_extension
 from knowledge_base.errors import InputError, SchemaError, StoreError
 from knowledge_base.journal.file import Durability
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.compatibility import require_extension
 from planning.domain import PlanningDomain
 from planning.engines.cache import CachingPlanner
 from planning.engines.planner import Planner, PlannerProcess

@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError, Place
-from knowledge_base.exchange.action_text import ActionText, united
-from knowledge_base.exchange.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.language.typed_list import TypedName
-from knowledge_base.schema import agreed_names
+from knowledge_base.pddl.action_text import ActionText, united
+from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.world.schema import agreed_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from dsc.components.component import Component
-    from knowledge_base.schema import Schema, Signature
+    from knowledge_base.world.schema import Schema, Signature
     from planning.domain import PlanningDomain
 
 

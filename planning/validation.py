@@ -11,7 +11,7 @@ from knowledge_base.facts import Delta
 from knowledge_base.language.evaluation import World, apply_effect, evaluate_term, explain, holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.terms import as_number
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning.plan import Plan
 from planning.posing.derived import derivation
 from planning.timeline import FINEST, Act, Changes, Event, Flaw, carried_out
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from knowledge_base.facts import Value
     from knowledge_base.language.effect import Effect
-    from knowledge_base.schema import Schema
+    from knowledge_base.world.schema import Schema
     from planning.domain import PlanningDomain
     from planning.plan import PlanStep, Timing
 

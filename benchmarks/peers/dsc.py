@@ -9,8 +9,8 @@ from dsc.engine.machine import Machine
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.validation import raise_findings, validate_plot
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 from peers.charts import PING, PONG, Chart, State
 from peers.contender import Contender
 

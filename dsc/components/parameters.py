@@ -23,9 +23,9 @@ from knowledge_base.facts import Value
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import free_variables
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.overlay import Overlay
-from knowledge_base.schema import Schema
-from knowledge_base.state import WorldState
+from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
 
 Type = Literal["number", "text", "boolean"]
 Who = Literal["nobody", "profile", "rules", "plots"]

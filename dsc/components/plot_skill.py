@@ -19,8 +19,8 @@ from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import SkillSignature, check_arguments
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.expression import Constant
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 COMPLETED = "completed"
 """The outcome of a plot that came to its end without emitting any."""

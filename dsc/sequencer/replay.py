@@ -18,8 +18,8 @@ from knowledge_base.facts import Delta
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.history import Version
 from knowledge_base.journal.memory import MemoryHistory
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 
 @dataclass(frozen=True, slots=True)

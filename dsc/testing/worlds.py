@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from knowledge_base.exchange.domain_text import read_domain
 from knowledge_base.exchange.problem_text import read_problem
 from knowledge_base.facts import Delta
 from knowledge_base.language.application import apply_effect
 from knowledge_base.language.parser import parse_effect
 from knowledge_base.language.terms import Bindings
-from knowledge_base.schema import Schema
+from knowledge_base.pddl.domain_text import read_domain
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 EMPTY = Schema()
 """What may be said where nothing needs to be known."""

@@ -26,7 +26,7 @@ from knowledge_base.language.binding import unbound_error
 from knowledge_base.language.check import check, check_effect, check_term
 from knowledge_base.language.effect import Effect, mentioned
 from knowledge_base.language.expression import Expression, Term, free_variables
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 FREE_TYPES = frozenset({"number", "text", "symbol", "boolean", "condition", "plot"})
 """Types of parameters and variables besides those of the schema."""

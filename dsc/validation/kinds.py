@@ -21,7 +21,7 @@ from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.expression import Constant, Term, Variable
 from knowledge_base.language.printer import to_text
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 _VALUES = frozenset({"number", "boolean"})
 _WORDS = frozenset({"text", "symbol"})

@@ -19,7 +19,7 @@ from dsc.validation.reach import check_reach
 from dsc.validation.size import check_size
 from dsc.validation.structure import check_structure
 from dsc.validation.wiring import check_wiring
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 MAX_FINDINGS = 50
 """For one plot; more are not read, and each takes a search for the name that was meant."""

@@ -12,8 +12,8 @@ from typing import Any, Generic, TypeVar
 from dsc.viewer.records import RecordLog
 from knowledge_base.errors import InputError
 from knowledge_base.exchange.forms import delta_of, schema_of, world_of
-from knowledge_base.schema import Schema
-from knowledge_base.state import WorldState
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
 
 CHECKPOINT_EVERY = 500
 """Records that are replayed at most to get to a moment."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from dsc.trace import FORMAT, Record, header
 from knowledge_base.errors import InputError, ParseError, Place
-from knowledge_base.exchange.files import read_text
+from knowledge_base.pddl.files import read_text
 
 MOST_RECORDS = 2000
 MOST_CHARACTERS = 400_000

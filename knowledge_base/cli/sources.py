@@ -86,7 +86,7 @@ def is_store(path: Path) -> bool:
 
 
 def _opened(source: Path, domain: Path | None) -> Opened:
-    from knowledge_base.exchange.files import read_text
+    from knowledge_base.pddl.files import read_text
     from knowledge_base.store import KnowledgeBase
 
     if is_store(source):
@@ -101,8 +101,8 @@ def _opened(source: Path, domain: Path | None) -> Opened:
 
 def _problem(source: Path, domain: Path | None) -> Opened:
     from knowledge_base.exchange.pddl import read_problem
-    from knowledge_base.schema import Schema
     from knowledge_base.store import KnowledgeBase
+    from knowledge_base.world.schema import Schema
 
     schema = Schema.from_pddl(domain or _beside(source))
     problem = read_problem(source, schema)

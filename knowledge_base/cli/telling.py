@@ -39,8 +39,8 @@ def new(
 ) -> None:
     """Make an empty store whose schema is that of a PDDL domain."""
     from knowledge_base.errors import StoreError
-    from knowledge_base.schema import Schema
     from knowledge_base.store import KnowledgeBase
+    from knowledge_base.world.schema import Schema
 
     schema = Schema.from_pddl(domain).with_functional(*functional or ())
     if store.exists():

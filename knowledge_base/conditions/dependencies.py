@@ -22,7 +22,7 @@ from knowledge_base.language.expression import (
     TypedVariable,
     Variable,
 )
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 Kind = Literal["said", "type"]
 """`said`: by facts and numbers, whose names differ; `type`: by the type of things."""

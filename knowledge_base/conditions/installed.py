@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from knowledge_base.announcement import Announcer
+from knowledge_base.conditions.announcement import Announcer
 from knowledge_base.conditions.clock import Clock
 from knowledge_base.conditions.condition import FIRE, Condition, Fire, Terms
 from knowledge_base.conditions.dependencies import BOTH, Kind, Occurrence
@@ -21,12 +21,12 @@ from knowledge_base.conditions.rows import Row
 from knowledge_base.conditions.shape import Args, Lifted, Shape, lifted
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact, Value
-from knowledge_base.inputs import shown
 from knowledge_base.language.expression import Expression, substitute
+from knowledge_base.language.inputs import shown
 from knowledge_base.language.printer import to_text
-from knowledge_base.schema import Schema
-from knowledge_base.state import WorldState
-from knowledge_base.turn import Turn
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
+from knowledge_base.world.turn import Turn
 
 MORE, LESS = 1, -1
 

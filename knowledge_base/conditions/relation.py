@@ -23,10 +23,10 @@ from knowledge_base.conditions.rows import Row, RowsWorld, row_fact
 from knowledge_base.conditions.shape import Args, Shape
 from knowledge_base.conditions.trigger import Trigger
 from knowledge_base.errors import InputError
-from knowledge_base.index import FactIndex
 from knowledge_base.language.compiler import compile_query, compile_test
 from knowledge_base.language.terms import Bindings
-from knowledge_base.state import WorldState
+from knowledge_base.world.index import FactIndex
+from knowledge_base.world.state import WorldState
 
 
 class Relation:

@@ -8,10 +8,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Content, Fact, Value
-from knowledge_base.index import FactIndex
 from knowledge_base.language.expression import TypedVariable
-from knowledge_base.schema import Schema, Signature
-from knowledge_base.state import WorldState
+from knowledge_base.world.index import FactIndex
+from knowledge_base.world.schema import Schema, Signature
+from knowledge_base.world.state import WorldState
 
 if TYPE_CHECKING:
     from knowledge_base.conditions.condition import Condition

@@ -29,7 +29,7 @@ from knowledge_base.language.expression import (
     free_variables,
     substitute,
 )
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 Args = tuple[Value, ...]
 

@@ -9,15 +9,15 @@ from threading import Lock
 from types import TracebackType
 from typing import Protocol, Self
 
-from knowledge_base.announcement import Listener
+from knowledge_base.conditions.announcement import Listener
 from knowledge_base.conditions.pattern import Touches, touches
 from knowledge_base.conditions.waiters import Waiters
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Change, Value
-from knowledge_base.inputs import fitted_names, require_condition, require_params, shown
 from knowledge_base.language.expression import Expression
+from knowledge_base.language.inputs import fitted_names, require_condition, require_params, shown
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from typing import Any
 
 from knowledge_base.facts import Content, Delta, Fact
 from knowledge_base.language.expression import TypedVariable
-from knowledge_base.schema import Schema, Signature
-from knowledge_base.state import WorldState
+from knowledge_base.world.schema import Schema, Signature
+from knowledge_base.world.state import WorldState
 
 Form = dict[str, Any]
 FORM_ERRORS = (AttributeError, IndexError, KeyError, TypeError, ValueError, RecursionError)

@@ -7,14 +7,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from knowledge_base.admission import check_delta
-from knowledge_base.compatibility import missing_constants, require_extension
 from knowledge_base.errors import InputError, ParseError, Place, SchemaError
-from knowledge_base.exchange.files import read_text
 from knowledge_base.exchange.forms import FORM_ERRORS, Form, schema_form, schema_hash, schema_of, world_form, world_of
 from knowledge_base.facts import Delta
-from knowledge_base.schema import Schema
-from knowledge_base.state import WorldState
+from knowledge_base.pddl.files import read_text
+from knowledge_base.world.admission import check_delta
+from knowledge_base.world.compatibility import missing_constants, require_extension
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
 
 FORMAT = "dsc-knowledge/2"
 _PARTS = ("format", "version", "schema_hash", "schema", "nodes", "facts", "values")

@@ -9,9 +9,6 @@ from typing import Literal
 
 from knowledge_base.content import GEOMETRY, require_content
 from knowledge_base.errors import ParseError, Place, SchemaError, UnknownNameError
-from knowledge_base.exchange.beyond import TIMED_INITIAL, refuse_forms, refused
-from knowledge_base.exchange.files import text_and_source
-from knowledge_base.exchange.sections import Definition, read_definition, word
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.language.check import check
 from knowledge_base.language.expression import (
@@ -28,8 +25,11 @@ from knowledge_base.language.expression import (
 from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.language.sexpr import Group, Node, Word
 from knowledge_base.language.typed_list import TypedName, parse_names
-from knowledge_base.schema import ROOT_TYPE, Schema, Signature
+from knowledge_base.pddl.beyond import TIMED_INITIAL, refuse_forms, refused
+from knowledge_base.pddl.files import text_and_source
+from knowledge_base.pddl.sections import Definition, read_definition, word
 from knowledge_base.spelling import is_number
+from knowledge_base.world.schema import ROOT_TYPE, Schema, Signature
 
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
 TOTAL_TIME = Call("total-time")

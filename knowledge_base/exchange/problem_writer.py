@@ -8,9 +8,9 @@ from knowledge_base.facts import Content, Fact
 from knowledge_base.language.expression import TRUE, Expression
 from knowledge_base.language.parser import LONGEST_NUMBER
 from knowledge_base.language.printer import to_text
-from knowledge_base.schema import Signature
 from knowledge_base.spelling import is_plain_name, value_text
-from knowledge_base.state import WorldState
+from knowledge_base.world.schema import Signature
+from knowledge_base.world.state import WorldState
 
 
 def problem_to_text(

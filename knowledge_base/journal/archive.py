@@ -9,14 +9,14 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from knowledge_base.compatibility import require_extension
 from knowledge_base.errors import ConflictError, Place, StoreError
 from knowledge_base.exchange.forms import FORM_ERRORS, delta_of, schema_of, world_of
 from knowledge_base.facts import Change
 from knowledge_base.journal.file import reading
 from knowledge_base.journal.history import Version, Writer, gone, too_early
-from knowledge_base.schema import Schema
-from knowledge_base.state import WorldState
+from knowledge_base.world.compatibility import require_extension
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
 
 _JOURNAL = "SELECT version, time, author, delta FROM changes WHERE version > ? AND version <= ? ORDER BY version"
 _LAST = "SELECT max(version) FROM (SELECT version FROM changes UNION ALL SELECT version FROM snapshots)"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Literal
 
 from knowledge_base.errors import Place, StoreError
-from knowledge_base.exchange.files import files_beside
+from knowledge_base.pddl.files import files_beside
 
 Durability = Literal["memory", "process", "power"]
 """What a commit outlives: nothing; the death of the process; a power cut (as far as the disk is honest)."""

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from knowledge_base.errors import HistoryError, Place
 from knowledge_base.facts import Change
-from knowledge_base.state import WorldState
+from knowledge_base.world.state import WorldState
 
 Writer = Callable[[sqlite3.Connection], None]
 """Writes more rows in the transaction of a commit; it neither commits nor rolls back."""

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from knowledge_base.compatibility import missing_constants, require_extension, require_functional
 from knowledge_base.errors import ConflictError, InputError, Place, StoreError
 from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
@@ -15,8 +14,9 @@ from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability, create_tables, is_new, reported, writing
 from knowledge_base.journal.history import Version, Writer
 from knowledge_base.journal.lock import WriterLock
-from knowledge_base.schema import Schema
-from knowledge_base.state import WorldState
+from knowledge_base.world.compatibility import missing_constants, require_extension, require_functional
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
 
 SNAPSHOT_AFTER = 2_000_000
 """How many characters of changes follow a snapshot at least before the next.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from knowledge_base.errors import ConflictError, StoreError
 from knowledge_base.facts import Change, Content, Delta, Fact
 from knowledge_base.journal.history import Version, Writer, gone, too_early
-from knowledge_base.state import WorldState
+from knowledge_base.world.state import WorldState
 
 MOST_KEPT = 10_000
 """How many things, facts and numbers the kept changes name together."""

@@ -26,7 +26,7 @@ from knowledge_base.language.expression import (
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.terms import Bindings, Getter, Test, compile_term
 from knowledge_base.language.world import World
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 NO_BINDINGS: Bindings = MappingProxyType({})
 

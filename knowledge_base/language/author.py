@@ -8,7 +8,7 @@ from typing import cast
 from knowledge_base.language.expression import Atom, Comparison, Constant, Not, Term, TypedVariable, Variable
 from knowledge_base.language.joins import Conjunct, Range, Step, candidates
 from knowledge_base.language.terms import same
-from knowledge_base.schema import ROOT_TYPE, Schema
+from knowledge_base.world.schema import ROOT_TYPE, Schema
 
 MISSING = object()
 """Stands for a value that was not given."""

@@ -26,7 +26,7 @@ from knowledge_base.language.expression import (
 )
 
 if TYPE_CHECKING:  # a schema checks what its computed predicates read
-    from knowledge_base.schema import Schema
+    from knowledge_base.world.schema import Schema
 
 _NONE: frozenset[str] = frozenset()
 

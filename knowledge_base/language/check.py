@@ -31,8 +31,8 @@ from knowledge_base.language.expression import (
 )
 
 if TYPE_CHECKING:  # a schema checks what its computed predicates read
-    from knowledge_base.computation import Computed
-    from knowledge_base.schema import Schema, Signature
+    from knowledge_base.world.computation import Computed
+    from knowledge_base.world.schema import Schema, Signature
 
 Free = Literal["error", "answers"]
 

@@ -44,7 +44,7 @@ from knowledge_base.language.terms import (
     compile_term,
 )
 from knowledge_base.language.world import World
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 _MOST_STAGES = 1000
 Answers = Callable[[World, Bindings], list[Answer]]

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from knowledge_base.computation import Read
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.application import choices
@@ -35,6 +34,7 @@ from knowledge_base.language.printer import to_text
 from knowledge_base.language.terms import Bindings
 from knowledge_base.language.world import World
 from knowledge_base.spelling import value_text
+from knowledge_base.world.computation import Read
 
 _Judged = tuple["Explanation", InputError | None]
 """A part, and why it cannot be computed."""

@@ -27,7 +27,7 @@ from knowledge_base.language.expression import (
     free_variables,
     variable_place,
 )
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from knowledge_base.facts import Value
 from knowledge_base.language.expression import Atom, Term, TypedVariable, Variable, free_variables
 from knowledge_base.language.terms import Argument, Bindings, compile_argument
 from knowledge_base.language.world import World
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 Search = Callable[[World, Bindings], Iterator[Bindings]]
 Answer = dict[str, Value]

@@ -25,10 +25,10 @@ from knowledge_base.language.expression import (
     variables_in_order,
 )
 from knowledge_base.language.joins import Conjunct, Range, as_range, conjuncts, order
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 if TYPE_CHECKING:
-    from knowledge_base.state import WorldState
+    from knowledge_base.world.state import WorldState
 
 MOST_LOOKUPS = 3
 """Each further one multiplies the ways that the source has."""

@@ -14,7 +14,7 @@ from knowledge_base.facts import Content, Value
 from knowledge_base.language.check import check_arity
 from knowledge_base.language.expression import Arithmetic, Call, Comparison, Constant, Term, Variable
 from knowledge_base.language.world import World
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 Bindings = Mapping[str, Value]
 Getter = Callable[[World, Bindings], Content]

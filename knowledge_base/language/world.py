@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from knowledge_base.facts import Content, Value
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 
 class World(Protocol):

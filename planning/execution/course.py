@@ -11,7 +11,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation import World, holds
 from knowledge_base.language.expression import Expression
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.execution.needs import Needs
 from planning.plan import PlanStep

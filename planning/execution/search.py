@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     from dsc.sequencer.clock import LoopClock
     from knowledge_base.language.expression import Expression
-    from knowledge_base.state import WorldState
     from knowledge_base.store import KnowledgeBase
+    from knowledge_base.world.state import WorldState
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
     from planning.execution.course import Course

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from dsc.calls import Outcome
 from dsc.sequencer.taking_up import PastClock
 from knowledge_base.language.printer import to_text
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning.execution.course import Course, cost_of, shortest_end
 from planning.execution.monitor import Broken, Monitor, News, Reached, Shorter
 from planning.execution.search import Found, NotFound, Search

@@ -31,7 +31,7 @@ from knowledge_base.language.expression import (
     parts_of,
     substitute,
 )
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning.posing.conditions import Literal
 
 Ground = Literal | Fact

@@ -24,7 +24,7 @@ from knowledge_base.language.effect import substitute_effect
 from knowledge_base.language.evaluation import World, apply_effect, holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.printer import to_text
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.ordering.dependencies import Changes, Ground, Support, changes, conjuncts, support
 from planning.plan import Plan, PlanStep

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.facts import Fact
-    from knowledge_base.schema import Schema
+    from knowledge_base.world.schema import Schema
     from planning.posing.conditions import Grounder
 
 TOTAL_COST = Call("total-cost")

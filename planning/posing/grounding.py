@@ -16,7 +16,7 @@ from planning.quantities import Assignment, combined, fluents
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from knowledge_base.schema import Schema
+    from knowledge_base.world.schema import Schema
     from planning.domain import PlanningAction
     from planning.patience import Patience
 

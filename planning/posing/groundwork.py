@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.effect import ForEach, effect_conditions, effect_parts
 from knowledge_base.language.expression import Exists, Expression, Forall, Term, Variable, parts_of
-from knowledge_base.schema import ROOT_TYPE
+from knowledge_base.world.schema import ROOT_TYPE
 from planning.patience import Patience
 from planning.plan import PlanStep
 from planning.posing.conditions import Grounder
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from knowledge_base.language.evaluation import World
-    from knowledge_base.schema import Schema
+    from knowledge_base.world.schema import Schema
     from planning.domain import PlanningAction
 
 

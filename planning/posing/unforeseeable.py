@@ -13,7 +13,7 @@ from planning.posing.relevance import changed
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from knowledge_base.schema import Schema
+    from knowledge_base.world.schema import Schema
     from planning.domain import PlanningAction, PlanningDomain
 
 

@@ -29,8 +29,8 @@ from dsc.text.scxml.reader import parse_scxml
 from dsc.text.scxml.writer import to_scxml
 from dsc.validation import raise_findings, validate_plot
 from knowledge_base.errors import InputError
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".conformance"

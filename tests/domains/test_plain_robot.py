@@ -15,8 +15,8 @@ from domains.clean_up_table.faults import KINDS, NO_PATH, NOTHING_FOUND
 from domains.clean_up_table.items import DESTINATION_OF
 from domains.clean_up_table.places import SURFACES
 from domains.clean_up_table.scenario import Scenario
-from knowledge_base.exchange.domain_text import parse_domain
 from knowledge_base.facts import fact
+from knowledge_base.pddl.domain_text import parse_domain
 
 DOMAIN_FILE = Path(domains.clean_up_table.__file__).with_name("domain.pddl")
 DOMAIN = parse_domain(DOMAIN_FILE.read_text(encoding="utf-8"))

@@ -16,11 +16,11 @@ from domains.clean_up_table.items import new_item
 from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.world import World
 from dsc.calls import SkillCall
-from knowledge_base.exchange.action_text import ActionText
-from knowledge_base.exchange.domain_text import parse_domain
 from knowledge_base.facts import Fact, fact
 from knowledge_base.language.effect import Add, AllOf, Delete
 from knowledge_base.language.expression import And, Atom, Variable
+from knowledge_base.pddl.action_text import ActionText
+from knowledge_base.pddl.domain_text import parse_domain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -15,8 +15,8 @@ from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.trace import Trace
 from knowledge_base.facts import Delta, Fact, fact
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 SCHEMA = Schema.parse("""
     (define (domain kitchen)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dsc_charts import plot
 
 from dsc import Component, Outcome, skill
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 SCHEMA = Schema.parse("""
     (define (domain kitchen)

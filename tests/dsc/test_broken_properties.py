@@ -19,7 +19,7 @@ from dsc.text.scxml.writer import to_scxml
 from dsc.text.yaml import dump, load_document
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted([*ROOT.glob("domains/*/plots/*.yaml"), *ROOT.glob("planning/plots/*.yaml")])

@@ -19,8 +19,8 @@ from dsc.skills import skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 SCHEMA = Schema.parse("""
     (define (domain kitchen)

@@ -10,8 +10,8 @@ from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.events import Event
 from knowledge_base.facts import Fact
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 
 def started(text, *inner, **keys):

@@ -14,7 +14,7 @@ from dsc.text.diagram import draw
 from dsc.text.plots import parse_plot, plot_to_yaml
 from knowledge_base import KnowledgeBase
 from knowledge_base.facts import Fact
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 SAY = """
     plot: say

@@ -17,8 +17,8 @@ from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 
 class Base(Component):

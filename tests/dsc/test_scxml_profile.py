@@ -19,8 +19,8 @@ from dsc.testing import DryRun
 from dsc.trace import Trace
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 
 def chart(states, **keys):

@@ -15,8 +15,8 @@ from dsc.events import Event
 from dsc.sequencer.tracing import StepTracer
 from dsc.trace import FORMAT, VERSION, Record, Trace, header, write_to
 from knowledge_base.facts import Change, Delta, fact
-from knowledge_base.schema import Schema
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 
 def test_a_record_is_one_line_with_the_head_first():

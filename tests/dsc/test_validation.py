@@ -17,7 +17,7 @@ from dsc.model.plot import ActionPlot
 from dsc.skills import skill
 from dsc.text.plots import load_library, parse_plot
 from dsc.validation import raise_findings, validate_library, validate_plot
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 SCHEMA = Schema.parse("""
     (define (domain kitchen)

@@ -17,7 +17,7 @@ from pathlib import Path
 from random import Random
 
 from knowledge_base import Change, Delta, Firing, KnowledgeBase, Missed, Schema, fact
-from knowledge_base.state import WorldState
+from knowledge_base.world.state import WorldState
 
 WORKERS = tuple(f"w{n}" for n in range(4))
 CELLS = tuple(f"c{n}" for n in range(5))

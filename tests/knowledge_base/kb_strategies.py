@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.language import effect as eff
 from knowledge_base.language import expression as ex
-from knowledge_base.schema import Schema
+from knowledge_base.world.schema import Schema
 
 SCHEMA = Schema.parse(
     """(define (domain small)

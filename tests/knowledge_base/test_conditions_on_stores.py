@@ -13,7 +13,7 @@ from kb_strategies import SCHEMA, THINGS
 from kb_worlds import PROPERTY, Ticks
 
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
-from knowledge_base.announcement import Announcer
+from knowledge_base.conditions.announcement import Announcer
 from knowledge_base.journal.history import Version
 from knowledge_base.journal.memory import MemoryHistory
 

@@ -13,8 +13,8 @@ from knowledge_base.language import expression as ex
 from knowledge_base.language.contradiction import complete, contradictory, implied, subjects
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition as condition
-from knowledge_base.overlay import Overlay
-from knowledge_base.state import WorldState
+from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.state import WorldState
 
 
 @pytest.mark.parametrize(

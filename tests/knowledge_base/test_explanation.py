@@ -12,8 +12,8 @@ from knowledge_base import Delta, InputError, KnowledgeBase, Schema, UnknownName
 from knowledge_base.language import expression as ex
 from knowledge_base.language.evaluation import Explanation, explain, holds
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.overlay import Overlay
-from knowledge_base.state import WorldState
+from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.state import WorldState
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 import pytest
 
 from knowledge_base import ConflictError, Delta, KnowledgeBase, Schema, fact
-from knowledge_base.turn import Stamp, Turn
+from knowledge_base.world.turn import Stamp, Turn
 
 
 class Crowd:
@@ -157,7 +157,7 @@ def test_who_is_interrupted_while_waiting_keeps_nobody_waiting(crowd: Crowd, mon
 
     with crowd.turn.changing():
         with monkeypatch.context() as patch:
-            patch.setattr("knowledge_base.turn.Lock", Interrupted)
+            patch.setattr("knowledge_base.world.turn.Lock", Interrupted)
             for enter in (lambda: crowd.turn, crowd.turn.changing):
                 thread = threading.Thread(target=waits, args=(enter,))
                 thread.start()

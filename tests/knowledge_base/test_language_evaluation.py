@@ -13,8 +13,8 @@ from knowledge_base.language.binding import only_tested
 from knowledge_base.language.evaluation import apply_effect, evaluate_term, explain, holds, query
 from knowledge_base.language.expression import TypedVariable, free_variables
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
-from knowledge_base.overlay import Overlay
-from knowledge_base.state import WorldState
+from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.state import WorldState
 
 
 def world_of(delta: Delta) -> Overlay:

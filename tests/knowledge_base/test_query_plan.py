@@ -15,8 +15,8 @@ from knowledge_base.language import expression as ex
 from knowledge_base.language.binding import only_tested
 from knowledge_base.language.evaluation import query
 from knowledge_base.language.query_plan import plan_query
-from knowledge_base.overlay import Overlay
-from knowledge_base.state import WorldState
+from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.state import WorldState
 
 
 @computed("(warm ?t - thing)", reads=["(temperature ?t)"])

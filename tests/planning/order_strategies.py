@@ -10,8 +10,8 @@ from knowledge_base.facts import Delta, fact
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.overlay import Overlay
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.plan import Plan, PlanStep
 

@@ -12,7 +12,7 @@ from searching import cheapest, solution
 
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning.plan import PlanStep
 from planning.posing.problem import Poser, pose
 from planning.validation import validate

@@ -9,7 +9,7 @@ from dsc import ActionPlot, Component, Outcome, skill
 from dsc.chance import uniform
 from dsc.trace import Record
 from knowledge_base.language.printer import to_text
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning import Executive, PlanStep, plot_from_plan
 from planning.ordering.order import deordered
 

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from searching import breadth_first, solution
 
-from knowledge_base.computation import computed
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.overlay import Overlay
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.computation import computed
+from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep

@@ -7,7 +7,7 @@ import pytest
 from trace_replay import Replay
 
 from dsc.chance import uniform
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning.engines.planner import PlannerProcess
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "two_tables.py"

@@ -16,7 +16,7 @@ from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import And, Not, substitute
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.overlay import Overlay
+from knowledge_base.world.overlay import Overlay
 from planning.ordering.order import causal_links, standing
 from planning.plan import Plan, PlanStep
 

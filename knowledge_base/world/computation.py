@@ -13,10 +13,10 @@ from graphlib import CycleError, TopologicalSorter
 from typing import Any, Generic, ParamSpec
 
 from knowledge_base.errors import InputError, Place, SchemaError
-from knowledge_base.exchange.domain_text import parse_declaration
 from knowledge_base.language.expression import Arithmetic, Atom, Call, Term, TypedVariable, Variable, free_variables
 from knowledge_base.language.parser import parse_term
 from knowledge_base.language.printer import to_text
+from knowledge_base.pddl.domain_text import parse_declaration
 
 Read = Term | Atom
 """What comes in: a term's value, or whether an atom is true."""

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 
 from knowledge_base.errors import Place, SchemaError, SchemaMismatchError, nearest
 from knowledge_base.facts import Delta
-from knowledge_base.functional import require_single
-from knowledge_base.schema import ROOT_TYPE, Schema, Signature
-from knowledge_base.state import WorldState
+from knowledge_base.world.functional import require_single
+from knowledge_base.world.schema import ROOT_TYPE, Schema, Signature
+from knowledge_base.world.state import WorldState
 
 
 def require_extension(written: Schema, given: Schema, place: Place | None = None) -> None:

@@ -9,14 +9,14 @@ from pathlib import Path
 
 from knowledge_base.content import UNSET
 from knowledge_base.errors import ParseError, Place, nearest
-from knowledge_base.exchange.action_text import ACTION, DURATIVE_ACTION, ActionText, read_actions
-from knowledge_base.exchange.beyond import OBJECT_FLUENTS, refuse_forms, refused
-from knowledge_base.exchange.files import text_and_source
-from knowledge_base.exchange.sections import read_definition, word
 from knowledge_base.language.expression import Expression, TypedVariable
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.sexpr import Group, Node, Word, read
 from knowledge_base.language.typed_list import TypedName, parse_names, typed_variables
+from knowledge_base.pddl.action_text import ACTION, DURATIVE_ACTION, ActionText, read_actions
+from knowledge_base.pddl.beyond import OBJECT_FLUENTS, refuse_forms, refused
+from knowledge_base.pddl.files import text_and_source
+from knowledge_base.pddl.sections import read_definition, word
 
 _SECTIONS = (
     ":requirements",

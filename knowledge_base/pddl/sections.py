@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from knowledge_base.errors import ParseError, Place, nearest, printable
-from knowledge_base.exchange.beyond import SECTIONS, refused
 from knowledge_base.language.sexpr import Group, Node, Word, read
+from knowledge_base.pddl.beyond import SECTIONS, refused
 
 REQUIREMENTS = frozenset(
     {

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import TypeVar
 
 from knowledge_base.errors import ParseError
-from knowledge_base.exchange.beyond import ACROSS_TIMES, CHOSEN_DURATION, DURATION_AT_END, refused
 from knowledge_base.language.effect import AllOf, Assign, Effect, ForEach, When
 from knowledge_base.language.expression import (
     And,
@@ -23,6 +22,7 @@ from knowledge_base.language.expression import (
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term, parse_variables
 from knowledge_base.language.sexpr import Group, Node, Word
 from knowledge_base.language.timed import Duration, Timed
+from knowledge_base.pddl.beyond import ACROSS_TIMES, CHOSEN_DURATION, DURATION_AT_END, refused
 
 _DURATION = Variable("duration")
 _START, _OVER_ALL, _END = "at start", "over all", "at end"

@@ -8,11 +8,11 @@ from dataclasses import replace
 from knowledge_base.content import require_content, require_finite
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, Value
-from knowledge_base.functional import require_single
 from knowledge_base.language.check import check_arity, value_fits
 from knowledge_base.language.expression import TypedVariable
 from knowledge_base.language.world import World
-from knowledge_base.schema import ROOT_TYPE, VALUE_TYPES, Schema, Signature
+from knowledge_base.world.functional import require_single
+from knowledge_base.world.schema import ROOT_TYPE, VALUE_TYPES, Schema, Signature
 
 
 def check_delta(delta: Delta, world: World) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 
 from knowledge_base.facts import Content, Delta, Fact, Value
-from knowledge_base.index import FactIndex
-from knowledge_base.schema import Schema
-from knowledge_base.turn import Stamp
+from knowledge_base.world.index import FactIndex
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.turn import Stamp
 
 
 class WorldState:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from functools import partial
 
 from knowledge_base.facts import Change
-from knowledge_base.turn import Turn
+from knowledge_base.world.turn import Turn
 
 Listener = Callable[[Change], None]
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from knowledge_base.computation import Computed, in_reading_order
 from knowledge_base.content import GEOMETRY, UNSET
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
-from knowledge_base.exchange.domain_text import DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.facts import Content
 from knowledge_base.language.check import check_reads
 from knowledge_base.language.expression import KEYWORDS, TypedVariable
 from knowledge_base.language.typed_list import TypedName
+from knowledge_base.pddl.domain_text import DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.world.computation import Computed, in_reading_order
 
 Declared = tuple[str, Place | None]
 """A declaration as written, and where."""

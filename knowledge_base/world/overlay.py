@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from knowledge_base.admission import check_delta
 from knowledge_base.facts import Content, Delta, Fact, Value
-from knowledge_base.functional import rivals
-from knowledge_base.index import FactIndex
 from knowledge_base.language.world import World
-from knowledge_base.schema import Schema
+from knowledge_base.world.admission import check_delta
+from knowledge_base.world.functional import rivals
+from knowledge_base.world.index import FactIndex
+from knowledge_base.world.schema import Schema
 
 
 class Overlay:
