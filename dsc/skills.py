@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
+from dsc.blocking import in_process, in_thread
 from dsc.calls import Outcome, SkillCall
-from dsc.components.blocking import in_process, in_thread
 from dsc.events import EXECUTIVES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 

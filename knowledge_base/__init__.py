@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from knowledge_base.language.explanation import Explanation as Explanation
     from knowledge_base.language.query_plan import QueryPlan as QueryPlan
     from knowledge_base.language.query_plan import QueryStep as QueryStep
+    from knowledge_base.language.vocabulary import Signature as Signature
     from knowledge_base.prepared import Binding as Binding
     from knowledge_base.sources import Source as Source
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     from knowledge_base.world.computation import computed as computed
     from knowledge_base.world.overlay import Overlay as Overlay
     from knowledge_base.world.schema import Schema as Schema
-    from knowledge_base.world.schema import Signature as Signature
     from knowledge_base.world.state import WorldState as WorldState
 
 __getattr__, __dir__, __all__ = lazy_exports(
@@ -71,7 +71,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Schema": "world.schema",
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",
-        "Signature": "world.schema",
+        "Signature": "language.vocabulary",
         "Source": "sources",
         "StoreError": "errors",
         "Transaction": "transaction",

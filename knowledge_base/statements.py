@@ -16,9 +16,9 @@ from knowledge_base.language.effect import Add, Assign, Effect
 from knowledge_base.language.expression import Atom, Call, Comparison, Constant, Expression
 from knowledge_base.language.parser import parse_condition, parse_effect
 from knowledge_base.language.sexpr import Group, read
+from knowledge_base.language.vocabulary import ROOT_TYPE
 from knowledge_base.language.world import World
 from knowledge_base.world.overlay import Overlay
-from knowledge_base.world.schema import ROOT_TYPE
 
 
 def told(statements: Iterable[str], world: World, source: str | None = None) -> Delta:

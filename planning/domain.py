@@ -24,9 +24,10 @@ from knowledge_base.language.expression import (
     substitute,
 )
 from knowledge_base.language.timed import Duration, Timed
+from knowledge_base.language.vocabulary import ROOT_TYPE
 from knowledge_base.pddl.action_text import ActionText
 from knowledge_base.pddl.domain_text import AxiomText, DomainText, parse_domain, read_domain
-from knowledge_base.world.schema import ROOT_TYPE, Schema
+from knowledge_base.world.schema import Schema
 from planning.fragments import merged_text, searched, text_of
 
 if TYPE_CHECKING:

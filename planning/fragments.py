@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from dsc.components.component import Component
-    from knowledge_base.world.schema import Schema, Signature
+    from knowledge_base.language.vocabulary import Signature
+    from knowledge_base.world.schema import Schema
     from planning.domain import PlanningDomain
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from knowledge_base.facts import Value
     from knowledge_base.language.effect import Effect
-    from knowledge_base.world.schema import Schema
+    from knowledge_base.language.vocabulary import Vocabulary
     from planning.domain import PlanningDomain
     from planning.plan import PlanStep, Timing
 
@@ -133,7 +133,7 @@ def _changes(effect: Effect, bindings: Mapping[str, Value], state: Overlay) -> C
     return {**dict.fromkeys(made.removed, False), **dict.fromkeys(made.added, True), **made.values}
 
 
-def _delta(changes: Changes, schema: Schema) -> Delta:
+def _delta(changes: Changes, schema: Vocabulary) -> Delta:
     facts = {one: so for one, so in changes.items() if one.predicate in schema.predicates}
     return Delta(
         added=tuple(one for one, so in facts.items() if so),

@@ -13,8 +13,8 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
+from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
-from dsc.components.blocking import DeadlineError
 from dsc.components.component import Component
 from dsc.components.roster import Roster
 from dsc.components.stopping import GRACE, give_up, give_up_after

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.expression import TypedVariable
+from knowledge_base.language.vocabulary import Signature
 from knowledge_base.world.index import FactIndex
-from knowledge_base.world.schema import Schema, Signature
+from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from knowledge_base.language.expression import TRUE, And, Constant, Expression, 
 from knowledge_base.language.printer import to_text
 from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.language.typed_list import TypedName
+from knowledge_base.language.vocabulary import ROOT_TYPE
 from knowledge_base.pddl.action_text import ACTION, DURATIVE_ACTION, ActionText
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText
 from knowledge_base.spelling import is_plain_name
-from knowledge_base.world.schema import ROOT_TYPE
 
 _T = TypeVar("_T")
 

@@ -14,7 +14,8 @@ from typing import Any
 
 from knowledge_base.facts import Content, Delta, Fact
 from knowledge_base.language.expression import TypedVariable
-from knowledge_base.world.schema import Schema, Signature
+from knowledge_base.language.vocabulary import Signature
+from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 Form = dict[str, Any]

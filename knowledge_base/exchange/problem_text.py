@@ -25,11 +25,12 @@ from knowledge_base.language.expression import (
 from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.language.sexpr import Group, Node, Word
 from knowledge_base.language.typed_list import TypedName, parse_names
+from knowledge_base.language.vocabulary import ROOT_TYPE, Signature
 from knowledge_base.pddl.beyond import TIMED_INITIAL, refuse_forms, refused
 from knowledge_base.pddl.files import text_and_source
 from knowledge_base.pddl.sections import Definition, read_definition, word
 from knowledge_base.spelling import is_number
-from knowledge_base.world.schema import ROOT_TYPE, Schema, Signature
+from knowledge_base.world.schema import Schema
 
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
 TOTAL_TIME = Call("total-time")

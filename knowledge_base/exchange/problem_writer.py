@@ -8,8 +8,8 @@ from knowledge_base.facts import Content, Fact
 from knowledge_base.language.expression import TRUE, Expression
 from knowledge_base.language.parser import LONGEST_NUMBER
 from knowledge_base.language.printer import to_text
+from knowledge_base.language.vocabulary import Signature
 from knowledge_base.spelling import is_plain_name, value_text
-from knowledge_base.world.schema import Signature
 from knowledge_base.world.state import WorldState
 
 

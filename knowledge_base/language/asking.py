@@ -25,8 +25,8 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.terms import Bindings, Getter, Test, compile_term
+from knowledge_base.language.vocabulary import Vocabulary
 from knowledge_base.language.world import World
-from knowledge_base.world.schema import Schema
 
 NO_BINDINGS: Bindings = MappingProxyType({})
 
@@ -90,12 +90,12 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
     return asked(e, world.schema).holds(world, bindings)
 
 
-def asked(e: Expression, schema: Schema) -> Asked:
+def asked(e: Expression, schema: Vocabulary) -> Asked:
     """The condition ready to be asked of worlds with this schema; errors of the text as for `holds`."""
     return _conditions.find(e, schema) or _conditions.keep(e, schema, _compiled(e, schema))
 
 
-def prepare(e: Expression, schema: Schema) -> None:
+def prepare(e: Expression, schema: Vocabulary) -> None:
     """Raise now what is wrong with the text of `e`, whatever the world will be; errors as for `holds`."""
     if _conditions.find(e, schema) is None:
         _conditions.keep(e, schema, _compiled(e, schema))
@@ -114,7 +114,7 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
     return queried(e, world.schema, bindings).answers(world, bindings)
 
 
-def queried(e: Expression, schema: Schema, params: Iterable[str]) -> Queried:
+def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried:
     """The query ready to be answered when `params` are bound; errors of the text as for `query`."""
     queries = _queries.find(e, schema) or _queries.keep(e, schema, _unsearched(e))
     bound = queries.free.intersection(params)
@@ -157,17 +157,17 @@ def _unsearched(e: Expression) -> _Queries:
     return _Queries(free_variables(e), {})
 
 
-def _compiled(e: Expression, schema: Schema) -> Asked:
+def _compiled(e: Expression, schema: Vocabulary) -> Asked:
     check_depth(e)
     return Asked(e, free_variables(e), compile_test(e, schema))
 
 
-def _compiled_term(term: Term, schema: Schema) -> _Term:
+def _compiled_term(term: Term, schema: Vocabulary) -> _Term:
     check_depth(term)
     return _Term(free_variables(term), compile_term(term, schema))
 
 
-def _compiled_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Queried:
+def _compiled_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) -> Queried:
     check_answers(e, bound, schema)
     names = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
     return Queried(e, compile_answers(e, schema, bound, names))

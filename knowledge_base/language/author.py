@@ -8,7 +8,7 @@ from typing import cast
 from knowledge_base.language.expression import Atom, Comparison, Constant, Not, Term, TypedVariable, Variable
 from knowledge_base.language.joins import Conjunct, Range, Step, candidates
 from knowledge_base.language.terms import same
-from knowledge_base.world.schema import ROOT_TYPE, Schema
+from knowledge_base.language.vocabulary import ROOT_TYPE, Vocabulary
 
 MISSING = object()
 """Stands for a value that was not given."""
@@ -30,7 +30,7 @@ class Author:
     """
 
     def __init__(
-        self, steps: list[Step], schema: Schema, params: Sequence[str], answers: tuple[str, ...] | None
+        self, steps: list[Step], schema: Vocabulary, params: Sequence[str], answers: tuple[str, ...] | None
     ) -> None:
         self.constants: dict[str, object] = {"same": same, "missing": MISSING}
         self._steps = dict(enumerate(steps))

@@ -7,7 +7,6 @@ variable occurring nowhere else has no answers that could be listed (safe querie
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
@@ -24,14 +23,12 @@ from knowledge_base.language.expression import (
     parts_of,
     variable_place,
 )
-
-if TYPE_CHECKING:  # a schema checks what its computed predicates read
-    from knowledge_base.world.schema import Schema
+from knowledge_base.language.vocabulary import Vocabulary
 
 _NONE: frozenset[str] = frozenset()
 
 
-def found_variables(e: Expression, schema: Schema, bound: frozenset[str] = _NONE) -> frozenset[str]:
+def found_variables(e: Expression, schema: Vocabulary, bound: frozenset[str] = _NONE) -> frozenset[str]:
     """The free variables of `e` that it finds values for, when those in `bound` already have some."""
     match e:
         case Atom(name, _) if name in schema.computed:
@@ -50,12 +47,12 @@ def found_variables(e: Expression, schema: Schema, bound: frozenset[str] = _NONE
             return _NONE
 
 
-def only_tested(e: Expression, schema: Schema, bound: frozenset[str] = _NONE) -> frozenset[str]:
+def only_tested(e: Expression, schema: Vocabulary, bound: frozenset[str] = _NONE) -> frozenset[str]:
     """The free variables of `e` beyond `bound` that nothing in it finds values for."""
     return free_variables(e) - found_variables(e, schema, bound) - bound
 
 
-def check_answers(e: Expression, bound: frozenset[str], schema: Schema) -> None:
+def check_answers(e: Expression, bound: frozenset[str], schema: Vocabulary) -> None:
     """Raise `InputError` if a free variable of the query `e`, not in `bound`, can only be tested."""
     for name in sorted(only_tested(e, schema, bound)):
         kind = next(_types(e, name, schema), "object")
@@ -66,7 +63,7 @@ def check_answers(e: Expression, bound: frozenset[str], schema: Schema) -> None:
         )
 
 
-def _types(e: Expression | Term, name: str, schema: Schema) -> Iterator[str]:
+def _types(e: Expression | Term, name: str, schema: Vocabulary) -> Iterator[str]:
     """The types of things that the variable must have where it is written."""
     for part in parts_of(e):
         yield from _types(part, name, schema)

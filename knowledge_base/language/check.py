@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
@@ -29,17 +29,14 @@ from knowledge_base.language.expression import (
     TypedVariable,
     Variable,
 )
-
-if TYPE_CHECKING:  # a schema checks what its computed predicates read
-    from knowledge_base.world.computation import Computed
-    from knowledge_base.world.schema import Schema, Signature
+from knowledge_base.language.vocabulary import Computing, Signature, Vocabulary
 
 Free = Literal["error", "answers"]
 
 
 def check(
     e: Expression,
-    schema: Schema,
+    schema: Vocabulary,
     variables: Mapping[str, str | None] | None = None,
     free: Free = "error",
     objects: Mapping[str, str] | None = None,
@@ -68,7 +65,7 @@ def check(
 
 def check_effect(
     effect: Effect,
-    schema: Schema,
+    schema: Vocabulary,
     variables: Mapping[str, str | None] | None = None,
     objects: Mapping[str, str] | None = None,
 ) -> None:
@@ -80,13 +77,13 @@ def check_effect(
     _Checker(schema, objects, variables or {}, "error").effect(effect)
 
 
-def check_term(term: Term, schema: Schema, variables: Mapping[str, str | None] | None = None) -> None:
+def check_term(term: Term, schema: Vocabulary, variables: Mapping[str, str | None] | None = None) -> None:
     """Raise an error with its place unless `term` has a value on worlds of `schema`; args and errors as `check`."""
     check_depth(term)
     _Checker(schema, None, variables or {}, "error").term(term)
 
 
-def check_parameters(parameters: tuple[TypedVariable, ...], schema: Schema) -> dict[str, str | None]:
+def check_parameters(parameters: tuple[TypedVariable, ...], schema: Vocabulary) -> dict[str, str | None]:
     """Check the parameters' types; gives them in the form that `check` takes as `variables`.
 
     A parameter of several types (`either`) is given as `None`.
@@ -100,7 +97,7 @@ def check_parameters(parameters: tuple[TypedVariable, ...], schema: Schema) -> d
     return {p.name: _single(p.types) for p in parameters}
 
 
-def check_reads(computed: Computed[Any], schema: Schema) -> None:
+def check_reads(computed: Computing, schema: Vocabulary) -> None:
     """Raise an error with its place unless the computed predicate can read what it declares; errors as `check`."""
     checker = _Checker(schema, None, check_parameters(computed.parameters, schema), "error")
     for read in computed.reads:
@@ -150,7 +147,7 @@ class _Checker:
 
     def __init__(
         self,
-        schema: Schema,
+        schema: Vocabulary,
         objects: Mapping[str, str] | None,
         variables: Mapping[str, str | None],
         free: Free,

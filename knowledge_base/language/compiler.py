@@ -43,14 +43,14 @@ from knowledge_base.language.terms import (
     compile_comparison,
     compile_term,
 )
+from knowledge_base.language.vocabulary import Vocabulary
 from knowledge_base.language.world import World
-from knowledge_base.world.schema import Schema
 
 _MOST_STAGES = 1000
 Answers = Callable[[World, Bindings], list[Answer]]
 
 
-def compile_test(e: Expression, schema: Schema) -> Test:
+def compile_test(e: Expression, schema: Vocabulary) -> Test:
     """A function that says whether `e` holds; all free variables of `e` must then be bound.
 
     Raises:
@@ -78,7 +78,7 @@ def compile_test(e: Expression, schema: Schema) -> Test:
     return test
 
 
-def compile_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Search:
+def compile_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) -> Search:
     """A search for values of the free variables of `e` that are not in `bound`.
 
     Raises:
@@ -87,7 +87,7 @@ def compile_query(e: Expression, schema: Schema, bound: frozenset[str]) -> Searc
     return _search(conjuncts(e), schema, bound)
 
 
-def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names: tuple[str, ...]) -> Answers:
+def compile_answers(e: Expression, schema: Vocabulary, bound: frozenset[str], names: tuple[str, ...]) -> Answers:
     """All that `compile_query` would find, as dictionaries of the variables `names`, which are those it finds.
 
     No two are the same: facts and things are found once, and `distinct` sees to the rest.
@@ -112,32 +112,32 @@ def compile_answers(e: Expression, schema: Schema, bound: frozenset[str], names:
     return answers
 
 
-def witnesses(e: Exists, schema: Schema) -> Search:
+def witnesses(e: Exists, schema: Vocabulary) -> Search:
     """A search for the choices of objects that make the body true."""
     return _search(_witnessing(e, schema), schema, free_variables(e))
 
 
-def counterexamples(e: Forall, schema: Schema) -> Search:
+def counterexamples(e: Forall, schema: Vocabulary) -> Search:
     """A search for the choices of objects that make the body false."""
     return _search(_refuting(e, schema), schema, free_variables(e))
 
 
-def _witnessing(e: Exists, schema: Schema) -> list[Conjunct]:
+def _witnessing(e: Exists, schema: Vocabulary) -> list[Conjunct]:
     return [*_ranges(e.variables, schema), *conjuncts(e.body)]
 
 
-def _refuting(e: Forall, schema: Schema) -> list[Conjunct]:
+def _refuting(e: Forall, schema: Vocabulary) -> list[Conjunct]:
     return [*_ranges(e.variables, schema), *conjuncts(opposite(e.body))]
 
 
-def _ranges(variables: tuple[TypedVariable, ...], schema: Schema) -> list[Range]:
+def _ranges(variables: tuple[TypedVariable, ...], schema: Vocabulary) -> list[Range]:
     for variable in variables:
         for type_name in variable.types:
             schema.require_type(type_name, variable.place)
     return [Range(v) for v in variables]
 
 
-def _atom(atom: Atom, schema: Schema) -> Test:
+def _atom(atom: Atom, schema: Vocabulary) -> Test:
     if schema.is_type(atom.predicate, len(atom.args)):
         return _type_test(compile_term(atom.args[0], schema), (atom.predicate,), schema)
     check_arity(schema.predicate(atom.predicate, atom.place), len(atom.args), atom.place)
@@ -147,7 +147,7 @@ def _atom(atom: Atom, schema: Schema) -> Test:
     return lambda world, bindings: world.holds(predicate, arguments(world, bindings))
 
 
-def _computed(atom: Atom, schema: Schema) -> Test:
+def _computed(atom: Atom, schema: Vocabulary) -> Test:
     of, arguments = schema.computed[atom.predicate], compile_arguments(atom.args, schema)
     inputs = tuple(
         compile_test(read, schema) if isinstance(read, Atom) else compile_term(read, schema)
@@ -165,7 +165,7 @@ def _computed(atom: Atom, schema: Schema) -> Test:
     return test
 
 
-def _type_test(get: Getter, types: tuple[str, ...], schema: Schema) -> Test:
+def _type_test(get: Getter, types: tuple[str, ...], schema: Vocabulary) -> Test:
     allowed = {t for wanted in types or ("object",) for t in schema.subtypes(wanted)}
 
     def test(world: World, bindings: Bindings) -> bool:
@@ -219,7 +219,7 @@ def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, o
     raise otherwise
 
 
-def _found(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Test:
+def _found(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset[str]) -> Test:
     """Whether a search finds anything; it takes fewer frames than the search, which nested quantifiers pay for."""
     plan = SearchPlan(conditions, schema, bound)
     first_test = plan.first.test
@@ -244,7 +244,7 @@ def _found(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]
     return test
 
 
-def _search(conditions: Iterable[Conjunct], schema: Schema, bound: frozenset[str]) -> Search:
+def _search(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset[str]) -> Search:
     plan = SearchPlan(conditions, schema, bound)
     first_test = plan.first.test
 
@@ -351,7 +351,7 @@ class SearchPlan:
     def __init__(
         self,
         conditions: Iterable[Conjunct],
-        schema: Schema,
+        schema: Vocabulary,
         bound: frozenset[str],
         names: tuple[str, ...] | None = None,
     ) -> None:
@@ -399,7 +399,7 @@ class SearchPlan:
         return _type_test(compile_term(Variable(variable.name), self._schema), variable.types, self._schema)
 
 
-def _lookup(step: Step, schema: Schema, bound: frozenset[str]) -> Lookup | Search:
+def _lookup(step: Step, schema: Vocabulary, bound: frozenset[str]) -> Lookup | Search:
     """Finds values for the variables of a condition that are not in `bound`."""
     finds = step.free - bound
     match step.conjunct:

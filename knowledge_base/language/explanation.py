@@ -32,9 +32,9 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.printer import to_text
 from knowledge_base.language.terms import Bindings
+from knowledge_base.language.vocabulary import Read
 from knowledge_base.language.world import World
 from knowledge_base.spelling import value_text
-from knowledge_base.world.computation import Read
 
 _Judged = tuple["Explanation", InputError | None]
 """A part, and why it cannot be computed."""

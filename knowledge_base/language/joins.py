@@ -27,7 +27,7 @@ from knowledge_base.language.expression import (
     free_variables,
     variable_place,
 )
-from knowledge_base.world.schema import Schema
+from knowledge_base.language.vocabulary import Vocabulary
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Step:
 
     conjunct: Conjunct
     free: frozenset[str]
-    schema: Schema
+    schema: Vocabulary
 
     def is_ready(self, bound: AbstractSet[str]) -> bool:
         """Whether it can be done when the variables `bound` have values."""
@@ -85,7 +85,7 @@ def conjuncts(e: Expression) -> Iterator[Expression]:
         yield e
 
 
-def as_range(conjunct: Conjunct, schema: Schema) -> Conjunct:
+def as_range(conjunct: Conjunct, schema: Vocabulary) -> Conjunct:
     """A type's atom about a variable ranges over the things of that type."""
     match conjunct:
         case Atom(name, (Variable(variable),)) if schema.is_type(name, 1):
@@ -107,7 +107,7 @@ def opposite(e: Expression) -> Expression:
             return Not(e, place=e.place)
 
 
-def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Schema) -> list[Step]:
+def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabulary) -> list[Step]:
     """The look-ups in a good order when the variables `bound` have values and no numbers of facts are known.
 
     Raises:
@@ -153,7 +153,7 @@ def _free(conjunct: Conjunct) -> frozenset[str]:
     return free_variables(conjunct)
 
 
-def _finds(conjunct: Conjunct, bound: frozenset[str], schema: Schema) -> frozenset[str]:
+def _finds(conjunct: Conjunct, bound: frozenset[str], schema: Vocabulary) -> frozenset[str]:
     return _free(conjunct) if isinstance(conjunct, Range) else found_variables(conjunct, schema, bound)
 
 

@@ -8,8 +8,8 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import Atom, Term, TypedVariable, Variable, free_variables
 from knowledge_base.language.terms import Argument, Bindings, compile_argument
+from knowledge_base.language.vocabulary import Vocabulary
 from knowledge_base.language.world import World
-from knowledge_base.world.schema import Schema
 
 Search = Callable[[World, Bindings], Iterator[Bindings]]
 Answer = dict[str, Value]
@@ -19,7 +19,7 @@ Answering = Callable[[World, Iterable[Bindings]], list[Answer]]
 class Lookup:
     """A search through the facts that match an atom whose variables `finds` are open."""
 
-    def __init__(self, atom: Atom, schema: Schema, finds: frozenset[str]) -> None:
+    def __init__(self, atom: Atom, schema: Vocabulary, finds: frozenset[str]) -> None:
         first: dict[str, int] = {}
         self._repeated: list[tuple[int, int]] = []
         self._computed: list[tuple[int, Argument]] = []

@@ -8,10 +8,10 @@ of `compiler`: where several may come next, the source has each of the ways and 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import CodeType, FunctionType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from knowledge_base.language.author import Author
 from knowledge_base.language.expression import (
@@ -25,14 +25,53 @@ from knowledge_base.language.expression import (
     variables_in_order,
 )
 from knowledge_base.language.joins import Conjunct, Range, as_range, conjuncts, order
-from knowledge_base.world.schema import Schema
-
-if TYPE_CHECKING:
-    from knowledge_base.world.state import WorldState
+from knowledge_base.language.vocabulary import Vocabulary
 
 MOST_LOOKUPS = 3
 """Each further one multiplies the ways that the source has."""
 MOST_TESTS = 50
+
+
+class Index(Protocol):
+    """Facts as the code looks them up: all of a predicate, those with a value in one place, and their arguments."""
+
+    @property
+    def by_predicate(self) -> Mapping[str, object]:
+        """Facts by predicate."""
+        ...
+
+    @property
+    def by_argument(self) -> Mapping[Any, object]:
+        """Facts by predicate, position and value."""
+        ...
+
+    @property
+    def listed(self) -> object:
+        """What lists them."""
+        ...
+
+
+class IndexedWorld(Protocol):
+    """What the code is bound to; it stays the same object while the world changes."""
+
+    @property
+    def facts(self) -> Index:
+        """What is true."""
+        ...
+
+    @property
+    def nodes(self) -> Mapping[str, str]:
+        """All things with their types."""
+        ...
+
+    @property
+    def stamp(self) -> object:
+        """Has the `version`, which is `None` while a change is being made."""
+        ...
+
+    def objects(self, type_name: str) -> Iterable[str]:
+        """The things of that type or a subtype."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +86,7 @@ class Source:
     code: CodeType
     constants: Mapping[str, object]
 
-    def bound(self, state: WorldState, **more: object) -> FunctionType:
+    def bound(self, state: IndexedWorld, **more: object) -> FunctionType:
         """The function for a world, which stays the same object while it changes."""
         scope: dict[str, Any] = {
             "facts": state.facts.by_predicate,
@@ -64,7 +103,7 @@ class Source:
         return function
 
 
-def condition_source(e: Expression, schema: Schema, params: Sequence[str]) -> Source | None:
+def condition_source(e: Expression, schema: Vocabulary, params: Sequence[str]) -> Source | None:
     """Whether `e` holds, all of whose free variables are `params`; `None` if it is not plain."""
     if isinstance(e, Exists):
         parts: list[Conjunct] = [*map(Range, e.variables), *conjuncts(e.body)]
@@ -73,7 +112,7 @@ def condition_source(e: Expression, schema: Schema, params: Sequence[str]) -> So
     return _written(parts, schema, params, None)
 
 
-def test_source(e: Expression, schema: Schema, params: Sequence[str]) -> Source | None:
+def test_source(e: Expression, schema: Vocabulary, params: Sequence[str]) -> Source | None:
     """As `condition_source`, for who holds the lock and has judged the values; `None` also if something is looked up.
 
     The function takes more values than it has parameters, too.
@@ -81,14 +120,19 @@ def test_source(e: Expression, schema: Schema, params: Sequence[str]) -> Source 
     return _written(list(conjuncts(e)), schema, params, None, bare=True)
 
 
-def query_source(e: Expression, schema: Schema, params: Sequence[str]) -> Source | None:
+def query_source(e: Expression, schema: Vocabulary, params: Sequence[str]) -> Source | None:
     """All values of the free variables of `e` that are not `params`; `None` if it is not plain."""
     names = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in params))
     return _written(list(conjuncts(e)), schema, params, names)
 
 
 def _written(
-    parts: list[Conjunct], schema: Schema, params: Sequence[str], answers: tuple[str, ...] | None, *, bare: bool = False
+    parts: list[Conjunct],
+    schema: Vocabulary,
+    params: Sequence[str],
+    answers: tuple[str, ...] | None,
+    *,
+    bare: bool = False,
 ) -> Source | None:
     if len(parts) > MOST_TESTS or not all(_plain(part, schema) for part in parts):
         return None
@@ -100,7 +144,7 @@ def _written(
     return Source(compile("\n".join(lines), "<question>", "exec"), author.constants)
 
 
-def _plain(part: Conjunct, schema: Schema) -> bool:
+def _plain(part: Conjunct, schema: Vocabulary) -> bool:
     match part:
         case Range():
             return True

@@ -13,8 +13,8 @@ from knowledge_base.errors import InputError, Place, SchemaError
 from knowledge_base.facts import Content, Value
 from knowledge_base.language.check import check_arity
 from knowledge_base.language.expression import Arithmetic, Call, Comparison, Constant, Term, Variable
+from knowledge_base.language.vocabulary import Vocabulary
 from knowledge_base.language.world import World
-from knowledge_base.world.schema import Schema
 
 Bindings = Mapping[str, Value]
 Getter = Callable[[World, Bindings], Content]
@@ -36,7 +36,7 @@ _FOLD: Mapping[str, Callable[[Number, Number], Number]] = {
 }
 
 
-def compile_term(term: Term, schema: Schema) -> Getter:
+def compile_term(term: Term, schema: Vocabulary) -> Getter:
     """A function that gives the term's value; all its variables must then be bound.
 
     Raises:
@@ -54,7 +54,7 @@ def compile_term(term: Term, schema: Schema) -> Getter:
             return _arithmetic(term, schema)
 
 
-def compile_arguments(terms: tuple[Term, ...], schema: Schema) -> Callable[[World, Bindings], tuple[Value, ...]]:
+def compile_arguments(terms: tuple[Term, ...], schema: Vocabulary) -> Callable[[World, Bindings], tuple[Value, ...]]:
     """A function that gives the values of all terms."""
     constants = tuple(t.value for t in terms if isinstance(t, Constant))
     if len(constants) == len(terms):
@@ -70,7 +70,7 @@ def compile_arguments(terms: tuple[Term, ...], schema: Schema) -> Callable[[Worl
     return lambda world, bindings: tuple([get(world, bindings) for get in getters])
 
 
-def compile_argument(term: Term, schema: Schema) -> Argument:
+def compile_argument(term: Term, schema: Vocabulary) -> Argument:
     """As `compile_term`, for what facts are about.
 
     Raises:
@@ -82,7 +82,7 @@ def compile_argument(term: Term, schema: Schema) -> Argument:
     return cast("Argument", compile_term(term, schema))
 
 
-def compile_comparison(e: Comparison, schema: Schema) -> Test:
+def compile_comparison(e: Comparison, schema: Vocabulary) -> Test:
     """A function that compares; `=` and `!=` anything, the others numbers.
 
     The function raises `SchemaError` when it meets a side that is no number.
@@ -121,13 +121,13 @@ def as_number(value: Content, used_by: str, place: Place | None) -> Number:
     return value
 
 
-def _call(call: Call, schema: Schema) -> Getter:
+def _call(call: Call, schema: Vocabulary) -> Getter:
     check_arity(schema.function(call.function, call.place), len(call.args), call.place)
     function, arguments = call.function, compile_arguments(call.args, schema)
     return lambda world, bindings: world.value(function, arguments(world, bindings))
 
 
-def _arithmetic(term: Arithmetic, schema: Schema) -> Getter:
+def _arithmetic(term: Arithmetic, schema: Vocabulary) -> Getter:
     name, place = term.operator, term.place
     if name == GEOMETRY:
         numbers = compile_arguments(term.args, schema)

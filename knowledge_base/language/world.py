@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from knowledge_base.facts import Content, Value
-from knowledge_base.world.schema import Schema
+from knowledge_base.language.vocabulary import Vocabulary
 
 
 class World(Protocol):
@@ -19,7 +19,7 @@ class World(Protocol):
     """
 
     @property
-    def schema(self) -> Schema:
+    def schema(self) -> Vocabulary:
         """What may be said about it."""
         ...
 

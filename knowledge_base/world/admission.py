@@ -10,9 +10,9 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.check import check_arity, value_fits
 from knowledge_base.language.expression import TypedVariable
+from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
 from knowledge_base.language.world import World
 from knowledge_base.world.functional import require_single
-from knowledge_base.world.schema import ROOT_TYPE, VALUE_TYPES, Schema, Signature
 
 
 def check_delta(delta: Delta, world: World) -> None:
@@ -60,7 +60,7 @@ def check_fluent(fluent: Fact, world: World) -> None:
     _Admission(Delta(), world).fact(fluent, world.schema.function(fluent.predicate))
 
 
-def _require_replaceable(fact: Fact, schema: Schema) -> None:
+def _require_replaceable(fact: Fact, schema: Vocabulary) -> None:
     if not fact.args:
         raise SchemaError(f"{fact} has no argument that could be replaced")
     if len(fact.args) == 1 and fact.predicate not in schema.functional:

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 
 from knowledge_base.errors import Place, SchemaError, SchemaMismatchError, nearest
 from knowledge_base.facts import Delta
+from knowledge_base.language.vocabulary import ROOT_TYPE, Signature
 from knowledge_base.world.functional import require_single
-from knowledge_base.world.schema import ROOT_TYPE, Schema, Signature
+from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 

@@ -16,10 +16,8 @@ from knowledge_base.errors import InputError, Place, SchemaError
 from knowledge_base.language.expression import Arithmetic, Atom, Call, Term, TypedVariable, Variable, free_variables
 from knowledge_base.language.parser import parse_term
 from knowledge_base.language.printer import to_text
+from knowledge_base.language.vocabulary import Read
 from knowledge_base.pddl.domain_text import parse_declaration
-
-Read = Term | Atom
-"""What comes in: a term's value, or whether an atom is true."""
 
 MOST_NESTED = 8
 """How many may read one through the other; each multiplies what judging the first costs."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from knowledge_base.facts import Content, Delta, Fact, Value
+from knowledge_base.language.vocabulary import Vocabulary
 from knowledge_base.language.world import World
 from knowledge_base.world.admission import check_delta
 from knowledge_base.world.functional import rivals
 from knowledge_base.world.index import FactIndex
-from knowledge_base.world.schema import Schema
 
 
 class Overlay:
@@ -28,7 +28,7 @@ class Overlay:
         self._gone: dict[str, None] = {}
 
     @property
-    def schema(self) -> Schema:
+    def schema(self) -> Vocabulary:
         """What may be said about it: as of the base."""
         return self._schema
 

@@ -11,46 +11,14 @@ from knowledge_base.content import GEOMETRY, UNSET
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Content
 from knowledge_base.language.check import check_reads
-from knowledge_base.language.expression import KEYWORDS, TypedVariable
+from knowledge_base.language.expression import KEYWORDS
 from knowledge_base.language.typed_list import TypedName
+from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature
 from knowledge_base.pddl.domain_text import DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.world.computation import Computed, in_reading_order
 
 Declared = tuple[str, Place | None]
 """A declaration as written, and where."""
-
-ROOT_TYPE = "object"
-VALUE_TYPES = ("number", "text", "boolean")
-"""Types of arguments that are values and not things; they have no subtypes and cannot be quantified over."""
-
-
-@dataclass(frozen=True, slots=True)
-class Signature:
-    """A predicate's or function's name and the parameters it takes, in order.
-
-    `result` is what a function is worth, one of `UNSET`; a predicate has none.
-    """
-
-    name: str
-    parameters: tuple[TypedVariable, ...] = ()
-    result: str | None = None
-    place: Place | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def arity(self) -> int:
-        """The number of arguments it takes."""
-        return len(self.parameters)
-
-    def __str__(self) -> str:
-        """As declared: `(on ?a - item ?b - place)`, `(label ?a - item) - text`."""
-        typed = (f"?{p.name} - {' or '.join(p.types or (ROOT_TYPE,))}" for p in self.parameters)
-        result = "" if self.result in (None, "number") else f" - {self.result}"
-        return "(" + " ".join([self.name, *typed]) + ")" + result
-
-    def means(self, other: Signature) -> bool:
-        """Whether both take the same types in the same order and are worth the same, whatever the parameters' names."""
-        mine, others = ([p.types for p in s.parameters] for s in (self, other))
-        return mine == others and self.result == other.result
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
     from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.facts import Fact
-    from knowledge_base.world.schema import Schema
+    from knowledge_base.language.vocabulary import Vocabulary
     from planning.posing.conditions import Grounder
 
 TOTAL_COST = Call("total-cost")
 """What PDDL calls the sum of action costs; the metric of a domain that declares it, unless another is asked for."""
 
 
-def metric_of(metric: Metric | None, schema: Schema) -> Term | None:
+def metric_of(metric: Metric | None, schema: Vocabulary) -> Term | None:
     """What plans shall have as little of as possible: by default `(total-cost)`, if it is declared."""
     if metric is not None:
         return metric.term if metric.direction == "minimize" else Arithmetic("-", (metric.term,))

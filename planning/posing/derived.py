@@ -36,8 +36,8 @@ from knowledge_base.language.expression import (
     parts_of,
 )
 from knowledge_base.language.memory import IdentityCache
+from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES
 from knowledge_base.world.overlay import Overlay
-from knowledge_base.world.schema import ROOT_TYPE, VALUE_TYPES
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.posing.relevance import changed, names_of
 

@@ -16,7 +16,7 @@ from planning.quantities import Assignment, combined, fluents
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from knowledge_base.world.schema import Schema
+    from knowledge_base.language.vocabulary import Vocabulary
     from planning.domain import PlanningAction
     from planning.patience import Patience
 
@@ -185,7 +185,7 @@ class Rule:
                 yield from self.join(reached, atoms[:best] + atoms[best + 1 :], extended)
 
 
-def joined_atoms(action: PlanningAction, schema: Schema) -> tuple[Atom, ...]:
+def joined_atoms(action: PlanningAction, schema: Vocabulary) -> tuple[Atom, ...]:
     """The positive conjuncts of an action's precondition that facts can be joined with."""
     return tuple(
         atom

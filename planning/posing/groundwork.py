@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.effect import ForEach, effect_conditions, effect_parts
 from knowledge_base.language.expression import Exists, Expression, Forall, Term, Variable, parts_of
-from knowledge_base.world.schema import ROOT_TYPE
+from knowledge_base.language.vocabulary import ROOT_TYPE
 from planning.patience import Patience
 from planning.plan import PlanStep
 from planning.posing.conditions import Grounder
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from knowledge_base.language.evaluation import World
-    from knowledge_base.world.schema import Schema
+    from knowledge_base.language.vocabulary import Vocabulary
     from planning.domain import PlanningAction
 
 
@@ -60,7 +60,7 @@ class Consulted:
         return len(self.things) > before
 
     @property
-    def schema(self) -> Schema:
+    def schema(self) -> Vocabulary:
         """What may be said about it."""
         return self._world.schema
 
@@ -212,7 +212,7 @@ def things_of(world: World) -> dict[str, str]:
     return {name: world.type_of(name) or ROOT_TYPE for name in world.objects(ROOT_TYPE)}
 
 
-def _ranges_over_all(action: PlanningAction, schema: Schema) -> bool:
+def _ranges_over_all(action: PlanningAction, schema: Vocabulary) -> bool:
     """Whether which ways there are depends on all things of a type, not only on those that facts name."""
     bound = {term.name for atom in joined_atoms(action, schema) for term in atom.args if isinstance(term, Variable)}
     return (

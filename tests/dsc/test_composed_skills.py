@@ -9,9 +9,9 @@ from dsc_charts import plot
 from dsc_runs import Arm, Ran
 
 from dsc.calls import Outcome
-from dsc.components.plot_skill import PlotComponent
 from dsc.components.trees import action, condition, fallback, repeat, retry, sequence, tree_skill
 from dsc.dynamic.library import Library
+from dsc.sequencer.plot_skill import PlotComponent
 from dsc.validation import validate_plot
 from knowledge_base.facts import Delta, fact
 

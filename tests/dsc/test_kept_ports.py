@@ -7,8 +7,8 @@ import asyncio
 import pytest
 from dsc_crashes import Crashes, Robot, Run, copied
 
+from dsc.blocking import BlockingCall
 from dsc.calls import Outcome
-from dsc.components.blocking import BlockingCall
 from dsc.components.ports import event, query, takes
 from dsc.components.trees import action, sequence, tree_skill
 from dsc.events import Event
