@@ -8,17 +8,15 @@ from functools import partial
 from itertools import count
 from threading import Lock
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self
+from typing import Literal, Protocol, Self
 
 from knowledge_base.conditions.holding import Hold
 from knowledge_base.conditions.rows import Row
+from knowledge_base.conditions.shape import Args
 from knowledge_base.conditions.waiters import Waiters
 from knowledge_base.errors import ConditionCancelledError, InputError
 from knowledge_base.facts import Value
-
-if TYPE_CHECKING:
-    from knowledge_base.conditions.installed import Installed
-    from knowledge_base.conditions.shape import Args
+from knowledge_base.world.turn import Turn
 
 Fire = Literal["edge", "each"]
 FIRE: tuple[Fire, ...] = ("edge", "each")
@@ -69,6 +67,33 @@ class _Listening:
     ended: bool = field(default=False)
 
 
+class Owner(Protocol):
+    """Who keeps conditions evaluated.
+
+    Attributes:
+        version: the latest version that was judged.
+    """
+
+    version: int
+
+    @property
+    def lock(self) -> Turn:
+        """Held while conditions are judged."""
+        ...
+
+    def remove(self, condition: Condition) -> None:
+        """Forget a condition; under the lock."""
+        ...
+
+    def later(self, call: Callable[[], None]) -> None:
+        """Queue a call for when the lock is released; under the lock."""
+        ...
+
+    def deliver(self) -> None:
+        """Make the queued calls; without the lock."""
+        ...
+
+
 class Condition:
     """A condition that the knowledge base keeps evaluated; made by `KnowledgeBase.install`.
 
@@ -76,7 +101,7 @@ class Condition:
     """
 
     def __init__(
-        self, owner: Installed, text: str, rows: tuple[Row, Row], names: tuple[str, ...], terms: Terms, number: int
+        self, owner: Owner, text: str, rows: tuple[Row, Row], names: tuple[str, ...], terms: Terms, number: int
     ) -> None:
         rise, _ = self.rows = rows
         self.text = text

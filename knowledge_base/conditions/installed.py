@@ -63,6 +63,7 @@ class Installed:
         self._announcer = announcer
         self._relations: dict[Shape, Relation] = {}
         self._readers: dict[tuple[Kind, str], Readers] = {}
+        self._told: dict[Row, dict[Condition, None]] = {}
         self._changed: dict[Row, None] = {}
         self._numbers = 0
 
@@ -79,7 +80,7 @@ class Installed:
         self._numbers += 1
         condition = Condition(self, to_text(substitute(e, params)), (rise, stay), found.names, terms, self._numbers)
         for row in (rise, stay):
-            row.conditions[condition] = None
+            self._told.setdefault(row, {})[condition] = None
         if terms.fire == "each":
             stay.relation.want_all(stay)
         condition.begin()
@@ -87,17 +88,18 @@ class Installed:
 
     def remove(self, condition: Condition) -> None:
         """Forget a condition, and what was kept for it alone."""
-        for row in condition.rows:
-            row.conditions.pop(condition, None)
-            if not row.conditions and row.key in row.relation.rows:
+        for row in dict.fromkeys(condition.rows):
+            told = self._told[row]
+            del told[condition]
+            if not told:
+                del self._told[row]
                 row.relation.drop(row)
                 if not row.relation.rows:
                     self._relations.pop(row.relation.shape, None)
 
     def conditions(self) -> list[Condition]:
         """All that are installed, in the order of installation."""
-        rows = (row for relation in self._relations.values() for row in relation.rows.values())
-        return sorted({c for row in rows for c in row.conditions}, key=lambda c: c.number)
+        return sorted({c for told in self._told.values() for c in told}, key=lambda c: c.number)
 
     def departures(self, effective: Delta) -> list[Event]:
         """The types and numbers that go with removed things; to be asked for before the change is made."""
@@ -158,7 +160,7 @@ class Installed:
             for trigger, rows in tuple(readers.made(args, sign)):
                 if rows and trigger.admits(*args):  # what came before may have closed them
                     trigger.relation.make(trigger, args, rows)
-        touched = {condition for row in self._changed for condition in row.conditions}
+        touched = {condition for row in self._changed for condition in self._told.get(row, ())}
         for condition in sorted(touched, key=lambda c: c.number):
             condition.judge(self.version, self._changed)
 

@@ -15,7 +15,6 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 if TYPE_CHECKING:
-    from knowledge_base.conditions.condition import Condition
     from knowledge_base.conditions.relation import Relation
     from knowledge_base.conditions.shape import Args
 
@@ -33,10 +32,9 @@ class Row:
         witnesses: choices for the shape's answers that make it true: one is kept, or all (`wants_all`).
         wants_all: whether each change of the set of witnesses counts.
         is_listed: whether changes find it among the open rows.
-        conditions: who is told, in the order of installation.
     """
 
-    __slots__ = ("bindings", "conditions", "is_listed", "key", "relation", "wants_all", "witnesses")
+    __slots__ = ("bindings", "is_listed", "key", "relation", "wants_all", "witnesses")
 
     def __init__(self, relation: Relation, key: Args) -> None:
         self.relation = relation
@@ -45,7 +43,6 @@ class Row:
         self.is_listed = False
         self.witnesses: dict[Args, None] = {}
         self.wants_all = False
-        self.conditions: dict[Condition, None] = {}
 
     @property
     def truth(self) -> bool:
