@@ -151,11 +151,16 @@ class SchemaMismatchError(SchemaError):
 
     Attributes:
         differences: what is missing or declared otherwise, one sentence each.
+
+    Args:
+        said: what they come to.
     """
 
-    def __init__(self, differences: Sequence[str], *, place: Place | None = None) -> None:
+    def __init__(
+        self, differences: Sequence[str], *, place: Place | None = None, said: str = "the schema is another one"
+    ) -> None:
         more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
-        super().__init__(f"the schema is another one: {'; '.join(differences[:3])}{more}", place=place)
+        super().__init__(f"{said}: {'; '.join(differences[:3])}{more}", place=place)
         self.differences = tuple(differences)
 
 

@@ -53,6 +53,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
     Raises:
         StoreError: the file is not there, not a store, or cannot be read.
     """
+    require_place(path)
     if not path.exists():
         beside = files_beside(path)
         raise StoreError(f"there is no store '{path.name}'", place=Place(str(path)), found=path.name, valid=beside)
@@ -64,6 +65,14 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
             yield connection
         finally:
             connection.close()
+
+
+def require_place(path: Path) -> None:
+    """Raise `StoreError` where no file can be: the path is a folder, or in none."""
+    if path.is_dir():
+        raise StoreError(f"'{path.name}' is a folder; a store is a file", place=Place(str(path)))
+    if not path.parent.is_dir():
+        raise StoreError(f"there is no folder '{path.parent}' for a store to be in", place=Place(str(path)))
 
 
 def writing(path: Path, durability: Durability) -> sqlite3.Connection:

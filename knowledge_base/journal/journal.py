@@ -11,7 +11,7 @@ from knowledge_base.errors import ConflictError, InputError, Place, StoreError
 from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
 from knowledge_base.journal.archive import Archive
-from knowledge_base.journal.file import Durability, create_tables, is_new, reported, writing
+from knowledge_base.journal.file import Durability, create_tables, is_new, reported, require_place, writing
 from knowledge_base.journal.history import Version, Writer
 from knowledge_base.journal.lock import WriterLock
 from knowledge_base.world.compatibility import missing_constants, require_extension, require_functional
@@ -55,6 +55,7 @@ class Journal(Archive):
 
     def __init__(self, path: Path, schema: Schema | None, durability: Durability, clock: Callable[[], float]) -> None:
         self._path = path
+        require_place(path)
         if schema is None and not path.exists():
             raise _no_schema(path)
         self._place = Place(str(path))

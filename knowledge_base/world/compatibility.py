@@ -21,18 +21,24 @@ def require_extension(written: Schema, given: Schema, place: Place | None = None
     Raises:
         SchemaMismatchError: each difference is named, with the nearest name of `given` for a missing one.
     """
+    foreign = _declared(written).isdisjoint(_declared(given))
     found = [
-        *_differences("type", written.types, given.types),
-        *_differences("constant", written.constants, given.constants),
-        *_differences("predicate", _shapes(written.predicates), _shapes(given.predicates)),
-        *_differences("function", _shapes(written.functions), _shapes(given.functions)),
+        *_differences("type", written.types, given.types, hint=not foreign),
+        *_differences("constant", written.constants, given.constants, hint=not foreign),
+        *_differences("predicate", _shapes(written.predicates), _shapes(given.predicates), hint=not foreign),
+        *_differences("function", _shapes(written.functions), _shapes(given.functions), hint=not foreign),
         *(
             f"the predicate '{name}' was functional, now it is not"
             for name in sorted(written.functional & given.predicates.keys() - given.functional)
         ),
     ]
     if found:
-        raise SchemaMismatchError(found, place=place)
+        said = "it is about another domain" if foreign else "the schema is another one"
+        raise SchemaMismatchError(found, place=place, said=said)
+
+
+def _declared(schema: Schema) -> set[str]:
+    return {*schema.types, *schema.constants, *schema.predicates, *schema.functions} - {ROOT_TYPE}
 
 
 def require_functional(state: WorldState, place: Place | None = None) -> None:
@@ -64,10 +70,12 @@ def missing_constants(state: WorldState, place: Place | None = None) -> Delta:
     return Delta(nodes={name: t for name, t in constants.items() if name not in known})
 
 
-def _differences(kind: str, written: Mapping[str, str | None], given: Mapping[str, str | None]) -> Iterator[str]:
+def _differences(
+    kind: str, written: Mapping[str, str | None], given: Mapping[str, str | None], *, hint: bool
+) -> Iterator[str]:
     for name, declared in written.items():
         if name not in given:
-            meant = nearest(name, given.keys() - written.keys())
+            meant = nearest(name, given.keys() - written.keys()) if hint else None
             yield f"the {kind} '{name}' is missing" + (f" (nearest: '{meant}')" if meant else "")
         elif given[name] != declared:
             yield f"the {kind} '{name}' was declared '{declared}', now it is '{given[name]}'"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import sqlite3
 
 import pytest
@@ -15,6 +17,7 @@ from knowledge_base import (
     StoreError,
     fact,
 )
+from knowledge_base.journal.lock import WriterLock
 
 TYPES = "item place - object cup - item"
 PREDICATES = "(on ?i - item ?p - place) (clean ?i - item)"
@@ -76,6 +79,16 @@ def test_many_differences_are_counted(path):
     assert len(caught.value.differences) == 5
 
 
+@pytest.mark.parametrize("read_only", [False, True])
+def test_a_store_of_another_domain_is_called_that(path, read_only):
+    other = Schema.parse("(define (domain e) (:types lamp) (:predicates (one ?l - lamp)))")
+    said = r"world\.kb: it is about another domain: the type 'item' is missing"
+    with pytest.raises(SchemaMismatchError, match=said) as caught:
+        KnowledgeBase.open(other, path, read_only=read_only)
+    assert len(caught.value.differences) == 7
+    assert "nearest" not in str(caught.value)
+
+
 def test_more_declarations_are_accepted_and_recorded(path):
     more = schema(
         TYPES + " can - item", "home shelf tray - place", PREDICATES + " (full ?c - can)", FUNCTIONS + " (age)"
@@ -121,7 +134,7 @@ FOREIGN = {
     "other database": (lambda p: (p.unlink(), database(p, "CREATE TABLE t (x)")), "no knowledge store"),
     "other application": (lambda p: (p.unlink(), database(p, "PRAGMA application_id = 7")), "no knowledge store"),
     "later format": (lambda p: database(p, "PRAGMA user_version = 9"), "format 9, this program reads format 2"),
-    "folder": (lambda p: (p.unlink(), p.mkdir()), "cannot (open|read) the store"),
+    "folder": (lambda p: (p.unlink(), p.mkdir()), "'world.kb' is a folder; a store is a file"),
     "schema": (lambda p: database(p, "UPDATE schemas SET declarations = '[1]'"), "the schema cannot be read"),
     "change": (lambda p: database(p, "UPDATE changes SET delta = '{' WHERE version = 2"), "the change to version 2 cannot be read"),
     "change of nothing known": (
@@ -154,9 +167,50 @@ def test_an_empty_file_becomes_a_store_but_needs_a_schema(tmp_path):
         assert kb.objects("place") == ["home"]
 
 
-def test_a_store_in_no_folder_is_refused(tmp_path):
-    with pytest.raises(StoreError, match="No such file or directory"):
-        KnowledgeBase.open(schema(), tmp_path / "nowhere" / "world.kb")
+@pytest.mark.parametrize("read_only", [False, True])
+def test_a_store_in_no_folder_is_refused(tmp_path, read_only):
+    with pytest.raises(StoreError, match=r"there is no folder '.*nowhere' for a store to be in"):
+        KnowledgeBase.open(schema(), tmp_path / "nowhere" / "world.kb", read_only=read_only)
+
+
+# --- the lock file
+
+
+def test_the_lock_file_goes_with_the_lock(path):
+    with KnowledgeBase.open(None, path), pytest.raises(StoreError, match=f"process {os.getpid()}"):
+        KnowledgeBase.open(None, path)
+    scribble(path)
+    with pytest.raises(StoreError):
+        KnowledgeBase.open(schema(), path)
+    assert [one.name for one in path.parent.iterdir() if one.name.endswith("-lock")] == []
+
+
+def test_a_lock_that_is_given_back_while_another_takes_it_is_held_by_one(path, monkeypatch):
+    """The other has opened the file already when it is taken away."""
+    first = WriterLock(path)
+    flock = fcntl.flock
+
+    def late(file, operation):
+        first.release()
+        flock(file, operation)
+
+    monkeypatch.setattr("knowledge_base.journal.lock.fcntl.flock", late)
+    second = WriterLock(path)
+    monkeypatch.undo()
+    with pytest.raises(StoreError, match="another writer"):
+        WriterLock(path)
+    second.release()
+    WriterLock(path).release()
+
+
+def test_a_lock_that_was_taken_over_is_not_given_back_for_the_other(path):
+    first = WriterLock(path)
+    path.with_name("world.kb-lock").unlink()  # as on a file system that knows no locks
+    second = WriterLock(path)
+    first.release()
+    with pytest.raises(StoreError, match="another writer"):
+        WriterLock(path)
+    second.release()
 
 
 def test_odd_names_of_files_are_taken_literally(tmp_path):
