@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from threading import Condition, Lock, RLock, get_ident
 from time import monotonic
@@ -87,6 +87,7 @@ class Turn:
         self._changer: int | None = None  # who has the turn
         self._depth = 0  # how often it was taken again
         self._changes = 0  # how many keep the door shut
+        self._as_changing = _Changing(self)
 
     @property
     def waiting(self) -> tuple[int, int]:
@@ -105,20 +106,13 @@ class Turn:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._lock.release()
 
-    @contextmanager
-    def changing(self) -> Iterator[None]:
+    def changing(self) -> AbstractContextManager[None]:
         """Nobody else changes anything or asks.
 
         Raises:
-            ConflictError: this thread is inside a question.
+            ConflictError: on entering, this thread is inside a question.
         """
-        self._take()
-        try:
-            yield
-        finally:
-            self._leave()
-            self._open()
-            self._lock.release()
+        return self._as_changing
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -127,95 +121,72 @@ class Turn:
         Raises:
             ConflictError: this thread is inside a question.
         """
-        self._take()
-        self._open()
+        self.take()
+        with self._guard:
+            self._open()
         self._lock.release()
         try:
             yield
         finally:
-            self._leave()
+            with self._guard:
+                self._leave()
 
     @contextmanager
     def ajar(self) -> Iterator[None]:
         """Who reads without the lock may go on; used while changing, as long as nothing is changed."""
-        self._open()
+        with self._guard:
+            self._open()
         try:
             yield
         finally:
-            self._shut()
+            with self._guard:
+                self._shut()
 
-    def _take(self) -> None:
-        """Get the turn and the lock, and shut the door."""
-        mine = self._changer == get_ident()
-        if not mine and self._held():
+    def take(self) -> None:
+        """Begin to be `changing`: get the turn and the lock, and shut the door."""
+        me = get_ident()
+        if self._changer != me and self._held():
             raise ConflictError("a question is being answered in this thread; nothing can be changed meanwhile")
-        self._shut()
+        with self._guard:
+            self._shut()
         try:
             self.__enter__()
         except BaseException:
-            self._open()
+            with self._guard:
+                self._open()
             raise
-        if mine:
+        if self._changer == me:
             self._depth += 1
         else:
-            self._get_turn()
+            self._get_turn(me)
 
-    def _get_turn(self) -> None:
+    def give_back(self) -> None:
+        """End to be `changing`."""
+        with self._guard:
+            self._leave()
+            self._open()
+        self._lock.release()
+
+    def _get_turn(self, me: int) -> None:
         """Have the turn; if somebody is alone, leave the line and stand in it again when the turn has come."""
-        place = _place()
         with self._guard:
             if self._changer is None:
-                self._changer = place.thread
+                self._changer = me
                 return
+            place = _place()
             self._changers.append(place)
-        self._open()
+            self._open()
         self._lock.release()
         try:
             self._enter(place)
         except BaseException:
             with self._guard:
-                came = place not in self._changers
-                if not came:
+                if place in self._changers:
                     self._changers.remove(place)
-            if came:
-                self._leave()
-                self._open()
+                else:  # the turn has come
+                    self._leave()
+                    self._open()
             raise
-
-    def _leave(self) -> None:
-        """Give back the turn, to who has waited longest; that one is in line before this returns."""
-        if self._depth:
-            self._depth -= 1
-            return
-        with self._guard:
-            if not self._changers:
-                self._changer = None
-                return
-            place = self._changers.popleft()
-            self._changer = place.thread
-            self._changes += 1
-            self._stamp.shut()
-            self._join(place)
-
-    def _shut(self) -> None:
-        with self._guard:
-            self._changes += 1
-            self._stamp.shut()
-
-    def _open(self) -> None:
-        with self._guard:
-            self._changes -= 1
-            if not self._changes:
-                self._stamp.open()
-
-    def _join(self, place: _Place) -> None:
-        self._line.append(place)
-        if len(self._line) == 1:
-            self._call_first()
-
-    def _call_first(self) -> None:
-        self._due = monotonic() + self._patience_s
-        self._line[0].gate.release()
 
     def _enter(self, place: _Place) -> None:
         """Wait in line; who is first waits for the lock, and opens the gate of the next when it has it."""
@@ -237,3 +208,50 @@ class Turn:
         except RuntimeError:
             return False
         return True
+
+    # --- under the guard
+
+    def _leave(self) -> None:
+        """Give the turn to who has waited longest, and put that one in line."""
+        if self._depth:
+            self._depth -= 1
+        elif self._changers:
+            place = self._changers.popleft()
+            self._changer = place.thread
+            self._shut()
+            self._join(place)
+        else:
+            self._changer = None
+
+    def _shut(self) -> None:
+        self._changes += 1
+        self._stamp.shut()
+
+    def _open(self) -> None:
+        self._changes -= 1
+        if not self._changes:
+            self._stamp.open()
+
+    def _join(self, place: _Place) -> None:
+        self._line.append(place)
+        if len(self._line) == 1:
+            self._call_first()
+
+    def _call_first(self) -> None:
+        self._due = monotonic() + self._patience_s
+        self._line[0].gate.release()
+
+
+class _Changing:
+    """Entering it takes the turn, leaving it gives it back; as a class, since every change passes here."""
+
+    __slots__ = ("_turn",)
+
+    def __init__(self, turn: Turn) -> None:
+        self._turn = turn
+
+    def __enter__(self) -> None:
+        self._turn.take()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._turn.give_back()
