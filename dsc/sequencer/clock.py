@@ -7,13 +7,19 @@ a real answer is awaited (a planner in another process) the clock is held: nothi
 from __future__ import annotations
 
 import asyncio
+import heapq
 import math
 import selectors
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Any, TypeVar
+from contextvars import Context
+from functools import partial
+from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
 
 _Result = TypeVar("_Result")
+_Args = TypeVarTuple("_Args")
+_DIGITS = 9
+"""Of a second: what is due closer together is due at one moment, as for every asyncio loop."""
 
 
 class LoopClock:
@@ -56,6 +62,11 @@ class LoopClock:
         """Whether time jumps instead of passing."""
         return isinstance(asyncio.get_running_loop(), SimulatedEventLoop)
 
+    async def settled(self) -> None:
+        """Wait until nothing more happens at this moment of simulated time; in real time, for no time."""
+        loop = asyncio.get_running_loop()
+        await (loop.settled() if isinstance(loop, SimulatedEventLoop) else asyncio.sleep(0))
+
     def hold(self) -> AbstractContextManager[None]:
         """Simulated time stands still inside; real time goes on, of course."""
         loop = asyncio.get_running_loop()
@@ -67,8 +78,16 @@ def _no_hold() -> Iterator[None]:
     yield
 
 
+def released() -> AbstractContextManager[None]:
+    """Inside, one hold on simulated time does not count: its owner waits in simulated time for what comes."""
+    loop = asyncio.get_running_loop()
+    return loop.release() if isinstance(loop, SimulatedEventLoop) else _no_hold()
+
+
 class SimulatedEventLoop(asyncio.SelectorEventLoop):
-    """An asyncio loop whose time jumps to the next scheduled callback once nothing is ready.
+    """An asyncio loop whose time jumps to what is due next once nothing is ready.
+
+    What is due at one moment comes in the order in which it was asked for; asyncio's own queue leaves that open.
 
     Args:
         at: its time when it is made, in simulated seconds.
@@ -76,12 +95,35 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
 
     def __init__(self, at: float = 0.0) -> None:
         self._simulated_now = at
+        self._due: list[_Due] = []
+        self._asked = 0
         self._holds = 0
-        super().__init__(_JumpingSelector(self._jump, lambda: self._holds > 0))
+        self._settling: list[asyncio.Future[None]] = []
+        super().__init__(_IdleSelector(self._go_on))
 
     def time(self) -> float:
         """Simulated seconds."""
         return self._simulated_now
+
+    def call_at(
+        self, when: float, callback: Callable[[Unpack[_Args]], object], *args: *_Args,
+        context: Context | None = None,
+    ) -> asyncio.TimerHandle:  # fmt: skip
+        """As every loop's."""
+        timer = asyncio.TimerHandle(when, callback, args, self, context)
+        call = partial(_unless_cancelled, timer, callback, *args)
+        if when <= self._simulated_now:
+            self.call_soon(call, context=context)
+        else:
+            self._asked += 1
+            heapq.heappush(self._due, _Due(round(when, _DIGITS), self._asked, timer, call, context))
+        return timer
+
+    async def settled(self) -> None:
+        """Wait until nothing more happens at this moment, without letting it pass."""
+        waits = self.create_future()
+        self._settling.append(waits)
+        await waits
 
     @contextmanager
     def hold(self) -> Iterator[None]:
@@ -92,23 +134,66 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         finally:
             self._holds -= 1
 
-    def _jump(self, seconds: float) -> None:
-        self._simulated_now += seconds
+    @contextmanager
+    def release(self) -> Iterator[None]:
+        """Inside, one `hold` does not count."""
+        self._holds -= 1
+        try:
+            yield
+        finally:
+            self._holds += 1
+
+    def _go_on(self) -> bool:
+        """Nothing is ready: let time jump, if it may; whether anything is ready now."""
+        settling, self._settling = self._settling, []
+        for waits in settling:
+            if not waits.done():
+                waits.set_result(None)
+        return bool(settling) or (not self._holds and self._jump())
+
+    def _jump(self) -> bool:
+        while self._due and self._due[0].timer.cancelled():
+            heapq.heappop(self._due)
+        if not self._due:
+            return False
+        moment = self._due[0].moment
+        while self._due and self._due[0].moment == moment:
+            due = heapq.heappop(self._due)
+            self._simulated_now = max(self._simulated_now, due.timer.when())
+            self.call_soon(due.call, context=due.context)
+        return True
 
 
-class _JumpingSelector(selectors.DefaultSelector):
-    def __init__(self, jump: Callable[[float], None], held: Callable[[], bool]) -> None:
+class _Due(NamedTuple):
+    """A call that is to come, ordered by its moment and then by its number; no two have the same."""
+
+    moment: float
+    number: int
+    timer: asyncio.TimerHandle
+    call: Callable[[], object]
+    context: Context | None
+
+
+def _unless_cancelled(
+    timer: asyncio.TimerHandle, callback: Callable[[Unpack[_Args]], object], *args: *_Args
+) -> None:
+    """What was due together with it may have cancelled it."""
+    if not timer.cancelled():
+        callback(*args)
+
+
+class _IdleSelector(selectors.DefaultSelector):
+    """Asks what to do instead when the loop would wait; waits for real input only if that is nothing."""
+
+    def __init__(self, go_on: Callable[[], bool]) -> None:
         super().__init__()
-        self._jump = jump
-        self._held = held
+        self._go_on = go_on
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        if timeout is None or (timeout > 0 and self._held()):
-            return super().select(None)
         ready: list[tuple[selectors.SelectorKey, int]] = super().select(0)
-        if not ready and timeout > 0:
-            self._jump(timeout)
-        return ready
+        if ready or timeout is not None or self._go_on():
+            return ready
+        return super().select(None)
 
 
 def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0) -> _Result:

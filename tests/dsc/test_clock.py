@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from dsc.sequencer.clock import LoopClock, run_real, run_simulated
+from dsc.sequencer.clock import LoopClock, released, run_real, run_simulated
 
 
 def test_simulated_time_jumps_to_what_is_due_next():
@@ -122,3 +122,78 @@ def test_many_small_sleeps_do_not_drift():
         return clock.now()
 
     assert run_simulated(main()) == pytest.approx(100)
+
+
+def test_what_is_due_at_one_moment_comes_in_the_order_in_which_it_was_asked_for():
+    async def main():
+        clock, woken = LoopClock(), []
+
+        async def sleeper(name):
+            await clock.sleep(3)
+            woken.append(name)
+
+        await asyncio.gather(*map(sleeper, range(20)))
+        for number in range(20):
+            clock.call_at(5.0, lambda number=number: woken.append(number))
+        await clock.sleep_until(6.0)
+        return woken
+
+    assert run_simulated(main()) == [*range(20)] * 2
+
+
+def test_what_is_due_may_cancel_what_is_due_with_it():
+    async def main():
+        clock, called, others = LoopClock(), [], []
+        clock.call_at(1.0, lambda: others.pop().cancel())
+        others.append(clock.call_at(1.0, lambda: called.append(1)))
+        await clock.sleep(2)
+        return called
+
+    assert run_simulated(main()) == []
+
+
+def test_a_moment_is_settled_when_nothing_more_happens_in_it():
+    async def main():
+        clock, heard = LoopClock(), []
+
+        async def slowly():
+            await clock.sleep(1)
+            for number in range(5):
+                await asyncio.sleep(0)
+                heard.append(number)
+
+        task = asyncio.get_running_loop().create_task(slowly())
+        await clock.sleep(1)
+        before = len(heard)
+        await clock.settled()
+        await task
+        return before, heard, clock.now()
+
+    assert run_simulated(main()) == (0, [0, 1, 2, 3, 4], 1.0)
+
+
+def test_a_released_hold_lets_time_pass_and_another_one_still_holds_it():
+    async def main():
+        clock = LoopClock()
+        with clock.hold():
+            with released():
+                await clock.sleep(1)
+                with clock.hold():
+                    task = asyncio.create_task(clock.sleep(1))
+                    await asyncio.to_thread(time.sleep, 0.01)
+                    held = clock.now()
+            await asyncio.to_thread(time.sleep, 0.01)
+            still = clock.now()
+        await task
+        return held, still, clock.now()
+
+    assert run_simulated(main()) == (1.0, 1.0, 2.0)
+
+
+def test_real_time_is_always_released():
+    async def main():
+        with LoopClock().hold(), released():
+            await LoopClock().settled()
+        return True
+
+    assert run_real(main())
