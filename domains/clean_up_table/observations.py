@@ -42,6 +42,10 @@ class _Notes:
                 self.holds_not(predicate, *args[:-1], other)
         self.holds(predicate, *args)
 
+    def known(self, item: str) -> None:
+        """The robot sees or handles it, so it is not missing."""
+        self.holds_not("missing", item)
+
     def counts(self, function: str, argument: str, number: int) -> None:
         self.values[fact(function, argument)] = float(number)
 
@@ -132,6 +136,7 @@ def _thrown_away(notes: _Notes, result: Result) -> None:
     _let_go(notes, item)
     _came_apart(notes, result)
     for sighting in result.sightings:
+        notes.known(sighting.item)
         for surface in SURFACES:
             notes.holds_not("lies-at", sighting.item, surface)
         notes.holds("tidy", sighting.item)
@@ -143,6 +148,7 @@ def _stack_fell(notes: _Notes, result: Result) -> None:
     _let_go(notes, item)
     _came_apart(notes, result)
     for sighting in result.sightings:
+        notes.known(sighting.item)
         notes.holds("lies-at", sighting.item, surface)
         notes.holds_not("tidy", sighting.item)
     _rooms(notes, result)
@@ -177,7 +183,7 @@ def _sighted(notes: _Notes, sighting: Sighting) -> None:
     item = sighting.item
     notes.nodes[item] = sighting.kind
     notes.holds("seen", item)
-    notes.holds_not("missing", item)
+    notes.known(item)
     if sighting.where in SURFACES:
         notes.holds_only("lies-at", item, sighting.where, of=SURFACES)
     else:
@@ -192,12 +198,14 @@ def _sighted(notes: _Notes, sighting: Sighting) -> None:
 
 
 def _grasped(notes: _Notes, item: str) -> None:
+    notes.known(item)
     notes.holds_not("hand-free")
     notes.holds("holding", item)
     notes.counts("failures", item, 0)
 
 
 def _let_go(notes: _Notes, item: str) -> None:
+    notes.known(item)
     notes.holds_not("holding", item)
     notes.holds("hand-free")
 

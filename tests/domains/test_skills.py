@@ -173,6 +173,30 @@ def test_a_grasp_for_nothing_misses_the_item():
     assert (robot.all("missing"), robot.lying("table")) == (["cup1"], [])
 
 
+def with_a_missing_item_in_a_cup() -> Robot:
+    """cup1 is in cup2, which the robot did not find, and has been told of since; of cup1 nobody said anything."""
+    robot = looked_round(World([new_item("cup", "cup1"), new_item("cup", "cup2")]))
+    robot.do("pick_up", item="cup1", surface="table")
+    robot.do("stack", item="cup1", carrier="cup2", surface="table")
+    robot.facts.add(fact("missing", "cup1"))
+    return robot
+
+
+def test_what_was_missing_in_a_carrier_that_is_thrown_away_is_accounted_for():
+    robot = with_a_missing_item_in_a_cup()
+    robot.do("look_into", carrier="cup2", surface="table")
+    robot.do("pick_up", item="cup2", surface="table")
+    robot.do("drive", to="sink")
+    robot.do("throw_away", item="cup2", destination="sink")
+    assert (robot.all("disposed"), robot.all("missing")) == (["cup1", "cup2"], [])
+
+
+def test_what_was_missing_and_is_in_the_hand_is_not_missing():
+    robot = with_a_missing_item_in_a_cup()
+    robot.do("take_out", item="cup1", carrier="cup2", surface="table")
+    assert robot.all("missing") == []
+
+
 def test_failures_in_a_row_are_counted_and_forgotten_on_success():
     robot = looked_round(World([new_item("can", "can1")]))
     robot.world.faults.ungraspable["can1"] = "grasp_failed"
