@@ -7,6 +7,7 @@ What is drawn from a seed is in `soak_run`. Exit status 1 if a promise was broke
 from __future__ import annotations
 
 import argparse
+import gc
 import multiprocessing
 import os
 import subprocess
@@ -59,6 +60,8 @@ def prepare() -> None:
     """What a process has for all its runs."""
     global _planners  # noqa: PLW0603  one for each process, which ends them with itself
     _planners = Planners()
+    gc.freeze()  # what is there stays
+    gc.set_threshold(20_000)
 
 
 def lived(seed: int, chance: float) -> Outcome:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from functools import cache
 from importlib.resources import files
@@ -13,6 +13,7 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from dsc.components.component import Component
+from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
@@ -20,7 +21,7 @@ from dsc.model.states import Budget
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import RunEnd, Sequencer
-from dsc.skills import signatures
+from dsc.skills import SkillSignature, signatures
 from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
 from dsc.validation import raise_findings, validate_library
@@ -50,7 +51,8 @@ class Executive:
     Args:
         domain: the planning domain, or the PDDL file it is in, which the components may add to; the knowledge
             base's schema declares all that these do.
-        plots: the plots; those with `implements` carry out the domain's planning actions.
+        plots: the plots; those with `implements` carry out the domain's planning actions. A `Library` is taken as it
+            is, so that executives can share what was worked out for it; `achieve` is added if it has none.
         components: the skills.
         knowledge: the world model; an empty one of the domain's schema if left out.
         planner: finds plans; if left out, pyperplan in simulated time, so that a run can be repeated, and in real
@@ -90,7 +92,7 @@ class Executive:
         if knowledge is not None:
             require_extension(self.domain.schema, knowledge.schema)
         self._store = None if store is None else Path(store).resolve()
-        self.library = Library(plots)
+        self.library = plots if isinstance(plots, Library) else Library(plots)
         if ACHIEVE not in self.library:
             self.library.add(achieve_plot())
         self._own_planners: dict[bool, CachingPlanner] = {}
@@ -100,9 +102,8 @@ class Executive:
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        declared = {PlanningComponent.name: {}, **{c.name: c.declares for c in self.components}}
-        findings = validate_library(self.library, self.domain.schema, skills, declared)
-        raise_findings([*findings, *check_implementations(self.library, self.domain)])
+        declared = {PlanningComponent.name: PlanningComponent.declares, **{c.name: c.declares for c in self.components}}
+        _require_sound(self.library, self.domain, skills, declared)
         if knowledge is not None:
             self.knowledge = knowledge
         else:  # at last, since what is opened has to be closed
@@ -283,6 +284,29 @@ def achieve_plot() -> ActionPlot:
     """The plot that stands in where no designed candidate fits; read once, since plots never change."""
     resource = files("planning") / "plots" / "achieve.yaml"
     return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
+
+
+_sound: dict[tuple[int, ...], tuple[object, ...]] = {}
+"""What was found to be sound together, by identity, and kept alive so that no identity is ever another's."""
+_MOST_SOUND = 16
+
+
+def _require_sound(
+    library: Library,
+    domain: PlanningDomain,
+    skills: Collection[SkillSignature],
+    declared: Mapping[str, Mapping[str, Parameter]],
+) -> None:
+    """Raise `PlotError` for what the validator finds; what is the same as before is not looked through again."""
+    parts = (domain, *library, *skills, *declared, *declared.values())
+    key = tuple(map(id, parts))
+    if key in _sound:
+        return
+    findings = validate_library(library, domain.schema, skills, declared)
+    raise_findings([*findings, *check_implementations(library, domain)])
+    if len(_sound) >= _MOST_SOUND:
+        _sound.clear()
+    _sound[key] = parts
 
 
 def _budget(seconds: float, replans: int) -> Budget:

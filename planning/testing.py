@@ -1,21 +1,23 @@
-"""For tests of programs that plan: a planner that fails, hangs and lies, from a seed.
+"""For tests of programs that plan: a planner that fails, hangs, dies and lies, from a seed.
 
 Nothing else of the project imports it.
 """
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
-from dsc.testing.faults import Fault, Faults
+from dsc.sequencer.clock import released
+from dsc.testing.faults import Fault, Faults, InjectedError
 from planning.engines.planner import Planner
-from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome, TimedOut
+from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome
 from planning.strips import Problem
 
 _ENGINE = "faulty"
-_FAULTS = (Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_LIES)
+_FAULTS = (Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_DIES, Fault.PLANNER_LIES)
 
 
 async def _nothing(_: str) -> None:
@@ -25,8 +27,8 @@ async def _nothing(_: str) -> None:
 class FaultyPlanner:
     """A `Planner` with faults: of a problem it always makes the same, so that a resumed run meets them again.
 
-    It fails; it hangs, until its time is over, which takes no real time here; or it lies: the last step of its plan is
-    missing.
+    It fails, and says so; it hangs, in simulated time if the run is, until whoever asks it gives it up; it dies with
+    an error; or it lies: the last step of its plan is missing.
 
     Args:
         planner: finds the plans.
@@ -48,7 +50,10 @@ class FaultyPlanner:
         if fault is Fault.PLANNER_FAILS:
             return EngineFailed(_ENGINE, "it was to fail")
         if fault is Fault.PLANNER_HANGS:
-            return TimedOut(_ENGINE, seconds)
+            with released():
+                await asyncio.get_running_loop().create_future()
+        if fault is Fault.PLANNER_DIES:
+            raise InjectedError("it was to die")
         outcome = await self._planner.solve(problem, seconds)
         if fault is Fault.PLANNER_LIES and isinstance(outcome, PlanFound) and not outcome.plan.schedule:
             return replace(outcome, plan=Plan(outcome.plan.steps[:-1]))

@@ -20,6 +20,7 @@ from domains.clean_up_table.world import World
 from domains.clean_up_table.world_file import LastingWorld, beside
 from domains.tally import Tally
 from dsc.components.component import Component
+from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.profile import Profile
 from dsc.profiles import adapted, configure
@@ -31,7 +32,7 @@ from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.journal.file import Durability
 from planning.domain import PlanningDomain
 from planning.engines.planner import Planner
-from planning.executive import Executive
+from planning.executive import Executive, achieve_plot
 
 HOME = Path(str(files("domains.clean_up_table")))
 MAIN_PLOT = "clean_up_table"
@@ -195,7 +196,7 @@ def _wired(
     components = robot(profile)(world, believed)
     configure(components, profile)
     executive = Executive(
-        domain(), adapted(plots(), profile), components, None, planner,
+        domain(), library() if profile is None else adapted(plots(), profile), components, None, planner,
         foresight=Physics(), store=store, durability=durability,
     )  # fmt: skip
     executive.knowledge.apply(initial_knowledge(world), "deployment", key="deployment")
@@ -238,6 +239,12 @@ def robot(profile: Profile | None) -> Callable[[World, Believed], list[Component
 def plots() -> tuple[ActionPlot, ...]:
     """The plots of this domain; read once, since plots never change."""
     return tuple(load_library(HOME / "plots"))
+
+
+@cache
+def library() -> Library:
+    """The plots as no profile changes them; what is worked out for one run serves the next."""
+    return Library([*plots(), achieve_plot()])
 
 
 @cache

@@ -45,6 +45,7 @@ class Fault(StrEnum):
     KNOWLEDGE_CHANGED = "knowledge changed"
     PLANNER_FAILS = "planner fails"
     PLANNER_HANGS = "planner hangs"
+    PLANNER_DIES = "planner dies"
     PLANNER_LIES = "planner lies"
 
 

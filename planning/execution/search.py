@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import threading
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -150,7 +151,7 @@ class Search:
         changed = 0
         while True:
             version, snapshot = self._knowledge.version, self._knowledge.snapshot()
-            found = await self._found(goal, seconds, before, rejected, snapshot)
+            found = await self._bound(self._found(goal, seconds, before, rejected, snapshot), seconds)
             if isinstance(found, NotFound):
                 return found
             if self._clock.simulated:
@@ -178,6 +179,15 @@ class Search:
                 return NotFound("failed", wrong)
             if changed == MAX_ATTEMPTS:
                 return NotFound("failed", f"the world changes faster than plans are made: {verdict.why}")
+
+    async def _bound(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
+        """Simulated time is held while anybody searches; one that is simulated may let it pass, not for ever."""
+        due = self._clock.now() + seconds + PATIENCE if self._clock.simulated else math.inf
+        try:
+            async with self._clock.timeout_at(due):
+                return await finding
+        except TimeoutError:
+            return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after")
 
     async def _found(
         self,

@@ -1,4 +1,4 @@
-"""A planner that fails, hangs and lies: the executive believes nothing of it, and says what was wrong."""
+"""A planner that fails, hangs, dies and lies: the executive believes nothing of it, and says what was wrong."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from test_testing_with_plans import DOMAIN, LIGHT_UP, PLOTS, Lamps, OnePlan
 
 from dsc.testing import Answer, Fault, Faults, ScriptedSkills, world
 from planning import Executive
+from planning.execution.search import PATIENCE
 from planning.testing import FaultyPlanner
 
-PLANNER = [Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_LIES]
+PLANNER = [Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_DIES, Fault.PLANNER_LIES]
 
 
 def run(faults, *reached):
@@ -29,6 +30,7 @@ def run(faults, *reached):
     [
         (Fault.PLANNER_FAILS, "faulty: it was to fail"),
         (Fault.PLANNER_HANGS, "no plan within"),
+        (Fault.PLANNER_DIES, "InjectedError: it was to die"),
         (Fault.PLANNER_LIES, "the plan found does not lead to the goal"),
     ],
 )
@@ -57,3 +59,13 @@ def test_somebody_is_told_that_it_is_asked():
 
     run(Faults(1, 0.0), reached)
     assert set(heard) == {"while planning"}
+
+
+def test_one_that_hangs_is_given_up_at_its_deadline_in_simulated_time():
+    knowledge, ends = world(DOMAIN.schema, "a b - lamp"), []
+    skills = ScriptedSkills(knowledge, {}, like=[Lamps()])
+    planner = FaultyPlanner(OnePlan(), Faults(1, 1.0, {Fault.PLANNER_HANGS}))
+    with Executive(DOMAIN, PLOTS, skills.components, knowledge, planner) as robot:
+        robot.listen(lambda record: ends.append(record.t) if record.type == "end" else None)
+        robot.achieve("(forall (?l - lamp) (on ?l))", seconds=7)
+    assert ends == [7 + PATIENCE]
