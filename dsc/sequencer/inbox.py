@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Callable, Iterable
 
 from dsc.sequencer.messages import Message
 
@@ -36,6 +37,10 @@ class Inbox:
     def take(self) -> Message:
         """The first one; there has to be one."""
         return self._messages.popleft()
+
+    def rearrange(self, order: Callable[[Iterable[Message]], Iterable[Message]]) -> None:
+        """Put what waits in another order."""
+        self._messages = deque(order(tuple(self._messages)))
 
     async def filled(self) -> None:
         """Wait until there is one."""

@@ -63,7 +63,7 @@ class Sequencer:
         part_of: stands before the action ids that components see; an id of another run, if this one is part of it.
 
     Attributes:
-        library, knowledge, trace, store: as given.
+        library, knowledge, clock, trace, store: as given.
         dispatcher: carries actions to components.
     """
 
@@ -83,7 +83,7 @@ class Sequencer:
         self.knowledge = knowledge
         self.trace = trace or Trace(clock.now)
         self._reactor: Reactor = Reactor(library, knowledge, self.trace)
-        self._clock = clock
+        self.clock = clock
         self.store = store
         if store is not None:
             self.trace.listen(store.hear)
@@ -106,6 +106,10 @@ class Sequencer:
     def wait_before_events(self, wait: Callable[[], Awaitable[None]]) -> None:
         """Await `wait` before each event is taken: how a run is held still, e.g. at a breakpoint."""
         self._before_events.append(wait)
+
+    def rearrange(self, order: Callable[[Iterable[Message]], Iterable[Message]]) -> None:
+        """Put what waits to be taken in another order; for tests."""
+        self._inbox.rearrange(order)
 
     def working_for(self, action_id: str) -> frozenset[str]:
         """Names of the components that carry out skills for the content of the state that started `action_id`."""
@@ -197,10 +201,9 @@ class Sequencer:
                     break
                 if not self._inbox:
                     await self._inbox.filled()
-                message = self._inbox.take()
                 for wait in self._before_events:
                     await wait()
-                self._take(message)
+                self._take(self._inbox.take())
         except asyncio.CancelledError:  # somebody wants it to end; a crash would not come here
             reactor.problem = reactor.problem or "it was cancelled"
             self._leave()
@@ -285,7 +288,7 @@ class Sequencer:
     def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:
         assert self.store is not None  # noqa: S101
         under_way = self.dispatcher.telling.under_way
-        self.store.step(self._clock.now(), message, output, self._reactor, under_way)
+        self.store.step(self.clock.now(), message, output, self._reactor, under_way)
         for component, memory in self.dispatcher.memories():
             self.store.memory(component, memory)
 
@@ -303,7 +306,7 @@ class Sequencer:
             self._inbox.put(message)
             return
         self._last_late += 1
-        late, due = LateMessage(message, self._last_late), self._clock.now() + after
+        late, due = LateMessage(message, self._last_late), self.clock.now() + after
         if self.store is not None and self.store.begun:
             with self.store.writing():
                 self.store.late(late, due)

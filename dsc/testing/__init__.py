@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dsc.testing.dry_run import DryRun as DryRun
     from dsc.testing.faults import Fault as Fault
     from dsc.testing.faults import Faults as Faults
+    from dsc.testing.interleaving import Interleaving as Interleaving
     from dsc.testing.invariants import Invariant as Invariant
     from dsc.testing.invariants import KeptRun as KeptRun
     from dsc.testing.invariants import claims_nothing_false as claims_nothing_false
@@ -55,6 +56,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "DryRun": "dry_run",
         "Fault": "faults",
         "Faults": "faults",
+        "Interleaving": "interleaving",
         "Invariant": "invariants",
         "KeptRun": "invariants",
         "Rehearsal": "rehearsal",
