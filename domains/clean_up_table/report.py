@@ -16,6 +16,8 @@ FAILURES = frozenset({
     "timed_out", "skill_error",
 })  # fmt: skip
 """Outcomes of skills that were not what a plan hopes for."""
+STOPPED = "stopped"
+"""What the plot emits when it has ended because the operator said stop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,5 +139,11 @@ def reason_for(item: str, knowledge: KnowledgeBase, end: RunEnd) -> str:
     if carriers:
         carrier = str(carriers[0]["carrier"])
         return f"it is in {carrier}: {reason_for(carrier, knowledge, end)}"
+    return _why_it_ended(end)
+
+
+def _why_it_ended(end: RunEnd) -> str:
+    if any(event.name == STOPPED for event in end.emitted):
+        return "the operator stopped the run"
     return end.problem or "the run ended before it was cleared away"
 

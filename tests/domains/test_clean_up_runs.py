@@ -174,4 +174,5 @@ def test_an_operator_who_never_restarts_gets_an_honest_report(planner):
     _, report = run(planner, prepare=lambda sequencer: sequencer.post(Event("stop"), after=30.0))
     assert not report.goal_reached
     assert report.problem is None
+    assert all(one.reason.endswith("the operator stopped the run") for one in report.left)
     assert len(report.left) > 0
