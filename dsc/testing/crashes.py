@@ -25,8 +25,10 @@ from knowledge_base.errors import StoreError
 KILLED = "killed"
 DISK_FULL = "disk full"
 OVERTAKEN = "overtaken"
-_AFTER_COMMIT = (KILLED, KILLED, KILLED, DISK_FULL, OVERTAKEN)
+_AFTER_COMMIT = (KILLED, KILLED, DISK_FULL, OVERTAKEN, OVERTAKEN)
 """What may happen between commit and dispatch, as often as that."""
+_REACHED = (KILLED, OVERTAKEN)
+"""What may happen where nothing is being committed."""
 _Result = TypeVar("_Result")
 _Component = TypeVar("_Component", bound=Component)
 
@@ -40,7 +42,8 @@ class Crashes(Generic[_Result]):
 
     Boundaries are: before and after each commit (after it nothing has left yet), when a component has acted and its
     answer is not kept, and whatever else says that it is `reached`. After a commit the disk may be full from then on,
-    which SQLite itself says; or another program takes the run over, where locks do not work, while this one goes on.
+    which SQLite itself says. Anywhere but before a commit, another program may take the run over, where locks do not
+    work, and live it to its end, while this one then goes on as if nothing had been.
 
     Args:
         folder: each life has a folder of its own inside.
@@ -67,6 +70,7 @@ class Crashes(Generic[_Result]):
         self._disk_full = False
         self._live: Callable[[Path], _Result] | None = None
         self._heir: _Heir[_Result] | None = None
+        self._store: Path | None = None
 
     @property
     def folder(self) -> Path:
@@ -106,6 +110,7 @@ class Crashes(Generic[_Result]):
         """Let crashes happen around the commits of this run; to be called before it starts or is resumed."""
         store = sequencer.store
         assert store is not None  # noqa: S101  without one there is nothing to be resumed
+        self._store = store.path
 
         def boundary(what: Boundary) -> None:
             happens = self._drawn(what, (KILLED,) if what == "before commit" else _AFTER_COMMIT)
@@ -117,8 +122,7 @@ class Crashes(Generic[_Result]):
                 with sequencer.knowledge.together() as connection:
                     connection.execute("PRAGMA max_page_count = 1")  # not less than it has now
             if happens == OVERTAKEN:
-                self._calm = True
-                self._heir = _Heir(store.path, self._live, self.folder)
+                self._overtake()
 
         store.listen(boundary)
 
@@ -135,8 +139,11 @@ class Crashes(Generic[_Result]):
         return component
 
     async def reached(self, boundary: str) -> None:
-        """The program may die here."""
-        if self._drawn(boundary, (KILLED,)):
+        """The program may die here, or be overtaken."""
+        happens = self._drawn(boundary, _REACHED)
+        if happens == OVERTAKEN:
+            self._overtake()
+        if happens == KILLED:
             self._leave_behind()
             loop = asyncio.get_running_loop()
             loop.call_soon(_die)  # not from here: that of a task would be heard of only later
@@ -150,6 +157,11 @@ class Crashes(Generic[_Result]):
         what = choose(self._seed, where, "how", possible)
         self.fired[f"{what} {boundary}"] += 1
         return what
+
+    def _overtake(self) -> None:
+        assert self._store is not None  # noqa: S101  somebody watches
+        self._calm = True
+        self._heir = _Heir(self._store, self._live, self.folder)
 
     def _leave_behind(self) -> None:
         """What the next life finds; nothing happens any more to the program that dies."""

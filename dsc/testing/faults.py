@@ -10,8 +10,10 @@ import asyncio
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from enum import StrEnum
+from functools import partial
 from typing import Any, NoReturn, TypeVar
 
 from dsc.calls import Outcome, SkillCall
@@ -19,6 +21,7 @@ from dsc.chance import choose, uniform
 from dsc.components.component import Component
 from dsc.components.life import Life, LifeCycle
 from dsc.engine.steps import Start, Step
+from dsc.events import Event
 from dsc.sequencer.sequencer import Sequencer
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -27,6 +30,8 @@ SOMEBODY = "somebody"
 """Author of the changes that others make."""
 LATE = 5.0
 """Seconds that an answer, an event or somebody's change comes late at most."""
+AT_THE_END = 0.5
+"""Share of what others say while an action is under way that they say just when it ends."""
 DEAD = 20.0
 """Seconds until a component that died is back."""
 
@@ -43,6 +48,7 @@ class Fault(StrEnum):
     EVENT_LATE = "event late"
     EVENT_TWICE = "event twice"
     KNOWLEDGE_CHANGED = "knowledge changed"
+    INTERRUPTED = "interrupted"
     PLANNER_FAILS = "planner fails"
     PLANNER_HANGS = "planner hangs"
     PLANNER_DIES = "planner dies"
@@ -89,11 +95,15 @@ class Faults:
         self.chance = chance
         self.kinds = frozenset(kinds)
         self.fired: dict[str, Fault] = {}
+        self._at_end: dict[str, list[Callable[[], None]]] = {}
 
-    def draw(self, subject: str, possible: Collection[Fault]) -> Fault | None:
-        """The fault that hits the subject, e.g. an action by its id, if one does; it counts as fired."""
+    def draw(self, subject: str, possible: Collection[Fault], part: float = 1.0) -> Fault | None:
+        """The fault that hits the subject, e.g. an action by its id, if one does, with that part of the chance.
+
+        It counts as fired.
+        """
         kinds = [kind for kind in possible if kind in self.kinds]
-        if not kinds or uniform(self.seed, subject, "fault") >= self.chance:
+        if not kinds or uniform(self.seed, subject, "fault") >= self.chance * part:
             return None
         self.fired[subject] = choose(self.seed, subject, "kind", kinds)
         return self.fired[subject]
@@ -112,7 +122,7 @@ class Faults:
         return component
 
     def meddle(self, sequencer: Sequencer, changes: Callable[[], Sequence[Delta]]) -> None:
-        """Let somebody change the knowledge while actions are under way.
+        """Let somebody change the knowledge while actions are under way, or just when they end.
 
         Args:
             sequencer: of the run, before it starts.
@@ -124,11 +134,37 @@ class Faults:
             if options:
                 sequencer.change(choose(self.seed, subject, "change", options), SOMEBODY)
 
+        self._during_actions(sequencer, Fault.KNOWLEDGE_CHANGED, "during", hand_in)
+
+    def interrupt(self, sequencer: Sequencer, event: Event, part: float = 0.3) -> None:
+        """Let an event come from outside while actions are under way or just when they end, e.g. an operator's `stop`.
+
+        Args:
+            sequencer: of the run, before it starts.
+            event: what is handed in.
+            part: of the chance of other faults; a run that is stopped has not much left that could go wrong.
+        """
+        self._during_actions(
+            sequencer, Fault.INTERRUPTED, f"{event.name} during", lambda _: sequencer.post(event), part
+        )
+
+    def ended(self, action_id: str) -> None:
+        """An action of a component with faults has done its work, and says so now; others speak at the same moment."""
+        for happen in self._at_end.pop(action_id, ()):
+            asyncio.get_running_loop().call_soon(happen)
+
+    def _during_actions(
+        self, sequencer: Sequencer, fault: Fault, when: str, happen: Callable[[str], None], part: float = 1.0
+    ) -> None:
         def listen(step: Step) -> None:
             for start in (one for one in step.output if isinstance(one, Start)):
-                subject = f"during {start.action_id}"
-                if self.draw(subject, (Fault.KNOWLEDGE_CHANGED,)):
-                    asyncio.get_running_loop().call_later(LATE * self.share(subject), hand_in, subject)
+                subject = f"{when} {start.action_id}"
+                if not self.draw(subject, (fault,), part):
+                    continue
+                if uniform(self.seed, subject, "when") < AT_THE_END:
+                    self._at_end.setdefault(start.action_id, []).append(partial(happen, subject))
+                else:
+                    asyncio.get_running_loop().call_later(LATE * self.share(subject), happen, subject)
 
         sequencer.listen(listen)
 
@@ -148,10 +184,12 @@ class _Injected:
         fault = self._faults.draw(call.action_id, _OF_SKILLS)
         await self._before(fault, call)
         outcome = await self._execute(skill_name, call, arguments)
+        self._faults.ended(call.action_id)
         if fault is Fault.ANSWER_LOST:
             await _never(call)
         if fault is Fault.ANSWER_LATE:
-            await call.clock.sleep(min(LATE, call.remaining / 2) * self._faults.share(call.action_id))
+            with suppress(asyncio.CancelledError):  # it is done: told to stop, it can only say so
+                await call.clock.sleep(min(LATE, call.remaining / 2) * self._faults.share(call.action_id))
         if fault is Fault.ANSWER_TWICE:
             call.report(outcome)
         return outcome

@@ -7,6 +7,7 @@ from dsc_charts import plot
 from dsc_runs import SCHEMA
 
 from dsc import Component, Library, Outcome, Sequencer, event, skill
+from dsc.events import Event
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.testing import Fault, Faults, trail
 from knowledge_base import Delta, InputError, KnowledgeBase
@@ -56,7 +57,7 @@ class Robot(Component):
         return {"n": n} if n % 2 else None
 
 
-def run(faults, text=GO, changes=None):
+def run(faults, text=GO, changes=None, interrupts=None):
     """How it ended, at which second, the last state that was entered, the robot, what is known, each step with its time."""
     robot, kb, seen = faults.inject(Robot()), KnowledgeBase(SCHEMA), []
 
@@ -66,6 +67,8 @@ def run(faults, text=GO, changes=None):
         sequencer.listen(lambda step: seen.append((clock.now(), step)))
         if changes is not None:
             faults.meddle(sequencer, lambda: changes)
+        if interrupts is not None:
+            faults.interrupt(sequencer, interrupts, 1.0)
         end = await sequencer.run(plot(text).name)
         return end, clock.now(), trail([step for _, step in seen])[-1]
 
@@ -136,6 +139,34 @@ def test_somebody_changes_the_knowledge_while_an_action_is_under_way():
     assert kb.ask("(q)")
     (change,) = [change for change in kb.changes(0) if change.author == "somebody"]
     assert change.delta.added == (fact("q"),)
+
+
+def test_somebody_interrupts_while_an_action_is_under_way():
+    text = GO.replace("plot: go", "plot: go\nreceives: {stop: }").replace("did: done_,", "did: {}, stop: failed,")
+    text = text.replace("within: 60}", "within: 60}\n    after: {seconds: 50, to: late}")
+    ends = [run(Faults(seed, 1.0, {Fault.INTERRUPTED}), text, interrupts=Event("stop")) for seed in range(50)]
+    assert {entered for _, _, entered, *_ in ends} == {"failed"}
+    seconds = [at for _, at, *_ in ends]
+    assert all(0 < at <= 5 for at in seconds)
+    assert 15 < seconds.count(2) < 35  # just when the action ends
+
+
+def test_an_interruption_is_as_rare_as_is_said():
+    faults = Faults(1, 0.5, {Fault.INTERRUPTED})
+    drawn = [faults.draw(f"a{n}", [Fault.INTERRUPTED], 0.2) for n in range(1000)]
+    assert 60 < sum(one is not None for one in drawn) < 140
+
+
+def test_an_answer_that_is_late_is_given_at_once_when_the_action_is_cancelled():
+    text = GO.replace("plot: go", "plot: go\nreceives: {stop: }").replace("did: done_,", "did: {}, stop: waiting,")
+    text += "  waiting: {after: {seconds: 50, to: failed}}\n"
+    known = set()
+    for seed in range(60):
+        faults = Faults(seed, 1.0, {Fault.INTERRUPTED, Fault.ANSWER_LATE})
+        *_, robot, kb, seen = run(faults, text, interrupts=Event("stop"))
+        assert kb.ask("(p)") == bool(robot.done)  # what was done is known, though nobody waits for it
+        known.add((bool(robot.done), next(step.event.name for _, step in seen if step.event)))
+    assert known >= {(False, "stop"), (True, "stop"), (True, "did")}
 
 
 def test_what_happens_depends_on_seed_and_action_alone():
