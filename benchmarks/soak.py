@@ -18,11 +18,11 @@ from collections import Counter
 from functools import partial
 from pathlib import Path
 
+from soak_judge import PROMISES
 from soak_run import Outcome, Planners, Trial
 
-PROMISES = (
-    "executed twice", "knowledge is not so", "false claim", "no report", "hangs", "another history",
-)  # fmt: skip
+TOLD_EVERY = 1000
+"""Runs."""
 SHOWN = 10
 """Seeds that are named one by one."""
 MEMORY = Path("/dev/shm")  # noqa: S108  files in memory where there are such: no run waits for a disk
@@ -42,8 +42,7 @@ def main() -> None:
     with multiprocessing.get_context("spawn").Pool(options.processes, prepare) as pool:
         for outcome in pool.imap_unordered(partial(lived, chance=options.faults), seeds, chunksize=5):
             outcomes.append(outcome)
-            if sys.stderr.isatty():
-                print(f"\r{len(outcomes)}", end="", file=sys.stderr)
+            tell_progress(len(outcomes), options.runs, time.perf_counter() - started)
         pool.close()
         pool.join()
     seconds = time.perf_counter() - started
@@ -54,6 +53,14 @@ def main() -> None:
         print(f"seed {outcome.seed}: {'; '.join(f'{promise}: {what}' for promise, what in outcome.wrong)}")
         print(f"  again: make soak RUNS=1 FIRST={outcome.seed} FAULTS={options.faults:g}")
     sys.exit(1 if wrong else 0)
+
+
+def tell_progress(lived: int, runs: int, seconds: float) -> None:
+    """On a terminal at once, in a file now and then."""
+    if sys.stderr.isatty():
+        print(f"\r{lived} of {runs}", end="\n" if lived == runs else "", file=sys.stderr)
+    elif lived % TOLD_EVERY == 0:
+        print(f"{lived} of {runs} after {seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 def prepare() -> None:

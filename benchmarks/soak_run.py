@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 import threading
 from collections import Counter
@@ -10,62 +11,61 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from soak_judge import (
+    AFTER_STOP,
+    FALSE_CLAIM,
+    HANGS,
+    NO_REPORT,
+    STOPPED,
+    TWICE,
+    ended_stopped,
+    invariants,
+    said_by_others,
+    wrong_report,
+)
+
 from domains.clean_up_table.deployment import CleanUpTable, deploy, resumed
-from domains.clean_up_table.faults import ITEM_MOVED
-from domains.clean_up_table.items import HAND
-from domains.clean_up_table.places import SURFACES
 from domains.clean_up_table.report import Report
 from domains.clean_up_table.scenario import Scenario, Table
-from domains.clean_up_table.world import World
 from domains.clean_up_table.world_file import LastingWorld, beside
-from dsc.chance import choose
+from dsc.chance import choose, uniform
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
+from dsc.events import Event
 from dsc.sequencer.run_tables import has_run
 from dsc.sequencer.sequencer import Sequencer
 from dsc.testing.crashes import Crashes
 from dsc.testing.faults import USUAL, Fault, Faults
-from dsc.testing.invariants import (
-    Invariant,
-    KeptRun,
-    claims_nothing_false,
-    comes_to_an_end,
-    executed_once,
-    kept_run,
-    knows,
-    one_history,
-    replays,
-)
-from knowledge_base.facts import Delta, Fact, fact
-from knowledge_base.store import KnowledgeBase
+from dsc.testing.interleaving import Interleaving
+from dsc.testing.invariants import executed_once, kept_run
 from planning import PlannerProcess
 from planning.engines.cache import CachingPlanner
 from planning.testing import FaultyPlanner
 
-LONGEST = 6 * 3600.0
-"""Seconds of run time that a table may take."""
 MOST_STEPS = 5_000
 """Macrosteps of one life."""
 A_HANG = 120
 """Seconds of real time after which a run is one."""
 DEFAULT_EVERY = 100
 """One table in so many is the default one; the others are small."""
+INTERLEAVED = 0.5
+"""Share of the runs in which the order of what comes at one moment is shuffled."""
+RESTARTS = 0.5
+"""Share of the runs in which the operator lets the robot go on after a stop."""
 CRASHES = 0.015
 """Chance of a crash at each boundary."""
-REPLAYED_EVERY = 3
-"""One run in so many is replayed, which takes as long as the run."""
+UNTIL_RESTART = 60.0
+"""Seconds after a stop when the operator lets the robot go on."""
 REMEMBERED = 2_000
 """Problems whose plans are: small tables are alike."""
-PLAIN = frozenset({Fault.KNOWLEDGE_CHANGED, Fault.ANSWER_LATE, Fault.ANSWER_TWICE})
+PLAIN = frozenset({Fault.KNOWLEDGE_CHANGED, Fault.ANSWER_LATE, Fault.ANSWER_TWICE, Fault.INTERRUPTED})
 """What does not keep the robot from anything."""
-PREDICATES = ("robot-at", "hand-free", "holding", "inside", "lies-at", "disposed")
 
 _TABLES: tuple[tuple[int, int, tuple[str, ...]], ...] = (
     (1, 0, ()), (1, 0, ()), (1, 0, ()), (0, 1, ()), (0, 1, ()), (0, 0, ("small",)), (2, 0, ()), (2, 0, ()), (1, 1, ()),
     (0, 1, ("small",)), (0, 1, ("large",)), (1, 1, ("small",)), (2, 1, ()), (0, 2, ("large",)), (2, 1, ("small",)),
 )  # fmt: skip
 """Cups, cans and crisp cans; what is small comes more often."""
-_PLACES = {"lies-at", "inside"}
 
 
 class HangError(SystemExit):
@@ -78,7 +78,7 @@ class Outcome:
 
     Attributes:
         seed: of everything in it.
-        how: `goal reached`, `something left` or `ended early`; `no report` if there is none.
+        how: `goal reached`, `something left`, `stopped` or `ended early`; `no report` if there is none.
         lives: how often the program was begun.
         steps: macrosteps.
         faults: how often each fault fired.
@@ -114,21 +114,29 @@ class Trial:
     """A run from its seed.
 
     Args:
-        seed: of table, faults and crashes.
+        seed: of table, faults, crashes and, in half of the runs, the order of what comes at one moment.
         chance: of a fault per skill call.
         planners: of this process.
         folder: for the files.
+        replayed: whether the run is replayed as well, which takes half as long as the run.
+        interleaved: whether the order is shuffled; if left out, the seed says so.
     """
 
-    def __init__(self, seed: int, chance: float, planners: Planners, folder: Path) -> None:
+    def __init__(
+        self, seed: int, chance: float, planners: Planners, folder: Path, *,
+        replayed: bool = True, interleaved: bool | None = None,
+    ) -> None:  # fmt: skip
         self.outcome = Outcome(seed)
         self._seed = seed
         self._chance = chance
         self._planners = planners
+        self._replayed = replayed
+        self._interleaved = uniform(seed, "run", "interleaved") < INTERLEAVED if interleaved is None else interleaved
         self._library: Library | None = None
-        kinds = USUAL if seed % 2 else PLAIN
-        self._faults = Faults(seed, chance / 4, kinds)
+        self._faults = Faults(seed, chance / 4, USUAL if seed % 2 else PLAIN)
         self._crashes: Crashes[Report | None] = Crashes(folder, seed, chance=CRASHES)
+        self._stop = ObeyedStop()
+        self._turned = 0
 
     def run(self) -> Outcome:
         outcome = self.outcome
@@ -137,12 +145,13 @@ class Trial:
                 report = self._crashes.survive(self._live)
                 self._judge(report)
         except HangError as error:
-            outcome.wrong.append(("hangs", str(error)))
+            outcome.wrong.append((HANGS, str(error)))
         except Exception as error:  # noqa: BLE001  whatever it is, the seed is worth a look
-            outcome.wrong.append(("no report", f"{type(error).__name__}: {error}"))
-        outcome.wrong += [("executed twice", problem) for problem in self._crashes.problems]
+            outcome.wrong.append((NO_REPORT, f"{type(error).__name__}: {error}"))
+        outcome.wrong += [(TWICE, problem) for problem in self._crashes.problems]
+        outcome.wrong += [(AFTER_STOP, problem) for problem in self._stop.problems]
         outcome.lives = self._crashes.life + 1
-        outcome.faults += self._faults.counts()
+        outcome.faults += self._faults.counts() + Counter(turned=self._turned)
         outcome.crashes += self._crashes.fired
         return outcome
 
@@ -153,9 +162,10 @@ class Trial:
             table = deploy(scenario(self._seed), self._seed, self._chance, planner, store=store)
         else:
             with kept_run(store) as run:  # as it was left by a program that has died
-                self._must(run, "executed twice", executed_once(done(store)))
+                self.outcome.wrong += [(TWICE, wrong) for wrong in executed_once(done(store))(run)]
                 if run.ended is not None:
                     return None
+                self._stop.resumed(run.steps[-1].configuration)
             table = resumed(store, planner)
         with table:
             self._library = table.executive.library
@@ -173,8 +183,18 @@ class Trial:
                 raise HangError(f"more than {MOST_STEPS} macrosteps")
 
         sequencer.listen(count)
-        self._faults.meddle(sequencer, lambda: moved(table.world, sequencer.knowledge))
+        if self._interleaved:
+            interleaving = Interleaving(self._seed)
+            interleaving.attach(sequencer)
+            sequencer.listen(lambda _: self._note_turns(interleaving))
+        self._faults.meddle(sequencer, lambda: said_by_others(table.world, sequencer))
+        self._faults.interrupt(sequencer, Event("stop"))
+        self._stop.watch(sequencer, table, restarts=uniform(self._seed, "stop", "restarts") < RESTARTS)
         self._crashes.watch(sequencer)
+
+    def _note_turns(self, interleaving: Interleaving) -> None:
+        self._turned += interleaving.turned
+        interleaving.turned = 0
 
     def _judge(self, report: Report | None) -> None:
         """What is in the files after the last life, against what has become of the world."""
@@ -183,25 +203,60 @@ class Trial:
         world.close()
         outcome.faults += Counter(f"{one.kind}{' (permanent)' if one.permanent else ''}" for one in world.fired)
         with kept_run(store) as run:
-            cleared = all(item.disposed for item in world.items if item.seen)
-            self._must(run, "no report", comes_to_an_end(LONGEST))
-            self._must(run, "executed twice", executed_once(world.done))
-            self._must(run, "another history", one_history)
-            if self._seed % REPLAYED_EVERY == 0:
-                self._must(run, "another history", replays(self._library))
-            self._must(run, "knowledge is not so", knows(truth(world, run.knowledge), PREDICATES))
-            self._must(run, "false claim", claims_nothing_false(says_all_is_clear, reached=cleared))
+            for promise, invariant in invariants(world, self._library, replayed=self._replayed):
+                outcome.wrong += [(promise, wrong) for wrong in invariant(run)]
             outcome.steps = len(run.steps)
+            stopped = ended_stopped(run)
             if run.ended is not None:
-                left = "goal reached" if world.goal_reached else "something left"
+                left = "stopped" if stopped else "goal reached" if world.goal_reached else "something left"
                 outcome.how = left if run.ended["problem"] is None else "ended early"
-        if report is not None and report.goal_reached and not world.goal_reached:
-            outcome.wrong.append(("false claim", "the report says that the goal is reached"))
-        if self._faults.kinds == PLAIN and report is not None:
-            outcome.wrong += [("false claim", wrong) for wrong in dishonest(world, report)]
+        self._stop.judge(set(world.done))
+        if report is not None:
+            plain = self._faults.kinds == PLAIN
+            wrong = wrong_report(report, world, stopped=stopped, plain=plain)
+            outcome.wrong += [(FALSE_CLAIM, one) for one in wrong]
 
-    def _must(self, run: KeptRun, promise: str, invariant: Invariant) -> None:
-        self.outcome.wrong += [(promise, wrong) for wrong in invariant(run)]
+
+class ObeyedStop:
+    """Sees that the robot does nothing while it is to stand still.
+
+    Attributes:
+        problems: what it did all the same.
+    """
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+        self._done: set[str] | None = None
+        self._life = object()
+
+    def resumed(self, configuration: tuple[str, ...]) -> None:
+        """A program goes on where another was; what that had not committed has not been."""
+        if configuration != STOPPED:
+            self._done = None
+
+    def watch(self, sequencer: Sequencer, table: CleanUpTable, *, restarts: bool) -> None:
+        """Look at each macrostep; an operator who `restarts` lets the robot go on after a while."""
+        life = self._life = object()
+
+        def look(_: Step) -> None:
+            if life is not self._life:
+                return  # a program that another has overtaken
+            stands = sequencer.machine.state.configuration() == STOPPED
+            table.world.catch_up()
+            if not stands:
+                self.judge(set(table.world.done))
+                self._done = None
+            elif self._done is None:
+                self._done = set(table.world.done)
+                if restarts:
+                    asyncio.get_running_loop().call_later(UNTIL_RESTART, sequencer.post, Event("restart"))
+
+        sequencer.listen(look)
+
+    def judge(self, done: set[str]) -> None:
+        """What has been done by now, against what had been done when it was told to stop."""
+        if self._done is not None and done > self._done:
+            self.problems.append(f"{', '.join(sorted(done - self._done))} were executed after the stop")
 
 
 def scenario(seed: int) -> Scenario:
@@ -212,63 +267,11 @@ def scenario(seed: int) -> Scenario:
     return Scenario(table=Table(cups=cups, cans=cans, crisp_cans=crisp_cans))
 
 
-def dishonest(world: World, report: Report) -> Iterator[str]:
-    """The report against the world, where nothing but what is permanent keeps the robot from anything."""
-    left = {one.item for one in report.left}
-    if report.problem is not None:
-        yield f"the run ended early: {report.problem}"
-    if left != world.touched():
-        yield f"left are {sorted(left)}, and permanent faults have touched {sorted(world.touched())}"
-
-
 def done(store: Path) -> list[str]:
     """What the robot has executed, by action id."""
     world = LastingWorld.open(beside(store))
     world.close()
     return list(world.done)
-
-
-def moved(world: World, knowledge: KnowledgeBase) -> list[Delta]:
-    """What somebody who saw it could say: where an item is now that somebody has moved."""
-    names = {name for fault in world.fired if fault.kind == ITEM_MOVED for name in fault.items}
-    items = [world.items[name] for name in sorted(names) if knowledge.type_of(name) is not None]
-    return [_lies(item.name, item.where) for item in items if item.where in SURFACES]
-
-
-def _lies(item: str, where: str) -> Delta:
-    elsewhere = (fact("lies-at", item, other) for other in SURFACES if other != where)
-    return Delta(removed=(fact("missing", item), *elsewhere), added=(fact("lies-at", item, where),))
-
-
-def truth(world: World, knowledge: KnowledgeBase) -> Iterator[Fact]:
-    """What the robot should know: how it is itself, and of each item that it knows where it is.
-
-    Of what somebody moved, and of what the robot itself says that it does not find, it may believe what it likes.
-    """
-    believed = knowledge.snapshot()
-    excused = {name for fault in world.fired if fault.kind == ITEM_MOVED for name in fault.items}
-    excused |= {str(one.args[0]) for one in believed.facts if one.predicate == "missing"}
-    yield fact("robot-at", world.robot_at)
-    if world.items.held is None:
-        yield fact("hand-free")
-    for item in world.items:
-        if knowledge.type_of(item.name) is None:
-            continue
-        if item.disposed:
-            yield fact("disposed", item.name)
-        if item.name in excused:
-            yield from (one for one in believed.facts if one.predicate in _PLACES and one.args[0] == item.name)
-        elif item.where == HAND:
-            yield fact("holding", item.name)
-        elif item.where in SURFACES:
-            yield fact("lies-at", item.name, item.where)
-        elif not item.disposed:
-            yield fact("inside", item.name, item.where)
-
-
-def says_all_is_clear(run: KeptRun) -> bool:
-    """Whether the robot has told the operator so."""
-    return any(one.data["chosen"] == "announce_success" for one in run.records if one.type == "decision")
 
 
 @contextmanager
