@@ -8,6 +8,7 @@ from domains.clean_up_table.report import FAILURES
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.messages import SkillMessage
 from dsc.sequencer.run_store import RunStore
+from dsc.sequencer.sequencer import Sequencer
 
 
 def a_new_id_on_retry(monkeypatch):
@@ -82,3 +83,17 @@ def failures_not_recorded(monkeypatch):
             step(self, now, message, *more)
 
     monkeypatch.setattr(RunStore, "step", hopeful)
+
+
+def answers_dropped_with_their_state(monkeypatch):
+    """When a state is left, answers to it that wait to be taken are thrown away, with what they observed."""
+    take = Sequencer._take
+
+    def tidy(self, message):
+        take(self, message)
+        active = self.machine.state.has_activation
+        self.rearrange(
+            lambda waiting: [m for m in waiting if not isinstance(m, SkillMessage) or active(m.start.activation)]
+        )
+
+    monkeypatch.setattr(Sequencer, "_take", tidy)

@@ -6,15 +6,24 @@ Tried from the seed at which it was seen when this was written; should plots cha
 from __future__ import annotations
 
 import pytest
-from planted_bugs import a_new_id_on_retry, dispatch_before_commit, failures_not_recorded, no_fence
+from planted_bugs import (
+    a_new_id_on_retry,
+    answers_dropped_with_their_state,
+    dispatch_before_commit,
+    failures_not_recorded,
+    no_fence,
+)
+from soak_judge import HISTORY, NOT_SO, TWICE
 from test_soak import lived, planners  # noqa: F401  a fixture
 
 RUNS = 1000
+FORGETFUL = 456
 BUGS = [
-    (a_new_id_on_retry, 8, "executed twice"),
-    (dispatch_before_commit, 8, "executed twice"),
-    (no_fence, 129, "another history"),
-    (failures_not_recorded, 3, "another history"),
+    (a_new_id_on_retry, 8, TWICE),
+    (dispatch_before_commit, 8, TWICE),
+    (no_fence, 129, HISTORY),
+    (failures_not_recorded, 3, HISTORY),
+    (answers_dropped_with_their_state, FORGETFUL, NOT_SO),
 ]
 
 
@@ -28,3 +37,10 @@ def test_a_planted_bug_is_caught(bug, first, promise, planners, monkeypatch):  #
                 break
     assert promise in broken
     assert lived(seed, planners).wrong == []
+
+
+def test_only_the_shuffling_scheduler_shows_what_hangs_on_the_order_at_one_moment(planners, monkeypatch):  # noqa: F811
+    answers_dropped_with_their_state(monkeypatch)
+    assert NOT_SO in {promise for promise, _ in lived(FORGETFUL, planners, interleaved=True).wrong}
+    for seed in range(FORGETFUL, FORGETFUL + 3):
+        assert lived(seed, planners, interleaved=False).wrong == []
