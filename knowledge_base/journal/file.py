@@ -7,6 +7,7 @@ the journal. `schemas` are the declarations used, each since a version. JSON as 
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,6 +25,9 @@ FORMAT = 2
 PATIENCE_S = 1.0
 """How long to wait for others who lock the file; there should be none."""
 
+_PAGES_IN_LOG = {"process": 0, "power": 1000}
+"""Pages of 4 KiB in SQLite's log after which it makes the commit put them in their place; 0: others see to that."""
+_LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its head; commits are not cut
 _SYNCHRONOUS = {"process": "NORMAL", "power": "FULL"}  # in WAL mode only FULL waits for the disk in each commit
 
 _TABLES = (
@@ -90,10 +94,37 @@ def writing(path: Path, durability: Durability) -> sqlite3.Connection:
                 require_store(connection, path)
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute(f"PRAGMA synchronous = {_SYNCHRONOUS[durability]}")
+            connection.execute(f"PRAGMA wal_autocheckpoint = {_PAGES_IN_LOG[durability]}")
         except BaseException:
             connection.close()
             raise
     return connection
+
+
+def to_tidy_up(path: Path) -> sqlite3.Connection:
+    """A connection besides that of the one who writes; raises `sqlite3.Error` if it cannot be had."""
+    connection = _connect(path, "rw")
+    connection.execute("PRAGMA synchronous = NORMAL")  # or the log would be gone before the file is on the disk
+    return connection
+
+
+def lay_out_log(path: Path) -> None:
+    """Let SQLite's log have the length it comes to have, where it is shorter; the writer's connection is open.
+
+    Waiting for the disk takes longer, and depends on what others write, as long as a file grows: its length has to be
+    kept then, too. What follows the last commit is no commit to SQLite, whatever it is; zeros are none anywhere.
+
+    Raises:
+        StoreError: there is no room for it.
+    """
+    try:
+        with path.with_name(path.name + "-wal").open("r+b") as log:
+            length = log.seek(0, os.SEEK_END)
+            log.write(bytes(max(0, _LOG_LENGTH - length)))
+            log.flush()
+            os.fsync(log.fileno())
+    except OSError as error:
+        raise StoreError(f"cannot lay out the store's log: {error.strerror}", place=Place(str(path))) from error
 
 
 def is_new(connection: sqlite3.Connection) -> bool:

@@ -11,7 +11,16 @@ from knowledge_base.errors import ConflictError, InputError, Place, StoreError
 from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
 from knowledge_base.journal.archive import Archive
-from knowledge_base.journal.file import Durability, create_tables, is_new, reported, require_place, writing
+from knowledge_base.journal.checkpoints import CHECKPOINTS
+from knowledge_base.journal.file import (
+    Durability,
+    create_tables,
+    is_new,
+    lay_out_log,
+    reported,
+    require_place,
+    writing,
+)
 from knowledge_base.journal.history import Version, Writer
 from knowledge_base.journal.lock import WriterLock
 from knowledge_base.world.compatibility import missing_constants, require_extension, require_functional
@@ -24,6 +33,9 @@ SNAPSHOT_AFTER = 2_000_000
 They are read back in a fraction of a second. A world that is longer than this is written only after as many
 characters of changes as it has itself: so snapshots at most double the file and the work.
 """
+
+TIDY_UP_AFTER = 500
+"""Commits after which the file is tidied up; SQLite itself would after a thousand pages, and they take one or two."""
 
 _INSERT_CHANGE = "INSERT INTO changes VALUES (?, ?, ?, ?)"
 _INSERT_KEY = "INSERT INTO keys VALUES (?, ?, ?, ?, ?)"
@@ -62,11 +74,14 @@ class Journal(Archive):
         self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
         self._grouped = self._appended = False  # whether appends are parts of an open transaction; whether any was made
         self._behind: StoreError | None = None  # why the file lacks what the world in memory has
+        self._commits = 0
+        self._durability = durability
         self._writers = WriterLock(path)
         try:
             self._connection = writing(path, durability)
             try:
                 self._prepare(schema, clock)
+                self._lay_out_log()
             except BaseException:
                 self._connection.close()
                 raise
@@ -137,15 +152,22 @@ class Journal(Archive):
             self._put_snapshot(world, keep_since)
             for statement in _FORGET:
                 connection.execute(statement, {"oldest": keep_since})
+        CHECKPOINTS.leave(self._path)
         with reported(self._path, "shrink"):
             self._connection.executescript("PRAGMA incremental_vacuum")  # `execute` would free a single page
             self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
             self._measure()
+        self._lay_out_log()
 
     def close(self) -> None:
-        """Let others write."""
+        """Let others write; nothing stays beside the file."""
+        CHECKPOINTS.leave(self._path)
         self._connection.close()
         self._writers.release()
+
+    def _lay_out_log(self) -> None:
+        if self._durability == "power":
+            lay_out_log(self._path)
 
     def _prepare(self, schema: Schema | None, clock: Callable[[], float]) -> None:
         with reported(self._path, "read"):
@@ -226,15 +248,31 @@ class Journal(Archive):
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
         """All that is written in the block, or nothing."""
-        with reported(self._path, "write"):
-            self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._connection
-                self._connection.execute("COMMIT")
-            except BaseException:
-                if self._connection.in_transaction:  # SQLite ends it by itself when the disk is full
-                    self._connection.execute("ROLLBACK")
-                raise
+        connection = self._connection
+        try:
+            changes = connection.total_changes
+            connection.execute("BEGIN IMMEDIATE")
+            yield connection
+            self._commit(connection, changed=connection.total_changes != changes)
+        except BaseException as error:
+            with reported(self._path, "write"):
+                if connection.in_transaction:  # SQLite ends it by itself when the disk is full
+                    connection.execute("ROLLBACK")
+                if isinstance(error, sqlite3.Error):
+                    raise
+            raise
+
+    def _commit(self, connection: sqlite3.Connection, *, changed: bool) -> None:
+        self._commits += changed
+        if self._durability == "power" or not changed or self._commits % TIDY_UP_AFTER:
+            connection.execute("COMMIT")
+        elif not CHECKPOINTS.is_behind(self._path):
+            with CHECKPOINTS.asking(self._path):
+                connection.execute("COMMIT")
+        else:
+            connection.execute("COMMIT")
+            CHECKPOINTS.leave(self._path)
+            connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
 
 @contextmanager
