@@ -57,14 +57,22 @@ class LifeCycle:
         for listener in tuple(self._listeners):
             listener()
 
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call the listener after each change from now on."""
+        self._listeners.add(listener)
+
+    def leave(self, listener: Callable[[], None]) -> None:
+        """Call it no longer."""
+        self._listeners.discard(listener)
+
     @contextmanager
     def heard(self, listener: Callable[[], None]) -> Iterator[None]:
         """Inside, the listener is called after each change."""
-        self._listeners.add(listener)
+        self.listen(listener)
         try:
             yield
         finally:
-            self._listeners.discard(listener)
+            self.leave(listener)
 
     async def until(self, holds: Callable[[Life], bool]) -> Life:
         """Wait for a state in which `holds` is true; returns it."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, MutableMapping
-from contextlib import ExitStack
 from typing import TYPE_CHECKING, TypeVar
 
 from dsc.components.life import Life
@@ -66,16 +65,19 @@ class Roster:
 
             return changed
 
-        with ExitStack() as listening:
-            for one in support:
-                listening.enter_context(one.life.heard(listener(one)))
-            try:
-                return await work
-            except asyncio.CancelledError:
-                if not lost or me is None or me.uncancel() > 0:  # or the state was left, too
-                    raise
-                said = _state_of(lost[0])
-                raise NotAliveError(said if lost[0] is component else f"it needs {said}") from None
+        listening = [(one.life, listener(one)) for one in support]
+        for life, changed in listening:
+            life.listen(changed)
+        try:
+            return await work
+        except asyncio.CancelledError:
+            if not lost or me is None or me.uncancel() > 0:  # or the state was left, too
+                raise
+            said = _state_of(lost[0])
+            raise NotAliveError(said if lost[0] is component else f"it needs {said}") from None
+        finally:
+            for life, changed in listening:
+                life.leave(changed)
 
     async def _needed(self, component: Component, found: dict[str, Component], above: tuple[str, ...]) -> None:
         if component.name in above:

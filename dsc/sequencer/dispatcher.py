@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
@@ -34,6 +34,7 @@ from dsc.sequencer.ends import broken, declared, encoded, late
 from dsc.sequencer.messages import SkillMessage, TimerMessage
 from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
 from dsc.sequencer.telling import CLOSING, Telling, failure
+from dsc.sequencer.time_limit import TimeLimit
 from dsc.sequencer.timers import Timers
 from knowledge_base.errors import InputError, UnknownNameError
 
@@ -69,7 +70,7 @@ class Dispatcher:
         self._answered_for: set[str] = set()
         self._clock = clock
         self._post = post
-        self._running: dict[str, tuple[Start, asyncio.Task[None], float]] = {}  # with the seconds it may take
+        self._running: dict[str, _Running] = {}
         self._ending: set[asyncio.Task[None]] = set()
         self.telling = Telling()
         self.timers = Timers(clock, post)
@@ -80,7 +81,7 @@ class Dispatcher:
 
     def started(self) -> tuple[Start, ...]:
         """The skills that are being carried out, or whose answer has not been taken yet."""
-        return tuple([start for start, _, _ in self._running.values()])
+        return tuple([one.start for one in self._running.values()])
 
     @property
     def in_use(self) -> frozenset[str]:
@@ -93,7 +94,7 @@ class Dispatcher:
 
         Periods, which always are, do not count; nor do events that were activated without a bound and may never come.
         """
-        return self.timers.waiting or any(math.isfinite(within) for _, _, within in self._running.values())
+        return self.timers.waiting or any(math.isfinite(one.within) for one in self._running.values())
 
     def _within(self, start: Start) -> float:
         """Seconds that it may take; an event lasts as long as the state that activated it."""
@@ -151,7 +152,9 @@ class Dispatcher:
         """Cancel a skill; nobody waits for its answer any more."""
         if start.action_id not in self._running:
             return
-        _, task, _ = self._running.pop(start.action_id)
+        stopped = self._running.pop(start.action_id)
+        task = stopped.task
+        stopped.limit.end()
         self._ending.add(task)
         task.add_done_callback(self._ending.discard)
         task.cancel()
@@ -198,11 +201,11 @@ class Dispatcher:
     def _start(self, start: Start, earlier: Earlier | None = None) -> None:
         component = self.component(start.component)
         within = self._within(start)
-        task = asyncio.get_running_loop().create_task(self._execute(component, start, within, earlier))
-        self._running[start.action_id] = (start, task, within)
-        if math.isfinite(within):
-            left = within if earlier is None else earlier.began + within - self._clock.now()
-            give_up_after(task, left + GRACE, lambda: self._overdue(start, within))
+        limit = TimeLimit(partial(self._overdue, start, within))
+        work = self._execute(component, start, within, limit, earlier)
+        task = asyncio.get_running_loop().create_task(work)
+        self._running[start.action_id] = _Running(start, task, within, limit)
+        limit.begin(task, self._clock, within + (self._clock.now() if earlier is None else earlier.began))
 
     def _overdue(self, start: Start, within: float) -> None:
         """It swallowed that its time is over; the chart need not wait for it."""
@@ -215,14 +218,19 @@ class Dispatcher:
         skill = f"{start.component}.{start.skill}"
         self._given_up.append(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
 
-    async def _execute(self, component: Component, start: Start, within: float, earlier: Earlier | None) -> None:
-        outcome = await self._outcome(component, start, within, earlier)
+    async def _execute(
+        self, component: Component, start: Start, within: float, limit: TimeLimit, earlier: Earlier | None
+    ) -> None:
+        try:
+            outcome = await self._outcome(component, start, within, limit, earlier)
+        finally:
+            limit.end()
         if start.action_id in self._answered_for:
             return
         self._post(SkillMessage(start, outcome, final=True))
 
     async def _outcome(
-        self, component: Component, start: Start, within: float, earlier: Earlier | None
+        self, component: Component, start: Start, within: float, limit: TimeLimit, earlier: Earlier | None
     ) -> Outcome:
         heard = 0
 
@@ -234,28 +242,27 @@ class Dispatcher:
                 self._post(SkillMessage(start, declared(component, start, outcome), final=False))
 
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
-        deadline = clock.now() + within
-        call = SkillCall(self._id(start), clock, report, deadline, self._given_up.append)
-        bound = self._clock.timeout_at(deadline)
+        call = SkillCall(self._id(start), clock, report, clock.now() + within, self._given_up.append)
         try:
-            async with bound:
-                await self.telling.taken(component)
-                support = await self._roster.ready(component)
-                if earlier is not None:
-                    status = await asked_after(component, start, self._id(start))
-                    if isinstance(status, Ended):
-                        return declared(component, start, status.outcome)
-                    if status is Status.RUNNING or not self._is_event(start):  # else it is activated anew
-                        heard = earlier.reports
-                work = component.execute(start.skill, call, encoded(start.arguments))
-                outcome = await self._roster.with_support(component, work, support)
+            await self.telling.taken(component)
+            support = await self._roster.ready(component)
+            if earlier is not None:
+                status = await asked_after(component, start, self._id(start))
+                if isinstance(status, Ended):
+                    return declared(component, start, status.outcome)
+                if status is Status.RUNNING or not self._is_event(start):  # else it is activated anew
+                    heard = earlier.reports
+            work = component.execute(start.skill, call, encoded(start.arguments))
+            outcome = await self._roster.with_support(component, work, support)
             return declared(component, start, outcome)
         except asyncio.CancelledError:
+            if limit.has_cancelled():
+                return late(start, within)
             if _cancelled_from_outside():
                 raise
             return broken(start, "CancelledError: it cancelled itself")
         except Exception as error:  # noqa: BLE001  # whatever a skill does wrong must not end the run
-            if bound.expired() or isinstance(error, DeadlineError):
+            if limit.expired or isinstance(error, DeadlineError):
                 return late(start, within)
             return broken(start, f"{type(error).__name__}: {error}")
 
@@ -268,6 +275,15 @@ class Dispatcher:
     def _leave_alone(self, start: Start, task: asyncio.Task[None]) -> None:
         self._ending.discard(task)
         self._not_stopped(start)
+
+
+class _Running(NamedTuple):
+    """A skill that is carried out, and the seconds that it may take."""
+
+    start: Start
+    task: asyncio.Task[None]
+    within: float
+    limit: TimeLimit
 
 
 async def _forgotten(component: Component, action_id: str) -> None:
