@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import IO, Any
+from types import MappingProxyType
+from typing import IO, Any, NamedTuple
 
 from dsc.json_text import text_by
 
@@ -18,9 +18,8 @@ VERSION = 1
 _encode = text_by(json.JSONEncoder(ensure_ascii=False))  # `json.dumps` would make an encoder for each record
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One thing that happened.
+class Record(NamedTuple):
+    """One thing that happened; a named tuple, as `Event` is one.
 
     Attributes:
         seq: its number, from 1.
@@ -35,12 +34,13 @@ class Record:
     t: float
     type: str
     cause: int | None
-    data: Mapping[str, Any] = field(default_factory=dict)
+    data: Mapping[str, Any] = MappingProxyType({})
 
     def to_line(self) -> str:
         """One line of JSON, keys in a fixed order."""
-        head = {"seq": self.seq, "t": round(self.t, 6), "type": self.type, "cause": self.cause}
-        return _encode({**head, **self.data})
+        cause = "null" if self.cause is None else self.cause
+        head = f'{{"seq": {self.seq}, "t": {round(self.t, 6)}, "type": "{self.type}", "cause": {cause}'
+        return f"{head}, {_encode(self.data)[1:]}" if self.data else f"{head}}}"
 
     @staticmethod
     def from_line(line: str) -> Record:

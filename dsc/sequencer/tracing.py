@@ -77,8 +77,10 @@ class StepTracer:
             said = {}
         seq = self._trace.record("step", **said)
         self._trace.cause = seq
-        for taken in (taken for micro in step.microsteps for taken in micro.taken if taken.rule):
-            self._trace.record("rule", rule=taken.rule, state=taken.source)
+        for micro in step.microsteps:
+            for taken in micro.taken:
+                if taken.rule:
+                    self._trace.record("rule", rule=taken.rule, state=taken.source)
         return seq
 
     def decisions(self, step: Step) -> None:
@@ -130,16 +132,20 @@ class StepTracer:
     def _changed_variables(self, step: Step) -> dict[str, Any]:
         """Parameters and variables that are new or have another value than before, by path of the plot's holder."""
         before, self._frames = self._frames, dict(_frames(step.state.root, ""))
-        changed = {path: _news(before.get(path), frame) for path, frame in self._frames.items()}
-        said = {path: values for path, values in changed.items() if values}
+        said = {}
+        for path, frame in self._frames.items():
+            known = before.get(path)
+            if (known is None or known.variables is not frame.variables) and (news := _news(known, frame)):
+                said[path] = news
         return {"variables": said} if said else {}
 
     def _plots(self, step: Step) -> None:
-        for bound in (bound for micro in step.microsteps for bound in micro.bound):
-            digest = bound.plot.digest
-            if digest not in self.known_plots:
-                self.known_plots.add(digest)
-                self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
+        for micro in step.microsteps:
+            for bound in micro.bound:
+                digest = bound.plot.digest
+                if digest not in self.known_plots:
+                    self.known_plots.add(digest)
+                    self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
 
 
 def _micro(micro: Microstep) -> dict[str, Any]:
@@ -169,8 +175,6 @@ def _frames(frame: FrameState | None, path: str) -> Iterator[tuple[str, FrameSta
 def _news(before: FrameState | None, frame: FrameState) -> dict[str, Any]:
     """The values of a plot that were not there before; another instance of it begins anew."""
     known = before.variables if before is not None and before.serial == frame.serial else {}
-    if known is frame.variables:
-        return {}
     return {
         name: _told_once(value)
         for name, value in frame.variables.items()
