@@ -6,6 +6,7 @@ a step is a look-up. What is kept is bounded, and forgetting it changes nothing 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -73,6 +74,16 @@ class Configuration:
         """Names of the active states; regions have none."""
         nodes = self.compiled.nodes
         return tuple([nodes[index].name for index in self.active if nodes[index].state is not None])
+
+    @cached_property
+    def form(self) -> Mapping[str, Any]:
+        """As plain data, which nobody may change."""
+        names = [node.name for node in self.compiled.nodes]
+        return {
+            "active": [names[index] for index in self.active],
+            "waiting": [names[index] for index in sorted(self.waiting)],
+            "history": {names[at]: [names[index] for index in kept] for at, kept in self.history},
+        }
 
     @cached_property
     def leaves(self) -> tuple[int, ...]:

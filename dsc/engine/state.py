@@ -48,20 +48,20 @@ class FrameState(NamedTuple):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        names = [node.name for node in self.compiled.nodes]
-        configuration = self.configuration
         return {
             "serial": self.serial,
             "plot": self.compiled.plot.name,
             "form": self.compiled.form,
-            "active": [names[index] for index in configuration.active],
-            "waiting": [names[index] for index in sorted(configuration.waiting)],
-            "history": {names[at]: [names[index] for index in kept] for at, kept in configuration.history},
+            **self.configuration.form,
             "variables": dict(self.variables),
             "activations": dict(self.activations),
             "children": {name: child.to_json() for name, child in self.children.items()},
-            "kept": [[name, {**event._asdict(), "attributes": dict(event.attributes)}] for name, event in self.kept],
+            "kept": self.kept_form(),
         }
+
+    def kept_form(self) -> list[list[Any]]:
+        """The events that wait, as plain data."""
+        return [[name, {**event._asdict(), "attributes": dict(event.attributes)}] for name, event in self.kept]
 
     @staticmethod
     def from_json(data: Mapping[str, Any], chart: Chart) -> FrameState:

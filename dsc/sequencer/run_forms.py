@@ -15,7 +15,7 @@ from typing import Any
 from dsc.calls import Outcome
 from dsc.engine.state import NOTHING, FrameState, MachineState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
-from dsc.events import Event
+from dsc.events import NO_ATTRIBUTES, Event
 from dsc.json_text import text_by
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.run_tables import RunRow
@@ -29,6 +29,7 @@ message is awaited until the component has taken it."""
 
 _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
+_USUAL = (None, *Event._field_defaults.values())
 _encode = text_by(json.JSONEncoder(separators=(",", ":")))  # `json.dumps` would make one each time
 
 
@@ -174,36 +175,35 @@ def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Ca
 # -- what is awaited -----------------------------------------------------------------------------------------
 
 
-def awaited_text(what: Awaited, short: Shortener) -> str:
-    """As it is kept; equal ones have equal texts."""
+def awaited_form(what: Awaited, short: Shortener) -> Form:
+    """What is awaited, or in force."""
     match what:
         case Start():
-            return text_of(_plain(what) | {"arguments": short(what.arguments), "names": dict(what.names)})
+            return _plain(what) | {"arguments": short(what.arguments), "names": dict(what.names)}
         case SendLater():
-            return text_of(_later_form(what, short))
+            return _later_form(what, short)
         case LateMessage():
-            return text_of(message_form(what, short))
+            return message_form(what, short)
         case SetParameter():
-            return text_of(_plain(what) | {"value": short.short(what.value)})
+            return _plain(what) | {"value": short.short(what.value)}
         case SendMessage():
-            return text_of(_plain(what) | {"arguments": short(what.arguments)})
-    return text_of(_plain(what))
+            return _plain(what) | {"arguments": short(what.arguments)}
+    return _plain(what)
 
 
-def awaited_of(kind: str, text: str, find: Callable[[str], Any]) -> Awaited:
-    """The inverse of `awaited_text`; `kind` is the name of its class."""
-    form = json.loads(text)
+def awaited_of(kind: str, form: Mapping[str, Any], find: Callable[[str], Any]) -> Awaited:
+    """The inverse of `awaited_form`; `kind` is the name of its class."""
     match kind:
         case "Start":
-            return Start(**form | {"arguments": full(form["arguments"], find)})
+            return Start(**{**form, "arguments": full(form["arguments"], find)})
         case "SendLater":
             return _later_of(form, find)
         case "SetParameter":
-            return SetParameter(**form | {"value": _full(form["value"], find)})
+            return SetParameter(**{**form, "value": _full(form["value"], find)})
         case "StartTimer" | "SwitchMode":
             return StartTimer(**form) if kind == "StartTimer" else SwitchMode(**form)
         case "SendMessage":
-            return SendMessage(**form | {"arguments": full(form["arguments"], find)})
+            return SendMessage(**{**form, "arguments": full(form["arguments"], find)})
     late = message_of(form, _no_action, find)
     assert isinstance(late, LateMessage)  # noqa: S101  the only one left
     return late
@@ -222,11 +222,20 @@ def _later_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> SendLater:
 
 
 def _event_form(event: Event, short: Shortener) -> Form:
-    return {**event._asdict(), "attributes": short(event.attributes)}
+    """Only what is said of it: most events have nothing but a name."""
+    form: Form = {"name": event.name}
+    for name, value, usual in zip(Event._fields, event, _USUAL, strict=True):
+        if value is not usual:
+            form[name] = value
+    if event.attributes:
+        form["attributes"] = short(event.attributes)
+    else:
+        form.pop("attributes", None)
+    return form
 
 
 def _event_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> Event:
-    return Event(**{**form, "attributes": full(form["attributes"], find)})
+    return Event(**{**form, "attributes": full(form.get("attributes", NO_ATTRIBUTES), find)})
 
 
 def events_form(events: Iterable[Event], short: Shortener) -> list[Form]:
@@ -242,23 +251,40 @@ def events_of(forms: Iterable[Mapping[str, Any]], find: Callable[[str], Any]) ->
 # -- frames --------------------------------------------------------------------------------------------------
 
 
-def frame_text(frame: FrameState, short: Shortener) -> str:
-    """One running plot without those inside, which are referred to by their numbers."""
-    alone = frame._replace(children=NOTHING) if frame.children else frame
-    form = alone.to_json()
-    form["children"] = {host: child.serial for host, child in frame.children.items()}
-    form["form"] = short.short(form["form"])
-    form["variables"] = short(frame.variables)
-    return text_of(form)
+def frame_news(before: FrameState | None, frame: FrameState, short: Shortener) -> Form:
+    """What is different of one running plot, all of it if there was none; those inside are named by their numbers."""
+    if before is None or before.compiled is not frame.compiled:
+        return {
+            **frame._replace(children=NOTHING).to_json(),
+            "form": short.short(frame.compiled.form),
+            "variables": short(frame.variables),
+            "children": _inside(frame),
+        }
+    news: Form = {}
+    if frame.configuration is not before.configuration:
+        news.update(frame.configuration.form)
+    if frame.variables is not before.variables:  # 1 and 1.0 are equal, and not the same
+        news["variables"] = short(frame.variables)
+    if frame.activations is not before.activations and frame.activations != before.activations:
+        news["activations"] = dict(frame.activations)
+    if frame.children is not before.children and _inside(frame) != _inside(before):
+        news["children"] = _inside(frame)
+    if frame.kept is not before.kept:
+        news["kept"] = frame.kept_form()
+    return news
 
 
-def frame_form(serial: int, frames: Mapping[int, str], find: Callable[[str], Any]) -> Form:
+def frame_form(serial: int, frames: Mapping[int, Form], find: Callable[[str], Any]) -> Form:
     """The frame of that number with all inside it, as `FrameState.to_json` gives it."""
-    form: Form = json.loads(frames[serial])
+    form = dict(frames[serial])
     form["children"] = {host: frame_form(child, frames, find) for host, child in form["children"].items()}
     form["form"] = _full(form["form"], find)
     form["variables"] = full(form["variables"], find)
     return form
+
+
+def _inside(frame: FrameState) -> dict[str, int]:
+    return {host: child.serial for host, child in frame.children.items()}
 
 
 def _plain(value: Any) -> Form:

@@ -15,15 +15,18 @@ from dsc.sequencer.messages import LateMessage, Message
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import Kept, Shortener, message_form, text_of
 from dsc.sequencer.run_present import Present, read
-from dsc.sequencer.run_tables import TABLES, archive, serials_before, unfinished
+from dsc.sequencer.run_tables import FORMAT, TABLES, archive, require_format, serials_before, unfinished
 from dsc.sequencer.telling import Told
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
 
-_STEP = "INSERT INTO steps VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
+_STEP = "INSERT INTO steps VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
 _BEGIN = "INSERT INTO runs (plot, arguments, version, header, plots, domain) VALUES (?, ?, ?, ?, ?, ?)"
 _MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE place = (SELECT max(place) FROM steps)"
+_MORE_CHANGE = "UPDATE steps SET change = change || ? WHERE place = (SELECT max(place) FROM steps)"
+WHOLE_EVERY = 256
+"""After so many macrosteps one writes all that a restart needs: a restart reads at most as many."""
 
 Boundary = Literal["before commit", "after commit"]
 """Where a process that dies makes a difference: either nothing of the macrostep was, or nothing has left yet."""
@@ -62,21 +65,23 @@ class RunStore:
         self._domain = domain or {}
         self._run = self._number = self._before = 0
         self._records: list[str] = []
+        self._memory: dict[str, str] = {}
         self._listeners: list[Callable[[Boundary], None]] = []
         self._short = Shortener(self._put_form)
         self._present = Present(self._short)
         with knowledge.together() as connection:
             self._connection = connection
+            require_format(connection, path)
             for statement in TABLES:
                 connection.execute(statement)
             (epoch,) = connection.execute("SELECT max(epoch) FROM fence").fetchone()
             connection.execute("DELETE FROM fence")
             self._epoch = (epoch or 0) + 1
-            connection.execute("INSERT INTO fence VALUES (?)", (self._epoch,))
+            connection.execute("INSERT INTO fence VALUES (?, ?)", (self._epoch, FORMAT))
 
     def hear(self, record: Record) -> None:
         """A record of the trace, to be kept with the next macrostep."""
-        self._records.append(record.to_line())
+        self._records.append(f"{record.to_line()}\n")
 
     def listen(self, listener: Callable[[Boundary], None]) -> None:
         """Tell `listener` from now on when something is about to be committed, and when it has been."""
@@ -113,7 +118,8 @@ class RunStore:
         (open_runs,) = self._connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
         if open_runs:
             raise StoreError("the store has an unfinished run, which can be resumed", place=Place(str(self.path)))
-        self._present.clear(self._connection)
+        self._connection.execute("DELETE FROM memory")
+        self._number, self._present = 0, Present(self._short)
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
         row = (
             plot, text_of(self._short(arguments)), self._knowledge.version, text_of(self._header), text_of(plots),
@@ -124,7 +130,9 @@ class RunStore:
 
     def late(self, late: LateMessage, due: float) -> None:
         """Something was handed in that comes later, at second `due` of run time."""
-        self._present.put(self._connection, late, self._number, due)
+        self._present.put(late, self._number, due)
+        if self._number:  # else it goes with the first macrostep
+            self._connection.execute(_MORE_CHANGE, (self._present.change(),))
 
     def step(
         self,
@@ -145,21 +153,25 @@ class RunStore:
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
-        configuration = _paths_text(reactor.machine.state.configuration())
-        self._connection.execute(_STEP, (
-            self._run, self._number, now, self._before, self._knowledge.version, text_of(form), configuration,
-            self._present.reactor(reactor), self._new_records(),
-        ))  # fmt: skip
-        self._present.frames(self._connection, reactor.machine.state.root)
-        self._present.left(self._connection, under_way)
+        state, version = reactor.machine.state, self._knowledge.version
+        self._present.left(under_way)
         if message is not None:
-            self._present.taken(self._connection, message)
-        self._present.asked(self._connection, output, self._number, now, reactor)
-        self._before = self._knowledge.version  # the next macrostep may be part of the same transaction
+            self._present.taken(message)
+        self._present.asked(output, self._number, now, reactor)
+        self._present.reached(reactor)
+        change = self._present.change(whole=self._number % WHOLE_EVERY == 1)
+        self._connection.execute(_STEP, (
+            self._run, self._number, now, self._before, version, state.serials, text_of(form),
+            _paths_text(state.configuration()), change, self._new_records(),
+        ))  # fmt: skip
+        self._before = version  # the next macrostep may be part of the same transaction
 
     def memory(self, component: str, memory: Any) -> None:
-        """What a component has to remember."""
-        self._present.memory(self._connection, component, memory)
+        """What a component has to remember; it is written if it is not what it was."""
+        text = text_of(memory)
+        if self._memory.get(component) != text:
+            self._connection.execute("INSERT OR REPLACE INTO memory VALUES (?, ?)", (component, text))
+            self._memory[component] = text
 
     def end(self, *, finished: bool, problem: str | None) -> None:
         """The run is over."""
@@ -191,7 +203,7 @@ class RunStore:
 
     def _new_records(self) -> str:
         """What was heard since the last time, one record a line."""
-        text = "".join([f"{line}\n" for line in self._records])
+        text = "".join(self._records)
         self._records.clear()
         return text
 

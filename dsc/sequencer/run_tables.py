@@ -1,9 +1,9 @@
 """The tables of runs in the file of a knowledge store, and how they are read.
 
-`runs` and `steps` are the past: who ran what with which plots, and every macrostep with the message taken and the
-records of the trace. `frames`, `pending` and `memory` are the present of the one run that may be unfinished, with what
-its last step says of the reactor. `forms` are plots by hash; `fence` says who may write. A commit writes whole pages:
-few tables, and no index but their keys, make it cheap.
+`runs` are who ran what with which plots; `steps` every macrostep with the message taken, what it has changed of what
+a restart needs (see `run_standing`), and the records of the trace. `memory` is what components of the one run that may
+be unfinished remember. `forms` are plots by hash; `fence` says who may write. A commit writes whole pages: a macrostep
+is one row of one table, without an index.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from dsc.engine.steps import Start
+from dsc.sequencer.run_standing import Row, Standing, standing
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.file import reading
@@ -25,16 +26,14 @@ TABLES = (
     """CREATE TABLE IF NOT EXISTS runs (run INTEGER PRIMARY KEY, plot TEXT NOT NULL, arguments TEXT NOT NULL,
         version INTEGER NOT NULL, header TEXT NOT NULL, plots TEXT NOT NULL, domain TEXT NOT NULL, ended TEXT)""",
     """CREATE TABLE IF NOT EXISTS steps (place INTEGER PRIMARY KEY, run INTEGER NOT NULL, number INTEGER NOT NULL,
-        time REAL NOT NULL, before INTEGER NOT NULL, version INTEGER NOT NULL, message TEXT NOT NULL,
-        configuration TEXT NOT NULL, reactor TEXT NOT NULL, records TEXT NOT NULL)""",
-    "CREATE TABLE IF NOT EXISTS frames (serial INTEGER PRIMARY KEY, frame TEXT NOT NULL)",
-    """CREATE TABLE IF NOT EXISTS pending (place INTEGER PRIMARY KEY, kind TEXT NOT NULL, step INTEGER NOT NULL,
-        at REAL NOT NULL, what TEXT NOT NULL, reports INTEGER NOT NULL, cause INTEGER NOT NULL,
-        cancelled INTEGER NOT NULL)""",
+        time REAL NOT NULL, before INTEGER NOT NULL, version INTEGER NOT NULL, serials INTEGER NOT NULL,
+        message TEXT NOT NULL, configuration TEXT NOT NULL, change TEXT NOT NULL, records TEXT NOT NULL)""",
     "CREATE TABLE IF NOT EXISTS memory (component TEXT PRIMARY KEY, memory TEXT NOT NULL)",
     "CREATE TABLE IF NOT EXISTS forms (hash TEXT PRIMARY KEY, form TEXT NOT NULL) WITHOUT ROWID",
-    "CREATE TABLE IF NOT EXISTS fence (epoch INTEGER NOT NULL)",
+    "CREATE TABLE IF NOT EXISTS fence (epoch INTEGER NOT NULL, format INTEGER NOT NULL)",
 )
+FORMAT = 2
+"""Of these tables; the first had no number."""
 _RUNS = "SELECT run, plot, arguments, version, header, plots, domain, ended FROM runs"
 
 
@@ -70,6 +69,7 @@ class StepRow:
         number: the first is 1.
         time: seconds of run time.
         before, version: those of the knowledge, before and after it.
+        serials: the last serial number that was given out.
         message: what was taken, as `run_forms.message_form`; the first one is the start.
         configuration: paths of the active states after it.
         records: of the trace, since the macrostep before.
@@ -79,6 +79,7 @@ class StepRow:
     time: float
     before: int
     version: int
+    serials: int
     message: Mapping[str, Any]
     configuration: tuple[str, ...]
     records: tuple[Record, ...]
@@ -108,12 +109,12 @@ class RunArchive:
     def steps(self, run: int) -> Iterator[StepRow]:
         """The macrosteps of a run, in order."""
         rows = self.connection.execute(
-            "SELECT number, time, before, version, message, configuration, records FROM steps "
+            "SELECT number, time, before, version, serials, message, configuration, records FROM steps "
             "WHERE run = ? ORDER BY place", (run,),
         )  # fmt: skip
-        for number, time, before, version, message, configuration, records in rows:
+        for number, time, before, version, serials, message, configuration, records in rows:
             yield StepRow(
-                number, time, before, version, json.loads(message), tuple(json.loads(configuration)),
+                number, time, before, version, serials, json.loads(message), tuple(json.loads(configuration)),
                 tuple([Record.from_line(line) for line in records.split("\n") if line]),
             )  # fmt: skip
 
@@ -132,12 +133,15 @@ class RunArchive:
         )
         return ((place, line) for place, lines in rows for line in lines.split("\n") if line)
 
+    def standing(self) -> Standing:
+        """What stands after the last macrostep of all."""
+        rows = self.connection.execute("SELECT change FROM steps ORDER BY place DESC")
+        return standing(text for (text,) in rows)
+
     def under_way(self) -> list[tuple[Start, float]]:
         """The skills of the unfinished run that have not ended, with the second at which they were started."""
-        rows = self.connection.execute(
-            "SELECT what, at FROM pending WHERE kind = 'Start' AND NOT cancelled ORDER BY place"
-        )
-        return [(Start(**json.loads(what)), since) for what, since in rows]
+        rows = [Row(*row) for _, row in sorted(self.standing().pending.items())]
+        return [(Start(**row.what), row.at) for row in rows if row.kind == Start.__name__ and not row.cancelled]
 
     def serials_before(self, run: int) -> int:
         """The last serial number given out before a run: no two runs of a store have an action id in common."""
@@ -161,6 +165,7 @@ def archive(path: Path) -> Iterator[RunArchive]:
     with reading(path) as connection:
         if not _has_tables(connection):
             raise StoreError("no run was ever kept in this store", place=Place(str(path)))
+        require_format(connection, path)
         yield RunArchive(connection, path)
 
 
@@ -187,8 +192,10 @@ def has_run(path: Path) -> bool:
     if not path.exists():
         return False
     with reading(path) as connection:
-        runs = RunArchive(connection, path)
-        return _has_tables(connection) and bool(runs.runs())
+        if not _has_tables(connection):
+            return False
+        require_format(connection, path)
+        return bool(RunArchive(connection, path).runs())
 
 
 def is_unfinished(path: Path) -> bool:
@@ -210,9 +217,20 @@ def unfinished(runs: RunArchive) -> RunRow:
 def serials_before(connection: sqlite3.Connection, run: int) -> int:
     """As of `RunArchive`, for who writes the store."""
     last = connection.execute(
-        "SELECT reactor FROM steps WHERE run < ? ORDER BY place DESC LIMIT 1", (run,)
+        "SELECT serials FROM steps WHERE run < ? ORDER BY place DESC LIMIT 1", (run,)
     ).fetchone()
-    return 0 if last is None else int(json.loads(last[0])["serials"])
+    return 0 if last is None else int(last[0])
+
+
+def require_format(connection: sqlite3.Connection, path: Path) -> None:
+    """Raise `StoreError` if the file has runs, or room for them, in tables that are not those of today."""
+    if not _has_tables(connection):
+        return
+    columns = {name for _, name, *_ in connection.execute("PRAGMA table_info(fence)")}
+    row = connection.execute("SELECT format FROM fence").fetchone() if "format" in columns else (1,)
+    if row is not None and row[0] != FORMAT:
+        said = f"the runs in this store have format {row[0]}, this program reads and goes on with format {FORMAT}"
+        raise StoreError(said, place=Place(str(path)))
 
 
 def _has_tables(connection: sqlite3.Connection) -> bool:

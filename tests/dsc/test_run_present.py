@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import sqlite3
-from contextlib import closing
+from types import SimpleNamespace
 
+import pytest
 from dsc_charts import PROPERTY
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,27 +13,66 @@ from random_charts import happenings, libraries
 from test_engine_properties import Played
 
 from dsc.engine.state import MachineState
-from dsc.sequencer.run_forms import Shortener, frame_form
+from dsc.engine.steps import Cancel, Revoke, SendLater, SetParameter, Start, StartTimer
+from dsc.events import Event
+from dsc.sequencer.messages import SkillMessage, TimerMessage
+from dsc.sequencer.run_forms import Outcome, Shortener, frame_form
 from dsc.sequencer.run_present import Present
-from dsc.sequencer.run_tables import TABLES
+from dsc.sequencer.run_standing import Standing, standing
 
 EVERY_KIND = st.one_of(libraries(depth=2), libraries(scxml=True, depth=2))
 
 
 @settings(PROPERTY, max_examples=40)
-@given(EVERY_KIND, happenings())
-def test_the_frames_that_have_changed_are_enough_to_have_all_of_them(plots, happened):
-    forms, played = {}, Played(*plots)
+@given(EVERY_KIND, happenings(), st.integers(min_value=2, max_value=5))
+def test_the_changes_are_enough_to_have_all_frames(plots, happened, whole_every):
+    forms, played, changes = {}, Played(*plots), []
     present = Present(Shortener(forms.__setitem__))
-    with closing(sqlite3.connect(":memory:")) as connection:
-        for statement in TABLES:
-            connection.execute(statement)
-        for _ in played.steps(happened):
-            state = played.machine.state
-            present.frames(connection, state.root)
-            texts = dict(connection.execute("SELECT serial, frame FROM frames"))
-            assert len(texts) == (len(list(state.root.frames())) if state.root else 0)
-            if state.root is not None:
-                root = frame_form(state.root.serial, texts, lambda digest: json.loads(forms[digest]))
-                form = {"root": root, "serials": state.serials, "finished": state.finished}
-                assert MachineState.from_json(form, played.library) == state
+    for number, _ in enumerate(played.steps(happened)):
+        state = played.machine.state
+        present.reached(reactor_of(played.machine))
+        changes.append(present.change(whole=number % whole_every == 0))
+        found = standing(reversed(changes))
+        assert found.frames.keys() == {frame.serial for frame in state.root.frames()} if state.root else not found.frames
+        root = None
+        if state.root is not None:
+            root = frame_form(found.reactor["root"], found.frames, lambda digest: json.loads(forms[digest]))
+        form = {"root": root, "serials": state.serials, "finished": found.reactor["finished"]}
+        assert MachineState.from_json(form, played.library) == state
+
+
+def reactor_of(machine):
+    return SimpleNamespace(machine=machine, emitted=[], in_vain=set(), problem=None, caused_by={})
+
+
+WORK = Start("r-2", 2, "robot", "work", {})
+LATER = SendLater(Event("go"), 5.0, id="x")
+TIMEOUT = StartTimer(2, 0, 9.0)
+
+
+@pytest.mark.parametrize(
+    "happens",
+    [
+        lambda present: present.taken(SkillMessage(WORK, Outcome("did"), final=True)),
+        lambda present: present.taken(SkillMessage(WORK, Outcome("progress"), final=False)),
+        lambda present: present.taken(TimerMessage(TIMEOUT)),
+        lambda present: present.taken(LATER),
+        lambda present: present.asked([Cancel(2)], 2, 1.0, NOBODY),
+        lambda present: (present.asked([Cancel(2)], 2, 1.0, NOBODY), present.left(())),
+        lambda present: present.asked([Revoke(LATER.event.frame, "x")], 2, 1.0, NOBODY),
+        lambda present: (present.left(()), present.asked([SetParameter("robot", "speed", 2)], 2, 1.0, NOBODY)),
+        lambda present: (present.asked([StartTimer(3, 0, 1.0), Cancel(3)], 2, 1.0, NOBODY)),
+    ],
+    ids=["answer", "report", "timer", "event sent later", "cancelled", "left", "revoked", "overtaken", "come and gone"],
+)
+def test_what_is_pending_is_the_same_by_changes_and_as_a_whole(happens):
+    present, found = Present(Shortener(lambda *_: None)), Standing()
+    present.asked([WORK, TIMEOUT, LATER, SetParameter("robot", "speed", 1)], 1, 0.0, NOBODY)
+    found.take(json.loads(present.change()))
+    happens(present)
+    change = present.change()
+    found.take(json.loads(change))
+    assert found.pending == standing([present.change(whole=True)]).pending
+
+
+NOBODY = SimpleNamespace(caused_by={})

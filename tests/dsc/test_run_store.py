@@ -13,6 +13,7 @@ from dsc.calls import Ended, Outcome, Status
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.events import Event
+from dsc.sequencer import run_store
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.run_tables import archive, has_run, records_of
@@ -296,6 +297,31 @@ def test_a_changed_chart_is_refused_with_the_difference(tmp_path, chart, more, d
 
 def action(name):
     return f"planning action '{name}'"
+
+
+def test_runs_in_tables_of_another_format_are_refused_with_that_reason(tmp_path):
+    path = tmp_path / "run.kb"
+    with KnowledgeBase.open(SCHEMA, path) as kb, kb.together() as connection:  # as they were before they had a number
+        connection.execute("CREATE TABLE runs (run INTEGER PRIMARY KEY, ended TEXT)")
+        connection.execute("CREATE TABLE fence (epoch INTEGER NOT NULL)")
+        connection.execute("INSERT INTO runs VALUES (1, NULL)")
+    for look in (has_run, records_of):
+        with pytest.raises(StoreError, match="the runs in this store have format 1"):
+            look(path)
+    with KnowledgeBase.open(SCHEMA, path) as kb, pytest.raises(StoreError, match="goes on with format 2"):
+        RunStore(kb, path)
+    assert run_with(new(tmp_path), TWICE, Robot())[0].finished
+
+
+def test_a_restart_reads_no_more_macrosteps_than_since_all_was_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_store, "WHOLE_EVERY", 3)
+    chart = CHARTS["one skill after the other"]
+    crashes = Crashes(tmp_path, chart)
+    with archive(crashes.copies[-1][2] / "run.kb") as runs:
+        texts = [text for (text,) in runs.connection.execute("SELECT change FROM steps ORDER BY place")]
+        assert [number for number, text in enumerate(texts) if '"whole":true' in text] == list(range(0, len(texts), 3))
+    for what, run in crashes.resumed():
+        assert run.outcome() == crashes.whole.outcome(), what
 
 
 def test_a_changed_domain_is_refused_with_the_difference(tmp_path):
