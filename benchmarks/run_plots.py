@@ -16,6 +16,7 @@ import resource
 import statistics
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from knowledge_base import KnowledgeBase
+from knowledge_base.journal.journal import TIDY_UP_AFTER
 
 PLOT = ActionPlot.model_validate({
     "plot": "worker", "receives": {"ping": None, "stop": None},
@@ -41,8 +43,8 @@ PLOT = ActionPlot.model_validate({
     },
 })  # fmt: skip
 LIBRARY = Library([PLOT])
-PAST = 150
-"""Events that a plot has had before at most: about as many as fill a file until it is tidied up."""
+PAST = TIDY_UP_AFTER // 2
+"""Events that a plot has had before at most: as many as it takes until its file is tidied up; each is two commits."""
 FILES_EACH = 5
 """How many files SQLite and the lock hold open for a store."""
 MOST = 20.0
@@ -177,18 +179,22 @@ async def _past(one: Sequencer, robot: Robot, events: int) -> None:
 async def _events(
     runs: list[Sequencer], robots: list[Robot], clock: LoopClock, events: int, rate: float, chance: random.Random
 ) -> None:
-    """So many for each plot, at a moment of its own in each period."""
+    """So many for each plot, at a moment of its own in each period.
+
+    One timer a plot: timers for all of them would be a hundred thousand things for the collector to look through.
+    """
     begin = clock.now() + 0.1
 
-    def due(one: Sequencer, robot: Robot, at: float) -> None:
+    def due(one: Sequencer, robot: Robot, phase: float, turn: int) -> None:
+        at = phase + turn / rate
         robot.due = at if len(runs) > 1 else clock.now()
         one.post(PING)
+        if turn + 1 < events:
+            clock.call_at(at + 1 / rate, partial(due, one, robot, phase, turn + 1))
 
     for one, robot in zip(runs, robots, strict=True):
         phase = begin + chance.random() / rate
-        for turn in range(events):
-            at = phase + turn / rate
-            clock.call_at(at, lambda one=one, robot=robot, at=at: due(one, robot, at))
+        clock.call_at(phase, partial(due, one, robot, phase, 0))
     await asyncio.sleep(0.1 + (events + 1) / rate)
     for one in runs:
         one.post(STOP)
