@@ -32,6 +32,8 @@ EXECUTION_ERROR = "error.execution"
 """What `error` is called in profile `scxml` (SCXML 3.13)."""
 FAILURES = frozenset({SKILL_ERROR, TIMED_OUT})
 """How any skill may end. What no state of its plot takes goes outwards, to the states that hold plots."""
+LED_AWAY = "then."
+"""What the outcomes of generated plots begin with that lead to a state of the plot which holds the goal."""
 ERRORS = frozenset({ERROR, EXECUTION_ERROR})
 
 TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
@@ -44,6 +46,11 @@ EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
 
 NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
 """Of most events; shared, as nobody can change it."""
+
+
+def goes_outwards(event: str) -> bool:
+    """Whether what no state of a plot takes is offered to the states that hold plots around it."""
+    return event in FAILURES or event.startswith(LED_AWAY)
 
 
 class Event(NamedTuple):

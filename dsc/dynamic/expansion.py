@@ -3,7 +3,8 @@
 For each submachine or dynamic state and each outcome that its own `on` does not settle, the rules of its plot
 follow in order. A rule that uses a recovery plot adds a state for it. How often a rule has answered for a
 state is counted in a variable of the plot, so that it is part of the machine's state like everything else.
-In a generated plot, what no rule takes leads to `replan`. Failures of skills inside are answered like outcomes.
+In a generated plot, what no rule takes leads to `replan`, and what leads to a state leaves the plot. Failures of skills
+inside are answered like outcomes.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from collections.abc import Mapping
 from dsc.dynamic.added import Added
 from dsc.dynamic.detours import Detours
 from dsc.dynamic.handlers import with_handlers
+from dsc.dynamic.leading import led_away
 from dsc.dynamic.outcomes import Plots, answerable
 from dsc.dynamic.responses import Responses, States, reason_of
-from dsc.dynamic.steps import Step, about_step, concerns
+from dsc.dynamic.steps import Step, about_step, answers_in_plans, concerns
 from dsc.events import NO_CANDIDATE
 from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.rules import REPLAN
@@ -44,6 +46,7 @@ class _Expansion:
         self._plot, self._plots = plot, plots
         self.added = Added(plot)
         self._responses = Responses(plot, plots, self.added)
+        self._in_plans = [rule for rule in plot.rules if rule.leads_away and answers_in_plans(rule, plots)]
         self.detours = Detours(plot, plots, self.added, self._responses)
 
     def scope(self, scope: Scope) -> dict[str, object]:
@@ -62,12 +65,12 @@ class _Expansion:
                 regions = {key: one.model_copy(update=self.scope(one)) for key, one in state.regions.items()}
                 result[name] = state.model_copy(update={"regions": regions})
             elif isinstance(state, SubmachineState | DynamicState):
-                result.update(self._with_rules(name, state))
+                result.update(self._with_rules(name, state, states))
             else:
                 result[name] = state
         return result
 
-    def _with_rules(self, name: str, state: Step) -> States:
+    def _with_rules(self, name: str, state: Step, beside: Mapping[str, AnyState]) -> States:
         on = dict(state.on)
         recoveries: States = {}
         for event in answerable(state, self._plots):
@@ -84,4 +87,6 @@ class _Expansion:
                 own.append(self._responses.ending(name, REPLAN, reason))
             if own:
                 on[event] = tuple(own)
+        if isinstance(state, DynamicState) and state.goal is not None:
+            on = dict(led_away(name, state, on, beside, self._in_plans, self.added))
         return {name: state.model_copy(update={"on": on}), **recoveries}

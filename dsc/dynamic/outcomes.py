@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Protocol
 
 from dsc.events import GAVE_UP, NO_CANDIDATE, NO_PLAN, SKILL_ERROR, TIMED_OUT
@@ -20,6 +20,10 @@ _FAILED: Outcomes = {
 
 class Plots(Protocol):
     """Where plots are found by name."""
+
+    def __iter__(self) -> Iterator[ActionPlot]:
+        """All of them."""
+        ...
 
     def plot(self, name: str) -> ActionPlot:
         """Raises `UnknownNameError`."""

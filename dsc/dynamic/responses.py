@@ -39,6 +39,7 @@ class Responses:
         self._added = added
         self._interrupted = any(handler.interrupt for handler in plot.handlers)
         self._beside = {name: scope.states for scope in plot.scopes() for name in scope.states}
+        self._states = {name: state for name, state, _ in plot.walk()}
         self._ends: dict[tuple[int, str], str] = {}
         self._endings: dict[tuple[str, str], Transition] = {}
 
@@ -54,30 +55,34 @@ class Responses:
         guard, counting = self._limit(rule, key)
         onward = list(onward)
         if not rule.do.acts:
-            return [_joined(rule, guard, counting, after) for after in onward]
+            return [_joined(rule, guard, counting, self._handed_out(after)) for after in onward]
         name = self._added.state(f"{key}_{rule.do.use or 'command'}")
         kept: dict[str, lang.Term] = {}
-        onward = [one.model_copy(update={"passed": self._kept(one.passed, key, kept)}) for one in onward]
+        kept_onward = [one.model_copy(update={"passed": self._kept(one.passed, key, kept)}) for one in onward]
+        onward = list(map(self._handed_out, kept_onward))
         states[name] = self._acting(rule, key, onward, kept)
         return [_joined(rule, guard, {**counting, **kept}, Transition(target=name))]
 
     def onward(self, rule: Rule, number: int, name: str, state: State) -> list[Transition]:
         """What follows the response of a rule, which stands at that place in the plot, to a step."""
-        then = rule.then
-        about = rule.label if rule.on is None else rule.on
-        reason = about if rule.do.acts or rule.on is None else reason_of(rule.on)  # else the event is another one
+        then, about = rule.then, rule.label if rule.on is None else rule.on
+        if self._plot.generated and (then in {REPLAN, GIVE_UP} or rule.leads_away):
+            return [self._leaving(rule, name, about)]
         if then == CONTINUE and rule.before and skipped(name) in self._beside[name]:
             return [Transition(target=skipped(name))]
         if then == CONTINUE:
             return self._wired(rule, number, name, state, DONE)
-        if then == REPLAN and self._plot.generated:
-            return [self.ending(name, REPLAN, reason)]
         if then == GIVE_UP:
-            if self._plot.generated:
-                return [self.ending(name, GAVE_UP, reason)]
-            return [_because(about, one) for one in self._wired(rule, number, name, state, GAVE_UP)]
+            return [because(about, one) for one in self._wired(rule, number, name, state, GAVE_UP)]
         target = name if then in {RETRY, REPLAN, ENTER} else then
         return [Transition(target=target, passed=rule.do.passed)]
+
+    def _leaving(self, rule: Rule, name: str, about: str) -> Transition:
+        """Out of the generated plot."""
+        if rule.leads_away:
+            return Transition(target=self._end(self._beside[name], rule.outcome), passed=rule.do.passed)
+        reason = about if rule.do.acts or rule.on is None else reason_of(rule.on)  # else the event is another one
+        return self.ending(name, REPLAN if rule.then == REPLAN else GAVE_UP, reason)
 
     def ending(self, name: str, outcome: str, reason: str) -> Transition:
         """To the final state beside a step that ends the generated plot with the outcome."""
@@ -85,6 +90,14 @@ class Responses:
         if (end, reason) not in self._endings:  # the same for many steps
             self._endings[end, reason] = Transition.model_validate({"to": end, "assign": {"reason": reason}})
         return self._endings[end, reason]
+
+    def _handed_out(self, way: Transition) -> Transition:
+        """What is passed to an end of the plot becomes the variables that this end hands out."""
+        end = self._states.get(way.target or "")
+        if not way.passed or not isinstance(end, FinalState):
+            return way
+        handed = {term.name: way.passed[key] for key, term in end.arguments.items() if isinstance(term, lang.Variable)}
+        return way.model_copy(update={"passed": {}, "do": (*way.do, Assign(assign=handed))})
 
     def _end(self, scope: Mapping[str, AnyState], outcome: str) -> str:
         """The final state of a scope that emits the outcome; looked for once."""
@@ -155,7 +168,7 @@ def _spoken(rule: Rule) -> str:
     return f"on {rule.on}" if rule.on is not None else f"{rule.place} {', '.join(rule.steps)}"
 
 
-def _because(outcome: str, giving_up: Transition) -> Transition:
+def because(outcome: str, giving_up: Transition) -> Transition:
     """A state's way out on `gave_up`, taken on another outcome: that outcome is the reason."""
     reason = {"event.reason": lang.Constant(outcome)}
     return giving_up.model_copy(update={

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from dsc.dynamic.outcomes import Plots
+from dsc.events import FAILURES
 from dsc.model.actions import Configure, Send, Switch
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import STEP, Command, Handler, Response, Rule
@@ -40,6 +41,12 @@ def action_of(step: Step, plots: Plots) -> str | None:
 def concerns(rule: Rule, name: str, step: Step, plots: Plots) -> bool:
     """Whether a rule is for that step, as far as steps are named in it."""
     return not rule.steps or name in rule.steps or action_of(step, plots) in rule.steps
+
+
+def answers_in_plans(rule: Rule, plots: Plots) -> bool:
+    """Whether a rule may answer for steps of plans: those that carry out planning actions, if it names any, theirs."""
+    carrying = [plot for plot in plots if plot.implements and (not rule.steps or plot.implements in rule.steps)]
+    return bool(carrying) and (rule.on is None or any(rule.on in FAILURES or rule.on in one.emits for one in carrying))
 
 
 def mentioned_in(rule: Rule | Handler) -> frozenset[str]:

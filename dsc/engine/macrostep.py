@@ -17,7 +17,7 @@ from dsc.engine.state import FrameState, MachineState, at_rest
 from dsc.engine.steps import Step
 from dsc.engine.tables import Chart, Edge
 from dsc.errors import RunawayError
-from dsc.events import AT_LEAST, ERRORS, EVERY, FAILURES, Event
+from dsc.events import AT_LEAST, ERRORS, EVERY, Event, goes_outwards
 from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Expression
 
@@ -112,7 +112,9 @@ class Macrostep(Execution):
         if event.name == AT_LEAST:
             return self._least_time_passed(frame, state)
         trigger = Addressed(event.name, frame.compiled.index[state], event.exact, event.number)
-        return self._take_alone(frame, trigger, event) or (event.name in FAILURES and self._take_around(frame, event))
+        if self._take_alone(frame, trigger, event):
+            return True
+        return goes_outwards(event.name) and self._take_around(frame, event)
 
     def _take_around(self, frame: Frame, event: Event) -> bool:
         """What a plot does not take is offered to the state that holds the plot, and so on outwards."""

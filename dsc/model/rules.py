@@ -8,6 +8,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field, Tag, model_validator
 
+from dsc.events import LED_AWAY
 from dsc.model.actions import Configure, Send, Switch, Trigger
 from dsc.model.language import ConditionField, EffectField, Frozen, TermField, by_key
 from dsc.model.transitions import as_tuple
@@ -114,6 +115,16 @@ class Rule(Frozen):
     def then(self) -> str:
         """What follows: what it says, or what goes without saying where it answers."""
         return self.do.then or RESPONSES[self.place][0]
+
+    @property
+    def leads_away(self) -> bool:
+        """Whether a named state follows: there is none beside the steps of a plan, so the plan is left for it."""
+        return self.then not in RESPONSES[self.place]
+
+    @property
+    def outcome(self) -> str:
+        """The outcome with which it leaves a plan; its attributes are what is passed to the state that follows."""
+        return f"{LED_AWAY}{self.then}" + (f"({','.join(sorted(self.do.passed))})" if self.do.passed else "")
 
     @property
     def label(self) -> str:

@@ -15,7 +15,7 @@ from dsc.dynamic.steps import Step, concerns
 from dsc.errors import Finding
 from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path
-from dsc.model.rules import CONTINUE, ENTER, REPLAN, RESPONSES, RETRY, Rule
+from dsc.model.rules import CONTINUE, ENTER, REPLAN, RETRY, Rule
 from dsc.model.states import DynamicState, State
 from dsc.validation.candidates import review_candidates
 from dsc.validation.library import MAX_FINDINGS
@@ -41,18 +41,16 @@ def _rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Fin
     steps = {name: state for name, state, _ in nesting.states if isinstance(state, Step)}
     planned = any(isinstance(state, DynamicState) and state.goal is not None for state in steps.values())
     for number, rule in enumerate(plot.rules):
-        earlier = [one for one in plot.rules[:number] if _comes_before(one, rule, planned=planned)]
+        earlier = [one for one in plot.rules[:number] if _comes_before(one, rule)]
         why = _never(rule.when, [one.when for one in earlier])
         if why is None and rule.on is not None and not planned and _settled(rule, rule.on, steps, library):
             why = f"every state that can end with '{rule.on}' answers it itself"
-        if why is None and planned and rule.then not in RESPONSES[rule.place] and not _here(rule, steps, library):
-            why = f"it is for steps of plans alone, which cannot lead to the state '{rule.then}'"
         if why is not None:
             others = "; before it: " + ", ".join(f"'{one.label}'" for one in earlier) if earlier else ""
             yield _warning(plot, ("rules", number), f"the rule '{rule.label}' can never answer: {why}{others}", "rules")
 
 
-def _comes_before(earlier: Rule, later: Rule, *, planned: bool) -> bool:
+def _comes_before(earlier: Rule, later: Rule) -> bool:
     """Whether the later one is not asked any more where the earlier one has answered, however often that was."""
     if (earlier.place, earlier.on) != (later.place, later.on):
         return False
@@ -60,14 +58,7 @@ def _comes_before(earlier: Rule, later: Rule, *, planned: bool) -> bool:
         return False
     bounded = earlier.do.limit is not None or earlier.then in {RETRY, REPLAN}
     goes_on = (earlier.place, earlier.then) in {("before", ENTER), ("after", CONTINUE)}
-    stays = planned and earlier.then not in RESPONSES[earlier.place]  # it does not travel to plans, others do
-    return not (bounded or goes_on or stays)
-
-
-def _here(rule: Rule, steps: dict[str, Step], library: Library) -> bool:
-    """Whether a rule may answer at some state of the plot itself."""
-    mine = (state for name, state in steps.items() if concerns(rule, name, state, library))
-    return any(rule.on is None or rule.on in answerable(state, library) for state in mine)
+    return not (bounded or goes_on)
 
 
 def _settled(rule: Rule, event: str, steps: dict[str, Step], library: Library) -> bool:

@@ -22,7 +22,8 @@ def check_rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterato
     for number, rule in enumerate(plot.rules):
         path: Path = ("rules", number)
         yield from _used(plot, rule.do.use, path, library)
-        yield from _response(plot, rule, path, names)
+        if not (plot.generated and rule.outcome in plot.emits):  # else the state is in the plot that holds the goal
+            yield from _response(plot, rule, path, names)
         key = "of" if rule.on is not None else rule.place
         for position, name in enumerate(rule.steps):
             if name not in steps:

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import answerable, outcomes_of
-from dsc.dynamic.steps import Step, concerns
+from dsc.dynamic.steps import Step, answers_in_plans, concerns
 from dsc.errors import Finding
 from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, TIMERS
 from dsc.model.actions import Trigger
 from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path
-from dsc.model.rules import RESPONSES
 from dsc.model.states import (
     AnyState,
+    DynamicState,
     FinalState,
     State,
     SubmachineState,
@@ -77,18 +77,23 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     """A rule goes to a state beside the one it answers for."""
-    leading = [(n, rule) for n, rule in enumerate(plot.rules) if rule.then not in RESPONSES[rule.place]]
+    leading = [(n, rule) for n, rule in enumerate(plot.rules) if rule.leads_away and not plot.generated]
     for scope in plot.scopes() if leading else ():
         steps = [(name, state) for name, state in scope.states.items() if isinstance(state, Step)]
         for number, rule in leading:
-            for name, state in steps:
+            for name, state in steps if rule.then not in scope.states else ():
                 answers = rule.on is None or rule.on in answerable(state, library)
-                if answers and concerns(rule, name, state, library) and rule.then not in scope.states:
+                here = answers and concerns(rule, name, state, library)
+                if here or (_is_planned(state) and answers_in_plans(rule, library)):
                     error = SchemaError(
-                        f"the rule's way from '{name}' to '{rule.then}' crosses a border",
+                        f"the rule's way from {'' if here else 'a plan at '}'{name}' to '{rule.then}' crosses a border",
                         place=plot.place(("rules", number, "do", "then")), found=rule.then, valid=scope.states,
                     )  # fmt: skip
                     yield Finding(error, "no border crossing", "say with `of` for which states the rule is")
+
+
+def _is_planned(state: Step) -> bool:
+    return isinstance(state, DynamicState) and state.goal is not None
 
 
 def _left_out_in_a_circle(plot: ActionPlot, expanded: ActionPlot) -> Iterator[Finding]:

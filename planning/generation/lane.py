@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from dsc.dynamic.responses import skipped
@@ -51,6 +52,7 @@ class Writer:
         lanes: how they are spread.
         plan: name under which the planner's component hears which step begins; nobody hears of a plot without it.
         left_out: the steps that rules may leave out.
+        leading: outcomes with which rules leave the plan for another state, with what they pass to it.
     """
 
     def __init__(
@@ -60,9 +62,12 @@ class Writer:
         lanes: Sequence[Lane],
         plan: str | None,
         left_out: Collection[int] = (),
+        leading: Mapping[str, Iterable[str]] = MappingProxyType({}),
     ) -> None:
         self._steps = dict(enumerate(steps, start=1))
         self._left_out = left_out
+        self._ends: dict[str, Mapping[str, str]] = {end: {"reason": "?reason"} for end in (REPLAN, GAVE_UP)}
+        self._ends.update({end: {name: f"?{passed(name)}" for name in names} for end, names in leading.items()})
         self._plan = plan
         lane_of = {number: lane for lane in lanes for number in lane.numbers}
         self._waits: dict[int, list[tuple[str, int]]] = {number: [] for number in self._steps}
@@ -88,8 +93,8 @@ class Writer:
                 states[skipped(f"step_{number}")] = self._after(number, following, lane, left_out=True)
             if following is not None and self._waits[following]:
                 states[f"before_{following}"] = self._before(following, lane)
-        for end in (REPLAN, GAVE_UP):
-            states[end + lane.mark] = {"final": True, "emit": end, "with": {"reason": "?reason"}}
+        for end, handed_out in self._ends.items():
+            states[end + lane.mark] = {"final": True, "emit": end, "with": handed_out}
         return states
 
     def _before(self, number: int | None, lane: Lane) -> dict[str, Any]:
@@ -150,6 +155,11 @@ class Writer:
 
     def _replan(self, lane: Lane, reason: str, when: Expression | None = None) -> dict[str, Any]:
         return _guarded({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, when)
+
+
+def passed(name: str) -> str:
+    """The variable of what a rule passes under that name to a state outside of the plan."""
+    return f"passed_{name}"
 
 
 def _guarded(transition: dict[str, Any], when: Expression | None) -> dict[str, Any]:

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 from dsc.events import FAILURES, GAVE_UP
 from dsc.model.plot import ActionPlot
-from dsc.model.rules import CONTINUE, REPLAN, RESPONSES, Rule
-from planning.generation.lane import FINISHED, Lane, Writer
+from dsc.model.rules import CONTINUE, REPLAN, Rule
+from planning.generation.lane import FINISHED, Lane, Writer, passed
 from planning.generation.steps import CarriedStep, Carrier, sketched
 from planning.generation.usage import Usage
 from planning.ordering.chains import chains
@@ -66,7 +66,10 @@ def plot_from_plan(
     order = order.restricted(_clashes([step.usage for step in steps], order, shared))
     lanes = _lanes(order, steps)
     left_out = [n for n, step in enumerate(plan.steps, start=1) if any(_leaves_out(rule, step) for rule in rules)]
-    writer = Writer(steps, order, lanes, None if library is None else name, left_out)
+    outcomes = FAILURES.union(*(step.outcomes for step in steps))
+    rules = [rule for rule in rules if rule.on is None or rule.on in outcomes]
+    leading = {rule.outcome: dict.fromkeys(rule.do.passed, "symbol") for rule in rules if rule.leads_away}
+    writer = Writer(steps, order, lanes, None if library is None else name, left_out, leading)
     ends = {FINISHED: {"final": True}}
     if len(lanes) == 1:
         states = {**writer.states(lanes[0]), **ends}
@@ -77,22 +80,20 @@ def plot_from_plan(
         {
             "plot": name,
             "about": f"made from a plan of {len(steps)} steps",
-            "variables": {"reason": {"type": "text", "initial": "unknown"}, **writer.variables},
-            "emits": {REPLAN: {"reason": "text"}, GAVE_UP: {"reason": "text"}},
+            "variables": {
+                "reason": {"type": "text", "initial": "unknown"}, **writer.variables,
+                **{passed(name): kind for handed_out in leading.values() for name, kind in handed_out.items()},
+            },
+            "emits": {REPLAN: {"reason": "text"}, GAVE_UP: {"reason": "text"}, **leading},
             "states": states,
-            "rules": [
-                rule for rule in rules
-                if rule.on is None or any(rule.on in step.outcomes | FAILURES for step in steps)
-            ],
+            "rules": rules,
             "generated": True,
         }
     )
 
 
 def _inherited(rule: Rule, plan: Plan) -> Rule | None:
-    """The rule as far as it is about steps of this plan; names of states are about the plot alone that has them."""
-    if rule.then not in RESPONSES[rule.place]:
-        return None
+    """The rule as far as it is about steps of this plan."""
     if not rule.steps:
         return rule
     done = {step.action for step in plan.steps}

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
 from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
+from dsc.errors import PlotError
 from knowledge_base import Delta, fact
 from planning import Executive, PlanningDomain
 
@@ -60,6 +63,7 @@ class Studio(Component):
         super().__init__()
         self.done = []
         self.blurred = list(blurred)
+        self.seconds = {}
 
     @skill(outcomes={"lit": {}}, types={"thing": "thing"})
     async def light(self, call: SkillCall, thing: str) -> Outcome:
@@ -78,7 +82,7 @@ class Studio(Component):
         return Outcome("wiped", observed=Delta(removed=(fact("dirty", thing),)))
 
     async def _do(self, call, what, thing, ends, *seen):
-        await call.clock.sleep(1.0)
+        await call.clock.sleep(self.seconds.get((what, thing), 1.0))
         self.done.append((what, thing))
         return Outcome(ends, observed=Delta(added=seen))
 
@@ -142,3 +146,91 @@ def test_a_handler_interrupts_a_plan_and_a_new_one_reaches_the_goal():
     assert end.emitted == ()
     assert done[0] == ("wipe", "cup")
     assert knowledge.ask("(and (noticed) (forall (?t - thing) (shown ?t)))")
+
+
+# -- rules that lead out of a plan to a state of the plot that holds its goal -----------------------------------
+
+ASIDE = "  aside: {use: wipe, with: {thing: pot}, on: {done: all}}\n"
+TOLD = "  told: {use: tell_it, on: {done: over}}\n"
+TELL_IT = "plot: tell_it\nparameters: {what: {type: symbol, default: nothing}}\nstates: {a: {entry: {set: studio.told, to: ?what}, on: {done: e}}, e: {final: true}}"
+
+
+def away(rules, *facts, beside="", parallel=True, holder=HOLDER, records=None, **more):
+    studio = Studio(**more)
+    plots = [parse_plot(text) for text in (holder + beside + rules, TELL_IT, *PLOTS)]
+    with Executive(DOMAIN, plots, [studio], parallel=parallel) as robot:
+        if records is not None:
+            robot.listen(records.append)
+        known = [fact("known", thing) for thing in ("cup", "pot")]
+        robot.knowledge.apply(Delta(nodes={"cup": "thing", "pot": "thing"}, added=(*known, *facts)), "test")
+        return robot.run("photograph"), studio, robot.knowledge
+
+
+@pytest.mark.parametrize("parallel", [True, False])
+@pytest.mark.parametrize("rule", ["{on: blurred, do: {then: over}}", "{on: blurred, of: show, do: {tell: (noticed), then: over}}"])
+def test_a_rule_leads_out_of_a_plan_to_a_state_beside_its_goal(rule, parallel):
+    end, studio, knowledge = away(f"rules: [{rule}]", blurred=["cup", "pot"], parallel=parallel)
+    assert (end.finished, end.emitted, end.problem) == (True, (), None)
+    assert sum(what == "show wide" for what, _ in studio.done) == 1  # nobody goes on with what was planned
+    assert knowledge.ask("(noticed)") is ("noticed" in rule)
+
+
+def test_a_step_that_would_begin_is_left_for_another_state():
+    end, studio, _ = away("rules: [{before: show, when: (dirty ?step.thing), do: {then: aside}}]", fact("dirty", "pot"), beside=ASIDE)
+    assert (end.finished, end.emitted) == (True, ())
+    assert [one for one in studio.done if one[1] == "pot"] == [("light", "pot"), ("wipe", "pot"), ("show wide", "pot")]
+
+
+def test_what_a_rule_passes_arrives_with_the_state_it_leads_to():
+    rules = "rules: [{on: blurred, do: {use: wipe, with: {thing: ?event.thing}, then: told, pass: {what: ?event.thing}}}]"
+    end, studio, _ = away(rules, blurred=["pot"], beside=TOLD)
+    assert end.finished
+    assert studio.parameters["told"] == "pot"
+    assert studio.done[-1] == ("wipe", "pot")
+
+
+def test_a_rule_that_leads_away_again_and_again_ends_with_giving_up():
+    """The step is left for a state that leads back at once: as many new plans as the budget has, then the reason."""
+    holder = HOLDER.replace("goal: (forall (?t - thing) (shown ?t))", "goal: (forall (?t - thing) (shown ?t))\n    budget: {replans: 3}")
+    records = []
+    rule, beside = "rules: [{before: light, do: {then: aside}}]", "  aside: {on: {done: all}}\n"
+    end, studio, _ = away(rule, holder=holder, beside=beside, records=records)
+    assert end.finished
+    (failed,) = end.emitted
+    assert failed.attributes["reason"] == "the budget of 3 new plans is used up: rules have led to 'aside' once more"
+    assert studio.done == []
+    assert sum(record.type == "rule" for record in records) == 5
+
+
+def test_leading_away_is_bounded_anew_when_the_goal_has_been_reached():
+    """A plot that goes on for ever may be led away each time once; only what never gets anywhere is given up."""
+    holder = HOLDER.replace("goal: (forall", "budget: {replans: 0}\n    goal: (forall").replace("done: over\n", "done: again\n", 1)
+    holder = holder.replace("  over:", "  again: {always: [{to: all, when: (noticed), tell: [(not (noticed)), (not (shown cup)), (dirty cup)]}, over]}\n  over:")
+    rule = "rules: [{before: show, when: (dirty ?step.thing), do: {then: aside}}]"
+    end, studio, _ = away(rule, fact("dirty", "cup"), fact("noticed"), holder=holder, beside=ASIDE.replace("pot", "cup"))
+    assert (end.finished, end.emitted) == (True, ())
+    assert [one for one in studio.done if one == ("wipe", "cup")] == [("wipe", "cup")] * 2
+
+
+def test_leaving_a_plan_takes_what_runs_in_it_and_its_watching_along():
+    """Exit actions of the step that goes on in another lane put its component at rest, and its skill is cancelled."""
+    slow = PLOTS[0].replace("a: {entry: {trigger: studio.light", "a: {exit: {switch: studio, to: dark}, entry: {trigger: studio.light")
+    studio, records = Studio(blurred=["cup"]), []
+    studio.concurrent = True
+    studio.seconds = {("light", "pot"): 50.0}
+    plots = [parse_plot(text) for text in (HOLDER + "rules: [{on: blurred, do: {then: over}}]", TELL_IT, slow, *PLOTS[1:])]
+    with Executive(DOMAIN, plots, [studio]) as robot:
+        robot.listen(records.append)
+        known = [fact("known", thing) for thing in ("cup", "pot")]
+        robot.knowledge.apply(Delta(nodes={"cup": "thing", "pot": "thing"}, added=tuple(known)), "test")
+        end = robot.run("photograph")
+    assert (end.finished, end.problem, studio.mode) == (True, None, "dark")
+    assert studio.done == [("light", "cup"), ("show wide", "cup")]
+    assert records[-1].t < 10
+
+
+def test_a_rule_whose_state_is_not_beside_the_goal_is_refused():
+    around = "  around: {states: {first: {on: {done: inside}}, inside: {on: {done: last}}, last: {final: true}}, on: {done: over}}\n"
+    holder = HOLDER.replace("gave_up: {to: over", "gave_up: {to: around")
+    with pytest.raises(PlotError, match="the rule's way from a plan at 'all' to 'inside' crosses a border"):
+        away("rules: [{on: blurred, do: {then: inside}}]", holder=holder, beside=around)
