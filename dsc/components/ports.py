@@ -71,17 +71,21 @@ async def _ask(_: Component, body: SkillBody, __: SkillCall, arguments: Mapping[
 
 
 async def _activate(component: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-    """Test each value until we are cancelled."""
+    """Test each value until we are cancelled, or the test fails."""
     held = False
+    forever: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
 
     def test(*values: Any) -> None:
         nonlocal held
-        found = body(*values, **arguments)
-        if found is not None and not held:
-            call.report(Outcome(body.__name__, found))
-        held = found is not None
+        try:
+            found = body(*values, **arguments)
+            if found is not None and not held:
+                call.report(Outcome(body.__name__, found))
+            held = found is not None
+        except Exception as error:  # noqa: BLE001  # our affair, and not that of who has the value
+            if not forever.done():
+                forever.set_exception(error)
 
-    forever: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
     with component.activations.tested(body.__name__, test):
         return await forever
 

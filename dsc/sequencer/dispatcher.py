@@ -29,6 +29,7 @@ from dsc.engine.steps import (
     StartTimer,
     SwitchMode,
 )
+from dsc.events import SKILL_ERROR
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.ends import broken, declared, encoded, late
 from dsc.sequencer.messages import SkillMessage, TimerMessage
@@ -239,7 +240,9 @@ class Dispatcher:
             if heard:
                 heard -= 1
             elif start.action_id in self._running:
-                self._post(SkillMessage(start, declared(component, start, outcome), final=False))
+                said = declared(component, start, outcome)
+                failed = said.event == SKILL_ERROR
+                self._post(SkillMessage(start, said, final=failed, goes_on=failed))
 
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
         call = SkillCall(self._id(start), clock, report, clock.now() + within, self._given_up.append)

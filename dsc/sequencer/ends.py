@@ -10,6 +10,8 @@ from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.engine.steps import Start
 from dsc.events import SKILL_ERROR, TIMED_OUT
+from knowledge_base.errors import InputError
+from knowledge_base.language.inputs import require_delta, shown
 
 
 def encoded(value: Any) -> Any:
@@ -20,12 +22,18 @@ def encoded(value: Any) -> Any:
 
 
 def declared(component: Component, start: Start, outcome: object) -> Outcome:
-    """The outcome, encoded; an error if the skill's signature does not declare it."""
+    """The outcome, encoded; an error if it is none, or the skill's signature does not declare it."""
     if not isinstance(outcome, Outcome):
         return broken(start, f"it ended with {outcome!r}, which is no outcome")
     outcomes: Mapping[str, Any] = component.skills()[start.skill].outcomes
     if outcome.event not in outcomes:
         return broken(start, f"it ended with '{outcome.event}', which it does not declare")
+    if not isinstance(outcome.attributes, Mapping):
+        return broken(start, f"the attributes of '{outcome.event}' are a mapping, not {shown(outcome.attributes)}")
+    try:
+        require_delta(outcome.observed)
+    except InputError as error:
+        return broken(start, f"what it observed with '{outcome.event}' is no change of knowledge: {error}")
     return Outcome(outcome.event, encoded(dict(outcome.attributes)), outcome.observed)
 
 

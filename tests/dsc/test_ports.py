@@ -97,6 +97,31 @@ def test_a_value_said_before_counts_for_who_comes_later():
     assert ran(text, battery).end.finished
 
 
+@pytest.mark.parametrize(("low", "why"), [("raise", "ZeroDivisionError"), ("text", "'low'"), ("number", "17")])
+def test_a_test_of_an_event_that_goes_wrong_fails_the_activation_and_not_who_has_the_value(low, why):
+    class Wrong(Battery):
+        @event({"level": "number"})
+        def low(self, level: float, below: float = 20.0):
+            return {"raise": lambda: 1 / 0, "text": lambda: "low", "number": lambda: 17}[low]()
+
+    done = ran("""
+        plot: p
+        variables: {why: text}
+        emits: {because: {why: text}}
+        states:
+          o:
+            regions:
+              r1: {states: {x: {entry: {trigger: battery.low}, on: {low: {}, skill_error: {to: y, assign: {why: ?event.reason}}}}, y: {final: true}}}
+              r2: {states: {z: {entry: {trigger: battery.run}, on: {ran: e}}, e: {final: true}}}
+            on: {done: {to: f, emit: because, with: {why: ?why}}}
+          f: {final: true}
+    """, Wrong())  # fmt: skip
+    (event_,) = done.end.emitted
+    assert event_.attributes["why"].startswith("battery.low: ")
+    assert why in event_.attributes["why"]
+    assert done.at == pytest.approx(5)
+
+
 def test_an_event_may_never_come_and_does_not_keep_the_run():
     text = "{plot: p, states: {a: {entry: {trigger: battery.low}, on: {low: e}}, e: {final: true}}}"
     end = ran(text).end

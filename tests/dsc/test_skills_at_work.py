@@ -168,6 +168,13 @@ def test_whatever_a_skill_does_wrong_is_a_skill_error(how, reason):
         Delta(added=(fact("p"), fact("nonsense", "x"))),
         Delta(added=(fact("p"), fact("seen", "nobody"))),
         Delta(added=(fact("p"), fact("q", "too", "many"))),
+        Delta(added=(fact("p"), "(seen cup1)")),
+        Delta(added=fact("p")),
+        Delta(nodes=("cup9",), added=(fact("p"),)),
+        [fact("p")],
+        fact("p"),
+        None,
+        "",
     ],
 )
 @pytest.mark.parametrize("skill_name", ["says", "reports"])
@@ -190,6 +197,22 @@ def test_a_skill_that_observes_what_cannot_be_has_failed_and_nothing_of_it_is_kn
     (event,) = ran.end.emitted
     assert event.attributes["why"].startswith(f"arm.{skill_name}: ")
     assert not ran.kb.ask("(p)")
+    assert ran.at == 0
+
+
+def test_a_skill_that_reports_what_is_no_outcome_of_its_own_is_stopped():
+    class Chatty(Component):
+        name = "arm"
+
+        @skill(outcomes={"ok": {}})
+        async def chats(self, call):
+            call.report(Outcome("hello"))
+            await call.clock.sleep(5)
+            return Outcome("ok")
+
+    ran = Ran(BREAKS.replace("arm.breaks, with: {how: HOW}", "arm.chats"), arm=Chatty())
+    (event,) = ran.end.emitted
+    assert event.attributes["why"] == "arm.chats: it ended with 'hello', which it does not declare"
     assert ran.at == 0
 
 
