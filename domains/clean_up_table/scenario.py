@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from domains.clean_up_table.items import (
     CAN,
@@ -39,6 +39,7 @@ from domains.clean_up_table.items import (
 )
 from domains.clean_up_table.places import OPERATOR, PLACES
 from domains.clean_up_table.world import World
+from dsc.model.reading import Form
 from dsc.text.files import read_file
 from dsc.text.form import read_model
 from dsc.text.yaml import load_document
@@ -56,7 +57,7 @@ PlaceOf = Callable[[tuple[str | int, ...]], Place | None]
 Count = Annotated[int, Field(strict=True, ge=0, le=MAX_ITEMS)]
 
 
-class _Form(BaseModel):
+class _Form(Form):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 

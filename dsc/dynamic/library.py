@@ -6,8 +6,6 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from pydantic import ValidationError
-
 from dsc.dynamic.expansion import expand
 from dsc.dynamic.substitution import stand_in
 from dsc.engine.compiler import compile_plot
@@ -111,5 +109,5 @@ class Library:
 def _read(form: Mapping[str, Any]) -> ActionPlot:
     try:
         return ActionPlot.model_validate(form)
-    except ValidationError as error:
+    except InputError as error:
         raise InputError(f"the value to be bound is no plot: {error}") from error

@@ -9,8 +9,9 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from dsc.model.language import LOCATED, TermField
-from dsc.model.transitions import FormPath, Source, Transition, Transitions, as_transition
+from dsc.model.language import TermField
+from dsc.model.reading import LOCATED, FormPath
+from dsc.model.transitions import Source, Transition, Transitions, as_transition
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import And, Comparison, Constant
 from knowledge_base.spelling import TRUTH_VALUES, is_number

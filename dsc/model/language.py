@@ -11,8 +11,9 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Discriminator, PlainSerializer, PlainValidator, WithJsonSchema
+from pydantic import ConfigDict, Discriminator, PlainSerializer, PlainValidator, WithJsonSchema
 
+from dsc.model.reading import UNKNOWN_FORM, Form
 from knowledge_base.errors import InputError
 from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import AllOf, Effect
@@ -26,18 +27,12 @@ _Parsed = TypeVar("_Parsed", Expression, Term, Effect)
 _SYMBOL = re.compile(r"[a-z0-9_][a-z0-9_\-#~.]*", re.IGNORECASE)
 
 
-class Frozen(BaseModel):
+class Frozen(Form):
     """Base of all model values: immutable, no unknown keys, both spellings of an aliased field."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, arbitrary_types_allowed=True, allow_inf_nan=False
     )
-
-
-UNKNOWN_FORM = "unknown_form"
-"""Type of the validation error for data with none of a union's telling keys."""
-LOCATED = "located"
-"""Type of the validation error whose context has the `path` of what is wrong inside the form."""
 
 
 def by_key(*keys: str) -> Discriminator:

@@ -11,7 +11,8 @@ from typing import Any, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-from dsc.model.language import LOCATED, ConditionField, Frozen, TermField
+from dsc.model.language import ConditionField, Frozen, TermField
+from dsc.model.reading import LOCATED
 from dsc.model.rules import Handler, Reaction, Rule
 from dsc.model.states import (
     AnyState,

@@ -10,10 +10,10 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from dsc.model.actions import Action, InternalAction
 from dsc.model.connectors import ChoiceState, SelectState
 from dsc.model.language import ConditionField, Frozen, TermField
+from dsc.model.reading import FormPath
 from dsc.model.transitions import (
     CyclicTransitions,
     Duration,
-    FormPath,
     Source,
     TimedTransitions,
     Transition,

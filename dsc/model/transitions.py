@@ -10,6 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 
 from dsc.model.actions import Assign, Emit, Internal, InternalAction, Tell, flat
 from dsc.model.language import ConditionField, EffectField, Frozen, TermField
+from dsc.model.reading import FormPath
 from knowledge_base.language.expression import Constant, Term
 
 
@@ -116,10 +117,6 @@ def _as_transitions(value: Any) -> Any:
 Transitions = Annotated[tuple[Transition, ...], BeforeValidator(_as_transitions)]
 TimedTransitions = Annotated[tuple[TimedTransition, ...], BeforeValidator(as_tuple)]
 CyclicTransitions = Annotated[tuple[CyclicTransition, ...], BeforeValidator(as_tuple)]
-
-FormPath = tuple[str | int, ...]
-"""Where a transition stands in the form of its source, e.g. `("on", "grasped", 0)`."""
-
 
 class Source(Frozen):
     """What transitions lead away from: a state or a connector."""

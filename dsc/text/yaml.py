@@ -32,15 +32,13 @@ from ruamel.yaml.reader import ReaderError
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 from ruamel.yaml.scanner import Scanner, ScannerError
 
+from dsc.model.reading import FormPath
 from dsc.text.files import check_size
 from knowledge_base.errors import ParseError, Place
 
 MAX_DEPTH = 128
 MAX_PARTS = 18_000
 """Keys, values and collections: a plot of 1,000 states has 16,000; reading and checking that many takes a second."""
-
-FormPath = tuple[str | int, ...]
-"""Names of keys and positions in lists."""
 
 _SPACES = "\0 \t\r\n\x85\u2028\u2029"
 

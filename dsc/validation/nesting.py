@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dsc.model.plot import ActionPlot, Path
+from dsc.model.reading import FormPath
 from dsc.model.states import AnyState, State
-from dsc.model.transitions import FormPath, Source, Transition
+from dsc.model.transitions import Source, Transition
 
 
 class Nesting:

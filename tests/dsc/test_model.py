@@ -25,6 +25,7 @@ from dsc.model.states import (
 )
 from dsc.model.transitions import Transition
 from dsc.text.plots import parse_plot, plot_to_yaml
+from knowledge_base.errors import InputError
 from knowledge_base.language.effect import Add, When
 from knowledge_base.language.expression import TRUE, And, Arithmetic, Atom, Comparison, Constant, Not, Variable
 
@@ -208,7 +209,7 @@ def test_values_are_frozen():
     ],
 )
 def test_unknown_keys_are_refused(form):
-    with pytest.raises(ValidationError):
+    with pytest.raises(InputError):
         ActionPlot.model_validate(form)
 
 
@@ -260,8 +261,35 @@ def test_unknown_keys_are_refused(form):
     ],
 )
 def test_what_is_no_plot_is_refused(form):
-    with pytest.raises(ValidationError):
+    with pytest.raises(InputError):
         ActionPlot.model_validate(form)
+
+
+@pytest.mark.parametrize(
+    ("form", "said"),
+    [
+        ({"plot": "p", "stats": {}, "states": {"s": {}}}, "stats: unknown key 'stats'; did you mean 'states'?"),
+        ({"plot": "p", "states": {"s": {"on": {"e": [{"too": "s"}]}}}}, "states.s.on.e.0.too: unknown key 'too'; did you mean 'to'?"),
+        ({"plot": "p", "states": {"s": {"entry": ({"trigger": "a.b", "wihtin": 3},)}}}, "states.s.entry.0.wihtin: unknown key 'wihtin'; did you mean 'within'?"),
+        ({"plot": "p", "states": {"s": {"entry": {"triger": "a.b"}}}}, "states.s.entry: one of the keys trigger, set, switch,"),
+        ({"plot": "p", "when": "(and (p", "states": {"s": {}}}, "when: "),
+        ({"plot": "p", "when": 5, "states": {"s": {}}}, "when: a condition was expected, as text such as (on ?o table); found 5"),
+        ({"plot": "p"}, "the key 'states' is missing"),
+        ({"plot": "p", "states": {"s": {"states": {"s": {}}}}}, "states.s.states.s: two states are named 's'; names are unique in a plot"),
+        ("plot: p", "a mapping was expected; found 'plot: p'"),
+        (None, "a mapping was expected; found nothing"),
+    ],
+)
+def test_what_is_wrong_is_said_in_our_words_with_its_path(form, said):
+    with pytest.raises(InputError) as error:
+        ActionPlot.model_validate(form)
+    assert said in str(error.value)
+    assert "pydantic" not in str(error.value)
+
+
+def test_parts_of_plots_say_what_is_wrong_as_well():
+    with pytest.raises(InputError, match="unknown key 'dynamik'; did you mean 'dynamic'"):
+        DynamicState.model_validate({"dynamik": ["a"]})
 
 
 def test_the_form_reads_back_as_the_same_plot():
