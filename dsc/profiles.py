@@ -6,11 +6,11 @@ from collections.abc import Iterable
 
 from dsc.components.component import Component
 from dsc.components.parameters import check_relations, known
-from dsc.model.plot import ActionPlot, Parameter
+from dsc.model.plot import ActionPlot
 from dsc.model.profile import Profile
+from dsc.model.ranges import refuse_change
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import Constant
 
 
 def configure(components: Iterable[Component], profile: Profile | None = None) -> None:
@@ -40,7 +40,7 @@ def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tupl
 
     Raises:
         UnknownNameError: there is no such plot or parameter.
-        SchemaError: a value is of another type than the parameter.
+        InputError: a value is of another type than the parameter or out of its range, or not for profiles to say.
     """
     plots = tuple(plots)
     if profile is None or not profile.plots:
@@ -58,8 +58,7 @@ def _configured(component: Component, profile: Profile | None) -> dict[str, Valu
         try:
             declared = known(component.name, parameter, component.declares)
             declared.check(f"{component.name}.{parameter}", value)
-            if not declared.may_be_changed_by("profile"):
-                raise SchemaError(f"'{component.name}.{parameter}' is fixed by its builder", found=parameter)
+            refuse_change(f"{component.name}.{parameter}", "profile", declared.changed_by)
         except InputError as error:
             error.place = None if profile is None else profile.place("components", component.name, parameter)
             raise
@@ -79,29 +78,13 @@ def _configured(component: Component, profile: Profile | None) -> dict[str, Valu
 
 
 def _adapted(plot: ActionPlot, profile: Profile) -> ActionPlot:
-    settings = profile.plots.get(plot.name, {})
-    if not settings:
-        return plot
-    changed = dict(plot.parameters)
-    for name, value in settings.items():
-        if name not in plot.parameters:
-            error = UnknownNameError(f"plot '{plot.name}' has no parameter '{name}'", found=name, valid=plot.parameters)
+    for name, value in profile.plots.get(plot.name, {}).items():
+        try:
+            plot = plot.with_default(name, value, "profile")
+        except InputError as error:
             error.place = profile.place("plots", plot.name, name)
-            raise error
-        changed[name] = _with_default(plot, name, value, profile)
-    return plot.model_copy(update={"parameters": changed})
-
-
-def _with_default(plot: ActionPlot, name: str, value: Value, profile: Profile) -> Parameter:
-    parameter = plot.parameters[name]
-    kind = "boolean" if isinstance(value, bool) else "word" if isinstance(value, str) else "number"
-    wanted = parameter.type if parameter.type in {"number", "boolean"} else "word"
-    if kind != wanted:
-        raise SchemaError(
-            f"'{name}' of plot '{plot.name}' is a {parameter.type}; found {value}",
-            place=profile.place("plots", plot.name, name), found=str(value),
-        )  # fmt: skip
-    return parameter.model_copy(update={"default": Constant(value)})
+            raise
+    return plot
 
 
 def _unknown(profile: Profile | None, group: str, kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:

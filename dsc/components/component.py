@@ -11,6 +11,7 @@ from dsc.calls import Ended, Outcome, SkillCall, Status
 from dsc.components.activations import Activations
 from dsc.components.life import Life, LifeCycle
 from dsc.components.parameters import Parameter, check_relations, known
+from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import UnknownNameError
 
@@ -89,11 +90,27 @@ class Component:
             UnknownNameError: the component declares its parameters, and this is none.
             InputError: the value does not fit what is declared, or a relation.
         """
-        if self.declares:
-            declared = known(self.name, parameter, self.declares)
-            value = declared.check(f"{self.name}.{parameter}", value)
-            check_relations(self.name, self.relations, {**self.parameters, parameter: value})
+        self.check_parameter(parameter, value)
         self.parameters[parameter] = value
+
+    def check_parameter(self, parameter: str, value: object, who: Who | None = None) -> None:
+        """Whether a parameter may have that value now; nothing is changed.
+
+        Args:
+            parameter: its name.
+            value: what it shall be.
+            who: somebody who wants to change it; nobody in particular if left out.
+
+        Raises:
+            UnknownNameError: the component declares its parameters, and this is none.
+            InputError: the value does not fit what is declared, or a relation, or it is not for `who` to say.
+        """
+        if not self.declares and who is None:  # it takes anything from plots, and nothing from others
+            return
+        declared, name = known(self.name, parameter, self.declares), f"{self.name}.{parameter}"
+        if who is not None:
+            refuse_change(name, who, declared.changed_by)
+        check_relations(self.name, self.relations, {**self.parameters, parameter: declared.check(name, value)})
 
     async def switch(self, mode: str) -> None:
         """The *state* port: enter a mode (`neutral` is at rest); override to react."""

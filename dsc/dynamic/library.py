@@ -11,6 +11,7 @@ from dsc.dynamic.substitution import stand_in
 from dsc.engine.compiler import compile_plot
 from dsc.engine.tables import CompiledPlot
 from dsc.model.plot import ActionPlot
+from dsc.model.ranges import Who
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
 MOST_BOUND = 64
@@ -69,6 +70,19 @@ class Library:
         """
         other = stand_in(self.plot(name), plot)
         return Library(other if own.name == name else own for own in self)
+
+    def with_default(self, plot: str, name: str, value: object, who: Who) -> Library:
+        """A new library in which a plot's parameter has another default; tables that are made stay.
+
+        Raises:
+            UnknownNameError: there is no such plot or parameter.
+            InputError: the value does not fit the parameter, or it is not for `who` to say.
+        """
+        changed = self.plot(plot).with_default(name, value, who)
+        other = Library(changed if own.name == plot else own for own in self)
+        other._compiled = {known: tables for known, tables in self._compiled.items() if known != plot}
+        other._bound, other._made = self._bound, self._made
+        return other
 
     def expanded(self, plot: ActionPlot) -> ActionPlot:
         """The plot with its rules and handlers as states and transitions; see `expand`."""

@@ -44,7 +44,7 @@ def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: S
     """The variables of a new instance: arguments, defaults, and initial values.
 
     Raises:
-        InputError: a parameter is missing, or an argument is not a parameter.
+        InputError: a parameter is missing or out of its range, or an argument is not a parameter.
     """
     if not (arguments or plot.parameters or plot.variables or plot.outputs):
         return NOTHING
@@ -56,11 +56,12 @@ def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: S
     variables: dict[str, Any] = {}
     for name, parameter in plot.parameters.items():
         if name in arguments:
-            variables[name] = arguments[name]
+            value = arguments[name]
         elif parameter.default is not None:
-            variables[name] = evaluate(parameter.default, variables, situation)
+            value = evaluate(parameter.default, variables, situation)
         else:
             raise InputError(f"plot '{plot.name}' needs its parameter '{name}'")
+        variables[name] = parameter.range.check(f"{plot.name}.{name}", value) if parameter.bounded else value
     for name, variable in (*plot.variables.items(), *plot.outputs.items()):
         variables[name] = None if variable.initial is None else evaluate(variable.initial, variables, situation)
     return variables

@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Discriminator, PlainSerializer, PlainValidator,
 
 from dsc.model.reading import UNKNOWN_FORM, Form
 from knowledge_base.errors import InputError
+from knowledge_base.facts import Value
 from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import AllOf, Effect
 from knowledge_base.language.expression import Constant, Expression, Term
@@ -120,6 +121,22 @@ def _text_out(part: Expression | Effect) -> str:
 def _term_out(term: Term) -> Any:
     return term.value if isinstance(term, Constant) else to_text(term)
 
+
+def constant(value: Value) -> Constant:
+    """A value as a term; a text that is no name is quoted."""
+    return Constant(value, quoted=isinstance(value, str) and not _SYMBOL.fullmatch(value))
+
+
+def _setting(value: object) -> Value:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"a finite number was expected; found {value!r}")
+    if isinstance(value, str | int | float | bool):
+        return value
+    raise ValueError(f"a number, a text or a truth value was expected; found {value!r}")
+
+
+Setting = Annotated[Value, PlainValidator(_setting), WithJsonSchema({"type": ["string", "number", "boolean"]})]
+"""A constant value."""
 
 ConditionField = Annotated[
     Expression,

@@ -11,7 +11,8 @@ from typing import Any, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-from dsc.model.language import ConditionField, Frozen, TermField
+from dsc.model.language import ConditionField, Frozen, Setting, TermField, constant
+from dsc.model.ranges import Range, Who, refuse_change
 from dsc.model.reading import LOCATED
 from dsc.model.rules import Handler, Reaction, Rule
 from dsc.model.states import (
@@ -23,7 +24,7 @@ from dsc.model.states import (
     Region,
     SubmachineState,
 )
-from knowledge_base.errors import Place
+from knowledge_base.errors import Place, UnknownNameError
 from knowledge_base.spelling import is_plain_name
 
 Path = tuple[str | int, ...]
@@ -35,10 +36,33 @@ _STATE_NAME = re.compile(r"[^/#][^/]*")
 
 
 class Parameter(Frozen):
-    """A one-way parameter: a type of the knowledge base's schema or `number`, `text`, `symbol`, and a default."""
+    """A one-way parameter with its role (S1.11).
+
+    Attributes:
+        type: a type of the knowledge base's schema, or `number`, `boolean`, `text`, `symbol`.
+        default: its value if nobody says another.
+        least, most: the range of a number.
+        among: the values of which it is one; empty means any.
+        changed_by: who may say another value, each one also what those after it may: `nobody`; a `profile`, before a
+            run; an `operator`, while it goes on; `rules` and handlers that use the plot; all `plots` that do.
+    """
 
     type: str
     default: TermField | None = None
+    least: float | None = Field(default=None, strict=True)
+    most: float | None = Field(default=None, strict=True)
+    among: tuple[Setting, ...] = ()
+    changed_by: Who = "plots"
+
+    @property
+    def range(self) -> Range:
+        """The values that it may have."""
+        return Range(self.type, self.least, self.most, self.among)
+
+    @property
+    def bounded(self) -> bool:
+        """Whether it may have fewer values than its type has."""
+        return self.least is not None or self.most is not None or bool(self.among)
 
     @model_validator(mode="before")
     @classmethod
@@ -101,6 +125,20 @@ class ActionPlot(Frozen):
     profile: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
     _text: str | None = PrivateAttr(default=None)
+
+    def with_default(self, name: str, value: object, who: Who) -> ActionPlot:
+        """The same plot with another default of a parameter.
+
+        Raises:
+            UnknownNameError: it has no such parameter.
+            InputError: the value is of another type or out of range, or it is not for `who` to say.
+        """
+        if name not in self.parameters:
+            raise UnknownNameError(f"plot '{self.name}' has no parameter '{name}'", found=name, valid=self.parameters)
+        parameter, full = self.parameters[name], f"{self.name}.{name}"
+        refuse_change(full, who, parameter.changed_by)
+        changed = parameter.model_copy(update={"default": constant(parameter.range.check(full, value))})
+        return self.model_copy(update={"parameters": {**self.parameters, name: changed}})
 
     def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
         """The same plot that remembers where its parts stand in the text it was read from."""

@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Mapping
-from typing import Annotated
 
-from pydantic import Field, PlainValidator, PrivateAttr, WithJsonSchema
+from pydantic import Field, PrivateAttr
 
-from dsc.model.language import Frozen
+from dsc.model.language import Frozen, Setting
 from knowledge_base.errors import Place
-from knowledge_base.facts import Value
 
 Path = tuple[str | int, ...]
 
 
-def _value(value: object) -> Value:
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"a finite number was expected; found {value!r}")
-    if isinstance(value, str | int | float | bool):
-        return value
-    raise ValueError(f"a number, a text or a truth value was expected; found {value!r}")
-
-
-Setting = Annotated[Value, PlainValidator(_value), WithJsonSchema({"type": ["string", "number", "boolean"]})]
 Settings = dict[str, dict[str, Setting]]
 
 

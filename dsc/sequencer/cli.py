@@ -99,7 +99,8 @@ def _taken(step: StepRow) -> str:
     if events:
         return f"{events[-1]['name']} ({events[-1]['source']})"
     if step.message:
-        return "a period" if "timer" in step.message else "a change of knowledge"
+        said = {"timer": "a period", "set": "a parameter"}
+        return next((words for key, words in said.items() if key in step.message), "a change of knowledge")
     return "start" if step.number == 1 else "everything is left"
 
 

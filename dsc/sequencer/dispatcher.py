@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple
@@ -127,6 +127,11 @@ class Dispatcher:
         elif isinstance(output, SetParameter | SwitchMode | SendMessage):
             self.telling.tell(self.component(output.component), output)
         # What is left is a note, which the trace has.
+
+    @property
+    def components(self) -> Mapping[str, Component]:
+        """Those that are deployed, by name."""
+        return self._components
 
     def component(self, name: str) -> Component:
         """The component of that name; raises `UnknownNameError`."""

@@ -9,7 +9,7 @@ from dsc.calls import Outcome
 from dsc.engine.steps import SendLater, Start, StartTimer
 from dsc.events import NO_ATTRIBUTES, Event
 from knowledge_base.errors import InputError
-from knowledge_base.facts import Delta
+from knowledge_base.facts import Delta, Value
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +45,32 @@ class KnowledgeMessage:
 
 
 @dataclass(frozen=True, slots=True)
+class ParameterMessage:
+    """An operator says what a parameter is worth from now on.
+
+    Attributes:
+        owner: the component, or the plot, that has it.
+        name, value: of the parameter.
+        of_plot: whether it is a plot's.
+    """
+
+    owner: str
+    name: str
+    value: Value
+    of_plot: bool
+
+
+@dataclass(frozen=True, slots=True)
 class LateMessage:
     """Something that was handed in from outside to come later, and now is there; `number` tells it from others."""
 
-    message: Event | KnowledgeMessage
+    message: FromOutside
     number: int
 
 
-Message = SkillMessage | TimerMessage | KnowledgeMessage | LateMessage | SendLater | Event
+FromOutside = Event | KnowledgeMessage | ParameterMessage
+"""What somebody hands in who is no part of the run."""
+Message = SkillMessage | TimerMessage | KnowledgeMessage | ParameterMessage | LateMessage | SendLater | Event
 """A `SendLater` is the chart's own event whose time has come."""
 
 

@@ -9,11 +9,11 @@ from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.state import MachineState
-from dsc.engine.steps import Output, SendLater, Start, StartTimer, Step
+from dsc.engine.steps import Output, SendLater, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
 from dsc.sequencer.ends import broken
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
+from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.tracing import StepTracer
 from dsc.trace import Trace
@@ -35,6 +35,7 @@ class Reactor:
         emitted: outcome events of the plot so far.
         problem: why the run cannot go on, or what went wrong in its last step.
         in_vain: periods that passed without any effect since anything else happened.
+        settings: what an operator has said about plots, by plot and parameter.
         caused_by: the records of the skills that were started, by action id.
         listeners: are told every macrostep, before its actions leave.
     """
@@ -49,6 +50,7 @@ class Reactor:
         self.emitted: list[Event] = []
         self.problem: str | None = None
         self.in_vain: set[tuple[int, int]] = set()
+        self.settings: dict[tuple[str, str], ParameterMessage] = {}
         self.caused_by: dict[str, int] = {}
 
     def restore(self, kept: Kept) -> None:
@@ -57,6 +59,8 @@ class Reactor:
         self.emitted = list(kept.emitted)
         self.in_vain = set(kept.in_vain)
         self.problem = kept.problem
+        for setting in kept.settings:
+            self._set_default(setting)
         self.caused_by = {one.what.action_id: one.cause for one in kept.pending if isinstance(one.what, Start)}
         for one in kept.pending:
             if isinstance(one.what, Start) and not one.cancelled:
@@ -87,6 +91,9 @@ class Reactor:
             event = self._received(message)
             before = self.machine.state
             step = self.machine.send(event, self._situation())
+            said = message.message if isinstance(message, LateMessage) else message
+            if isinstance(said, ParameterMessage) and not said.of_plot:
+                step = step._replace(output=(SetParameter(said.owner, said.name, said.value), *step.output))
             in_vain = isinstance(message, TimerMessage) and step.state == before and _is_vain(step)
             self._note_periods(message, in_vain=in_vain)
             output = self._commit(step)
@@ -129,6 +136,12 @@ class Reactor:
             self.trace.cause = None
             self._apply(message.delta, message.author)
             return None
+        if isinstance(message, ParameterMessage):
+            self.trace.cause = None
+            if message.of_plot:
+                self._set_default(message)
+                self.trace.cause = self.tracer.set_default(message)
+            return None
         if isinstance(message, TimerMessage):
             return self._due(message)
         if isinstance(message, SkillMessage):
@@ -137,6 +150,12 @@ class Reactor:
         self.trace.cause = None
         self.trace.cause = self.tracer.event(event, "outside")
         return event
+
+    def _set_default(self, setting: ParameterMessage) -> None:
+        """The plot has another default from now on, wherever it is entered anew."""
+        self.settings[setting.owner, setting.name] = setting
+        self.library = self.library.with_default(setting.owner, setting.name, setting.value, "operator")
+        self.machine.chart = self.library
 
     def _due(self, message: TimerMessage) -> Event:
         self.trace.cause = None

@@ -17,7 +17,15 @@ from dsc.engine.state import NOTHING, FrameState, MachineState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import NO_ATTRIBUTES, Event
 from dsc.json_text import text_by
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
+from dsc.sequencer.messages import (
+    FromOutside,
+    KnowledgeMessage,
+    LateMessage,
+    Message,
+    ParameterMessage,
+    SkillMessage,
+    TimerMessage,
+)
 from dsc.sequencer.run_tables import RunRow
 from dsc.trace import Record
 from knowledge_base.exchange.forms import delta_form, delta_of
@@ -65,7 +73,7 @@ class Kept:
         number: that of the macrostep.
         time: its second of run time.
         state: of the machine.
-        emitted, in_vain, problem: as of `Reactor`.
+        emitted, in_vain, problem, settings: as of `Reactor`.
         pending: in the order in which it was asked for.
         memory: what components have to remember, by name.
         records: of the trace, so far.
@@ -78,6 +86,7 @@ class Kept:
     emitted: tuple[Event, ...]
     in_vain: frozenset[tuple[int, int]]
     problem: str | None
+    settings: tuple[ParameterMessage, ...]
     pending: tuple[Pending, ...]
     memory: Mapping[str, Any]
     records: tuple[Record, ...]
@@ -144,13 +153,11 @@ def message_form(message: Message, short: Shortener) -> Form:
             return form | {"attributes": short(outcome.attributes), "observed": delta_form(outcome.observed)}
         case TimerMessage():
             return {"timer": _plain(message.timer)}
-        case KnowledgeMessage():
-            return {"change": delta_form(message.delta), "author": message.author}
         case LateMessage():
-            return {"late": message.number, "message": message_form(message.message, short)}
+            return {"late": message.number, "message": _outside_form(message.message, short)}
         case SendLater():
             return {"sent": _later_form(message, short)}
-    return {"event": _event_form(message, short)}
+    return _outside_form(message, short)
 
 
 def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Callable[[str], Any]) -> Message:
@@ -161,14 +168,28 @@ def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Ca
             return SkillMessage(action(action_id), outcome, form["final"])
         case {"timer": timer}:
             return TimerMessage(StartTimer(**timer))
-        case {"change": delta}:
-            return KnowledgeMessage(delta_of(delta), form["author"])
         case {"late": number}:
-            inner = message_of(form["message"], action, find)
-            assert isinstance(inner, Event | KnowledgeMessage)  # noqa: S101  nothing else is handed in
-            return LateMessage(inner, number)
+            return LateMessage(_outside_of(form["message"], find), number)
         case {"sent": later}:
             return _later_of(later, find)
+    return _outside_of(form, find)
+
+
+def _outside_form(message: FromOutside, short: Shortener) -> Form:
+    match message:
+        case KnowledgeMessage():
+            return {"change": delta_form(message.delta), "author": message.author}
+        case ParameterMessage():
+            return {"set": _plain(message)}
+    return {"event": _event_form(message, short)}
+
+
+def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOutside:
+    match form:
+        case {"change": delta, "author": author}:
+            return KnowledgeMessage(delta_of(delta), author)
+        case {"set": setting}:
+            return ParameterMessage(**setting)
     return _event_of(form["event"], find)
 
 
@@ -204,13 +225,7 @@ def awaited_of(kind: str, form: Mapping[str, Any], find: Callable[[str], Any]) -
             return StartTimer(**form) if kind == "StartTimer" else SwitchMode(**form)
         case "SendMessage":
             return SendMessage(**{**form, "arguments": full(form["arguments"], find)})
-    late = message_of(form, _no_action, find)
-    assert isinstance(late, LateMessage)  # noqa: S101  the only one left
-    return late
-
-
-def _no_action(action_id: str) -> Start:
-    raise KeyError(action_id)  # what is handed in answers to none
+    return LateMessage(_outside_of(form["message"], find), form["late"])
 
 
 def _later_form(later: SendLater, short: Shortener) -> Form:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterable
+from dataclasses import asdict
 from typing import Any
 
 from dsc.components.life import Life
@@ -20,7 +21,7 @@ from dsc.engine.steps import (
     StartTimer,
     SwitchMode,
 )
-from dsc.sequencer.messages import LateMessage, Message, SkillMessage, TimerMessage
+from dsc.sequencer.messages import LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import (
     Awaited,
@@ -81,7 +82,10 @@ class Present:
             self._reached(state.root)
         serial = None if state.root is None else state.root.serial
         # Most events change none of this; of outcome events there are only ever more.
-        remembered = serial, state.finished, len(reactor.emitted), frozenset(reactor.in_vain), reactor.problem
+        settings = tuple(reactor.settings.values())
+        remembered = (
+            serial, state.finished, len(reactor.emitted), frozenset(reactor.in_vain), reactor.problem, settings,
+        )  # fmt: skip
         if remembered != self._remembered:
             self._remembered = remembered
             self._reactor = self._news["reactor"] = _reactor_form(reactor, self._short)
@@ -219,6 +223,7 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         emitted=events_of(reactor["emitted"], find),
         in_vain=frozenset((activation, index) for activation, index in reactor["in_vain"]),
         problem=reactor["problem"],
+        settings=tuple([ParameterMessage(**setting) for setting in reactor["settings"]]),
         pending=tuple([_pending(place, Row(*row), find) for place, row in sorted(now.pending.items())]),
         memory={name: json.loads(memory) for name, memory in connection.execute("SELECT * FROM memory")},
         records=tuple(record for step in steps for record in step.records),
@@ -244,6 +249,7 @@ def _reactor_form(reactor: Reactor, short: Shortener) -> Form:
         "emitted": events_form(reactor.emitted, short),
         "in_vain": sorted(reactor.in_vain),
         "problem": reactor.problem,
+        "settings": [asdict(one) for one in reactor.settings.values()],
     }
 
 

@@ -17,13 +17,21 @@ from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import Inbox
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, plain
+from dsc.sequencer.messages import (
+    FromOutside,
+    KnowledgeMessage,
+    LateMessage,
+    Message,
+    ParameterMessage,
+    SkillMessage,
+    plain,
+)
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.resuming import require_components, take_up
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
 from dsc.trace import Trace
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
@@ -163,6 +171,34 @@ class Sequencer:
         self.knowledge.overlay().apply(delta)
         self._hand_in(KnowledgeMessage(delta, author), after)
 
+    def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
+        """Hand in what an operator says a parameter is worth from now on; from the loop's own thread.
+
+        A component is told before its next skill begins. A plot has it wherever it is entered from then on and nobody
+        hands it another value. Both are kept with the run.
+
+        Args:
+            owner: the component, or the plot, that has the parameter.
+            name: of the parameter.
+            value: within its range.
+            after: as for `post`.
+
+        Raises:
+            UnknownNameError: there is no such component or plot, or it declares no such parameter.
+            InputError: the value is out of range, breaks a relation, or is not for operators to say.
+            StoreError: it could not be kept.
+        """
+        component = self.dispatcher.components.get(owner)
+        if component is not None:
+            component.check_parameter(name, value, "operator")
+        elif owner in self.library:
+            self.library.plot(owner).with_default(name, value, "operator")
+        else:
+            valid = [*self.dispatcher.components, *(plot.name for plot in self.library)]
+            raise UnknownNameError(f"there is no component or plot '{owner}'", found=owner, valid=valid)
+        assert isinstance(value, str | int | float | bool)  # noqa: S101  as everything that fits a range
+        self._hand_in(ParameterMessage(owner, name, value, of_plot=component is None), after)
+
     async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
         """Run the plot until it ends, or until nothing can happen any more.
 
@@ -301,7 +337,7 @@ class Sequencer:
 
     # -- from outside ------------------------------------------------------------------------------------
 
-    def _hand_in(self, message: Event | KnowledgeMessage, after: float) -> None:
+    def _hand_in(self, message: FromOutside, after: float) -> None:
         if after <= 0:
             self._inbox.put(message)
             return

@@ -21,6 +21,7 @@ from dsc.engine.steps import (
     SwitchMode,
 )
 from dsc.events import Event
+from dsc.sequencer.messages import ParameterMessage
 from dsc.trace import Trace
 from knowledge_base.exchange.forms import delta_form, schema_form, world_form
 from knowledge_base.facts import Change
@@ -107,6 +108,10 @@ class StepTracer:
         said = delta_form(change.delta)
         seq = self._trace.record("knowledge", version=change.version, author=change.author, **said)
         self._trace.cause = self._trace.cause or seq
+
+    def set_default(self, setting: ParameterMessage) -> int:
+        """An operator has said what a plot's parameter is worth."""
+        return self._trace.record("action", action="set", port=f"{setting.owner}.{setting.name}", value=setting.value)
 
     def output(self, output: Output) -> int | None:
         """An action that leaves; timers do not."""

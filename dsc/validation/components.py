@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 
-from dsc.components.parameters import Parameter, Who, known
+from dsc.components.parameters import Parameter, known
 from dsc.errors import Finding
 from dsc.model.actions import Configure, ExternalAction, Internal, Send, Switch
 from dsc.model.plot import ActionPlot, Path
+from dsc.model.ranges import Who, refuse_change
 from dsc.model.states import State
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.expression import Constant
@@ -42,9 +43,10 @@ def _setting(
         error.place = plot.place((*path, "to" if not isinstance(error, UnknownNameError) else "set"))
         yield Finding(error, "component parameter")
         return
-    if not declared.may_be_changed_by(who):
-        message = f"'{action.set}' is not changed by {who}, but by {declared.changed_by}"
-        refused = SchemaError(message, place=plot.place((*path, "set")), found=action.set)
+    try:
+        refuse_change(action.set, who, declared.changed_by)
+    except SchemaError as refused:
+        refused.place = plot.place((*path, "set"))
         yield Finding(refused, "component parameter", "say it in a profile, or let `changed_by` allow it")
 
 

@@ -15,6 +15,7 @@ from dsc.validation.data import check_data
 from dsc.validation.kinds import check_kinds
 from dsc.validation.nesting import Nesting
 from dsc.validation.outputs import check_outputs
+from dsc.validation.parameters import check_parameters
 from dsc.validation.reach import check_reach
 from dsc.validation.size import check_size
 from dsc.validation.structure import check_structure
@@ -63,6 +64,7 @@ def validate_plot(
         check_reach(plot, library, nesting),
         check_wiring(plot, library, signatures, nesting),
         check_arguments(plot, library, nesting),
+        check_parameters(plot, library, nesting),
         check_outputs(plot),
         check_data(plot, library, schema, signatures, nesting),
         check_kinds(plot, library, schema, signatures, nesting),

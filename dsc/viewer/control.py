@@ -69,7 +69,7 @@ class Control:
             InputError: it asks for something that is not known, or the run is over.
         """
         verbs: dict[str, Callable[[Mapping[str, Any]], object]] = {
-            "event": self._event, "tell": self._tell, "retract": self._tell, "pause": self._pause,
+            "event": self._event, "tell": self._tell, "retract": self._tell, "set": self._set, "pause": self._pause,
             "resume": self._resume, "step": self._step, "break": self._break, "unbreak": self._unbreak,
             "breaks": lambda _: None,
         }  # fmt: skip
@@ -96,6 +96,11 @@ class Control:
         run = self._run()
         delta = meaning(said, run.knowledge, "FACT")
         self._in_run(lambda run: run.change(delta, AUTHOR))
+
+    def _set(self, command: Mapping[str, Any]) -> None:
+        """A parameter of a component or plot, within what it leaves to operators."""
+        owner, name = str(command.get("owner")), str(command.get("name"))
+        self._in_run(lambda run: run.set_parameter(owner, name, command.get("value")))
 
     def _pause(self, _: Mapping[str, Any]) -> None:
         self._steps = 0

@@ -17,7 +17,14 @@ from dsc.text.profiles import find_profile, parse_profile, profile_schema
 from dsc.text.yaml import load_document
 from knowledge_base import InputError
 
-WAIT = parse_plot("plot: wait\nparameters: {seconds: {type: number, default: 10}, why: text}\nstates: {e: {final: true}}")
+WAIT = parse_plot("""
+plot: wait
+parameters:
+  seconds: {type: number, default: 10, least: 1, most: 60, changed_by: operator}
+  times: {type: number, default: 1, changed_by: nobody}
+  why: text
+states: {e: {final: true}}
+""")
 GOOD = """profile: simulation
 about: Everything is fast.
 components:
@@ -54,7 +61,7 @@ def test_without_a_profile_everything_is_as_it_was_built():
         ("base: {port: a, sped: 1}", 3, "has no parameter 'sped'; did you mean 'speed'?"),
         ("base: {port: a, speed: 9}", 3, "'base.speed' is from 0.1 to 1.5; found 9"),
         ("base: {port: a, mode: brisc}", 3, "one of calm, brisk; found brisc; did you mean 'brisk'?"),
-        ("base: {port: a, wheels: 6}", 3, "'base.wheels' is fixed by its builder"),
+        ("base: {port: a, wheels: 6}", 3, "'base.wheels' is not changed by profile, but by nobody"),
         ("base: {speed: 0.2}", 3, "'base.port' has no value: its builder leaves it to a profile"),
         ("base: {port: a, cycle: 0.1}", 3, "needs (<= ?speed (* 0.5 ?cycle)), but cycle is 0.1, speed is 0.5"),
     ],
@@ -78,8 +85,10 @@ def test_what_has_to_be_bound_is_missed_without_a_profile_too():
     [
         ("wiat: {seconds: 1}", "there is no plot 'wiat'; did you mean 'wait'?"),
         ("wait: {second: 1}", "plot 'wait' has no parameter 'second'; did you mean 'seconds'?"),
-        ("wait: {seconds: long}", "'seconds' of plot 'wait' is a number; found long"),
-        ("wait: {why: 3}", "'why' of plot 'wait' is a text; found 3"),
+        ("wait: {seconds: long}", "'wait.seconds' is from 1 to 60; found long"),
+        ("wait: {seconds: 0.5}", "'wait.seconds' is from 1 to 60; found 0.5"),
+        ("wait: {times: 3}", "'wait.times' is not changed by profile, but by nobody"),
+        ("wait: {why: 3}", "'wait.why' is a text; found 3"),
     ],
 )
 def test_values_for_plots_fit_too(plots, said):

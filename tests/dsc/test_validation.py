@@ -473,6 +473,8 @@ WRONG = [
     ("connectors lead on", S + "  a: {use: wait, on: {done: b}, after: {seconds: 9, to: e}}\n  b: {use: wait, on: {done: a}}\n" + E
      + "rules:\n  - {before: [a, b], when: (free), do: {then: continue}}\n", 6, "all steps of a circle", "`then`"),
     # -- parameters of components
+    ("parameter roles", "parameters:\n  n: {type: number, default: 5, most: 3}\n" + S + E, 2, "'p.n' is 3 or less; found 5", ""),
+    ("parameter roles", "parameters:\n  n: {type: number, changed_by: profile}\n" + S + E, 2, "'n' needs a default", "a profile may say another one"),
     ("component parameter", S + "  a:\n    entry:\n      set: lift.pace\n      to: 3\n    on: {done: e}\n" + E, 6, "from 0 to 2; found 3", ""),
     ("component parameter", S + "  a:\n    entry:\n      set: lift.port\n      to: x\n    on: {done: e}\n" + E, 5, "not changed by plots", "changed_by"),
     # -- rules are transitions too

@@ -101,9 +101,19 @@ def test_events_and_facts_are_handed_in() -> None:
     assert [e["nodes"] for e in events if e.get("author") == "viewer"] == [{"spare": "cup"}]
 
 
+def test_a_parameter_is_set_within_what_is_left_to_operators() -> None:
+    watched = Watched()
+    watched.control.obey({"do": "set", "owner": "wait", "name": "seconds", "value": 5})
+    watched.to_the_end()
+    records = [watched.log.record(n) for n in range(1, len(watched.log) + 1)]
+    assert [r["value"] for r in records if r.get("port") == "wait.seconds"] == [5]
+
+
 @pytest.mark.parametrize(
     ("command", "message"),
     [
+        ({"do": "set", "owner": "base", "name": "sped", "value": 1}, "component 'base' has no parameter 'sped'; did you mean 'speed'"),
+        ({"do": "set", "owner": "wait", "name": "seconds", "value": "long"}, "'wait.seconds' is a number; found long"),
         ({"do": "stepp"}, "there is nothing to do called 'stepp'; did you mean 'step'"),
         ({"do": "break", "on": {"stat": "clear"}}, "a breakpoint is on one of"),
         ({"do": "break", "on": {"condition": "(holdin cup1)"}}, "did you mean 'holding'"),

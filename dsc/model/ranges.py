@@ -1,0 +1,101 @@
+"""Roles of parameters: a builder's range, an integrator's default, and who may say another value (S1.11)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from knowledge_base.errors import InputError, SchemaError
+from knowledge_base.facts import Value
+
+Who = Literal["nobody", "profile", "operator", "rules", "plots"]
+_RANKS: tuple[Who, ...] = ("nobody", "profile", "operator", "rules", "plots")
+
+
+def may_change(who: Who, changed_by: Who) -> bool:
+    """Whether `who` may give another value to what is `changed_by` somebody: each one may what those after it may."""
+    return _RANKS.index(who) <= _RANKS.index(changed_by)
+
+
+def refuse_change(name: str, who: Who, changed_by: Who) -> None:
+    """Raise `SchemaError` if `who` may not change the parameter of that name."""
+    if not may_change(who, changed_by):
+        raise SchemaError(f"'{name}' is not changed by {who}, but by {changed_by}", found=name)
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """The values that a parameter may have.
+
+    Attributes:
+        type: `number` or `boolean`; anything else is a word.
+        least, most: the bounds of a number, both inside.
+        among: the values of which it is one; empty means any.
+    """
+
+    type: str
+    least: float | None = None
+    most: float | None = None
+    among: tuple[Value, ...] = ()
+
+    def __str__(self) -> str:
+        """In words."""
+        if self.among:
+            return "one of " + ", ".join(map(written, self.among))
+        if self.least is not None and self.most is not None:
+            return f"from {self.least:g} to {self.most:g}"
+        if self.least is not None:
+            return f"{self.least:g} or more"
+        if self.most is not None:
+            return f"{self.most:g} or less"
+        return f"{'an' if self.type[:1] in 'aeiou' else 'a'} {self.type}"
+
+    def check(self, name: str, value: object) -> Value:
+        """The value, if it fits.
+
+        Args:
+            name: what the parameter is called in messages.
+            value: what it shall be.
+
+        Raises:
+            InputError: it is of another type or out of range; the message has the range and the nearest word.
+        """
+        if isinstance(value, str | int | float | bool) and self._fits(value):
+            return value
+        message = f"'{name}' is {self}; found {written(value)}"
+        raise InputError(message, found=str(value), valid=map(str, self.among))
+
+    def problems(self) -> Iterable[str]:
+        """What is wrong with the range itself."""
+        if self.type != "number" and (self.least is not None or self.most is not None):
+            yield f"`least` and `most` are about numbers, and this is a {self.type}"
+        elif self.least is not None and self.most is not None and self.least > self.most:
+            yield f"no number is {self.least:g} or more and {self.most:g} or less"
+        for value in self.among:
+            if kind_of(value) != self._kind:
+                yield f"{written(value)} is no {self.type}"
+
+    @property
+    def _kind(self) -> str:
+        return self.type if self.type in {"number", "boolean"} else "word"
+
+    def _fits(self, value: Value) -> bool:
+        if kind_of(value) != self._kind or (self.among and value not in self.among):
+            return False
+        if isinstance(value, float) and math.isnan(value):  # it is neither below nor above anything
+            return False
+        too_low = self.least is not None and not isinstance(value, str) and value < self.least
+        too_high = self.most is not None and not isinstance(value, str) and value > self.most
+        return not (too_low or too_high)
+
+
+def kind_of(value: Value) -> str:
+    """Of which kind a value is: `number`, `boolean`, or `word`."""
+    return "boolean" if isinstance(value, bool) else "word" if isinstance(value, str) else "number"
+
+
+def written(value: object) -> str:
+    """A value as people write it."""
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
