@@ -5,19 +5,20 @@ Only what can never fit is found: a name may be any thing, and a variable of a t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Step, contents_of
+from dsc.dynamic.steps import Step, concerns, contents_of
 from dsc.errors import Finding
 from dsc.model.actions import Assign, Emit, ExternalAction, Internal, Trigger, flat
 from dsc.model.connectors import SelectState, case_value
 from dsc.model.plot import ActionPlot, Path
-from dsc.model.rules import Reaction
+from dsc.model.rules import Reaction, Rule
 from dsc.model.states import FinalState, State
 from dsc.model.transitions import TimedTransition, Transition
 from dsc.validation.attributes import Attributes, Skills, attributes_of
 from dsc.validation.nesting import Nesting
+from dsc.validation.rule_scope import RuleScope
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.expression import Constant, Term, Variable
 from knowledge_base.language.printer import to_text
@@ -62,14 +63,32 @@ class _Kinds:
                 if transition.passed or transition.effect or isinstance(transition, TimedTransition):
                     scope = self._scope(state, event) if isinstance(state, State) else self._own
                     yield from self._transition(transition, scope, (*path, *inside))
-        yield from self._reactions("rules", [rule.do for rule in self._plot.rules])
-        yield from self._reactions("handlers", [handler.do for handler in self._plot.handlers])
+        yield from self._reactions()
 
-    def _reactions(self, group: str, reactions: Sequence[Reaction]) -> Iterator[Finding]:
-        for number, do in enumerate(reactions):
-            if do.use is not None:
-                used = self._library.plot(do.use)
-                yield from self._given(used, do.arguments, self._own, (group, number, "do", "with"))
+    def _reactions(self) -> Iterator[Finding]:
+        """What rules and handlers hand over of their events, and of the steps' arguments."""
+        if not (self._plot.rules or self._plot.handlers):
+            return
+        scopes = RuleScope(self._plot, self._library, self._skills, self._nesting, lambda kind: kind)
+        for number, rule in enumerate(self._plot.rules):
+            scope, here = {**self._own, **(scopes.of(rule) or {})}, ("rules", number, "do")
+            yield from self._used(rule.do, scope, here)
+            for entered in self._entered(rule) if rule.do.passed else ():
+                yield from self._given(entered, rule.do.passed, scope, (*here, "pass"))
+        for number, handler in enumerate(self._plot.handlers):
+            scope = {**self._own, **(scopes.attributes(handler) or {})}
+            yield from self._used(handler.do, scope, ("handlers", number, "do"))
+
+    def _used(self, do: Reaction, scope: Attributes, path: Path) -> Iterator[Finding]:
+        if do.use is not None:
+            yield from self._given(self._library.plot(do.use), do.arguments, scope, (*path, "with"))
+
+    def _entered(self, rule: Rule) -> Iterable[ActionPlot]:
+        """The plots in this one that are handed what a rule passes, each once."""
+        steps = {name: state for name, state, _ in self._nesting.states if isinstance(state, Step)}
+        concerned = [state for name, state in steps.items() if concerns(rule, name, state, self._library)]
+        states = [steps[rule.then]] if rule.then in steps else concerned
+        return {used.name: used for state in states for used in contents_of(state, self._library)}.values()
 
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
         if isinstance(state, Step) and state.arguments:

@@ -15,8 +15,8 @@ from dsc.dynamic.steps import Step, concerns
 from dsc.errors import Finding
 from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path
-from dsc.model.rules import CONTINUE, ENTER, REPLAN, RETRY, Rule
-from dsc.model.states import DynamicState, State
+from dsc.model.rules import CONTINUE, ENTER, REPLAN, RETRY, Handler, Rule
+from dsc.model.states import CompositeState, DynamicState, State
 from dsc.validation.candidates import review_candidates
 from dsc.validation.library import MAX_FINDINGS
 from dsc.validation.nesting import Nesting
@@ -33,7 +33,10 @@ def review_plot(plot: ActionPlot, library: Library) -> list[Finding]:
     if plot.profile != "dsc":
         return []
     nesting = Nesting(plot)
-    checks = [_rules(plot, library, nesting), _transitions(plot, nesting), review_candidates(plot, library, nesting)]
+    checks = [
+        _rules(plot, library, nesting), _handlers(plot, nesting), _transitions(plot, nesting),
+        review_candidates(plot, library, nesting),
+    ]  # fmt: skip
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 
 
@@ -46,8 +49,32 @@ def _rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Fin
         if why is None and rule.on is not None and not planned and _settled(rule, rule.on, steps, library):
             why = f"every state that can end with '{rule.on}' answers it itself"
         if why is not None:
-            others = "; before it: " + ", ".join(f"'{one.label}'" for one in earlier) if earlier else ""
-            yield _warning(plot, ("rules", number), f"the rule '{rule.label}' can never answer: {why}{others}", "rules")
+            why += _listed(earlier)
+            yield _warning(plot, ("rules", number), f"the rule '{rule.label}' can never answer: {why}", "rules")
+
+
+def _handlers(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
+    """Those that interrupt, and those beside what goes on, have nothing to do with each other."""
+    for number, handler in enumerate(plot.handlers):
+        same = (one for one in plot.handlers[:number] if one.on == handler.on)
+        earlier = [one for one in same if one.interrupt == handler.interrupt]
+        why = _never(handler.when, [one.when for one in earlier])
+        if why is None and handler.interrupt and handler.listen is None and _all_answer(handler.on, nesting):
+            why = f"every state answers '{handler.on}' itself"
+        if why is not None:
+            message = f"the '{handler.label}' can never answer: {why}{_listed(earlier)}"
+            yield _warning(plot, ("handlers", number), message, "handlers")
+
+
+def _all_answer(event: str, nesting: Nesting) -> bool:
+    """Whether each state that would be interrupted takes the event, whatever its conditions say."""
+    resting = [state for _, state, _ in nesting.states if isinstance(state, State)]
+    own = [state for state in resting if not isinstance(state, CompositeState)]
+    return all(any(way.guard is None for way in state.on.get(event, ())) for state in own)
+
+
+def _listed(earlier: Sequence[Rule] | Sequence[Handler]) -> str:
+    return "; before it: " + ", ".join(f"'{one.label}'" for one in earlier) if earlier else ""
 
 
 def _comes_before(earlier: Rule, later: Rule) -> bool:

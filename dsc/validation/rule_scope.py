@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import chain
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import Outcomes, answerable
@@ -35,7 +36,7 @@ class RuleScope:
         planned = any(isinstance(state, DynamicState) and state.goal is not None for state in self._steps.values())
         self._implementing = [other for other in library if other.implements] if planned else []
         ways = (way for _, _, path in nesting.states for _, _, way in nesting.leaving(path))
-        self._fired = {event for way in ways for event in way.emitted}
+        self._fired = {event for way in ways for event in way.emitted if event not in plot.emits}  # those leave it
 
     def of(self, rule: Rule) -> Types | None:
         """Names and types; `None` if what the rule answers never happens where it is for."""
@@ -43,7 +44,8 @@ class RuleScope:
         if rule.on is None:
             return steps
         sources = [outcomes[rule.on] or {} for outcomes in self._sources(rule) if rule.on in outcomes]
-        event = {f"event.{name}": self._type(kind) for one in sources for name, kind in one.items()}
+        types = [{name: self._type(kind) for name, kind in one.items()} for one in sources]
+        event = {f"event.{name}": _common(name, types) for name in dict.fromkeys(chain.from_iterable(types))}
         return {**event, **steps} if sources else None
 
     def never(self, rule: Rule, path: Path) -> Finding:
@@ -112,10 +114,9 @@ class RuleScope:
 
     def _arguments(self, rule: Rule) -> Types:
         """What all steps have that the rule names."""
-        found: dict[str, str | None] | None = None
-        for arguments in self._given(rule):
-            found = arguments if found is None else {n: t for n, t in found.items() if n in arguments}
-        return {STEP + name: kind for name, kind in (found or {}).items()}
+        given = list(self._given(rule))
+        common = [name for name in given[0] if all(name in one for one in given)] if given else []
+        return {STEP + name: _common(name, given) for name in common}
 
     def _given(self, rule: Rule) -> Iterator[dict[str, str | None]]:
         if not rule.steps:
@@ -127,3 +128,9 @@ class RuleScope:
         for plot in self._implementing:
             if plot.implements in rule.steps:
                 yield {name: self._type(one.type) for name, one in plot.parameters.items()}
+
+
+def _common(name: str, sources: Iterable[Types]) -> str | None:
+    """The type that it has wherever it may come from; `None` if it has several."""
+    types = {one[name] for one in sources if name in one}
+    return types.pop() if len(types) == 1 else None

@@ -18,10 +18,10 @@ from knowledge_base.world.schema import Schema
 
 SAY = """
     plot: say
-    parameters: {text: {type: text, default: hm}}
+    parameters: {text: {type: text, default: hm}, level: {type: number, default: 0}, loud: {type: boolean, default: false}}
     emits: {unheard: }
     states:
-      saying: {entry: {set: voice.says, to: ?text}, on: {said: over, deaf: {to: over, emit: unheard}}}
+      saying: {entry: [{set: voice.says, to: ?text}, {set: voice.level, to: ?level}], on: {said: over, deaf: {to: over, emit: unheard}}}
       over: {final: true}
 """
 STEP = """
@@ -57,8 +57,8 @@ def innermost(run):
     return [path for path in run.active if not any(other.startswith(path + "/") for other in run.active)]
 
 
-BESIDE = "{on: low, do: {tell: (low), use: say, with: {text: ?event.level}}}"
-INTERRUPT = "{on: low, interrupt: true, do: {tell: (low), use: say, with: {text: ?event.level}}}"
+BESIDE = "{on: low, do: {tell: (low), use: say, with: {level: ?event.level}}}"
+INTERRUPT = "{on: low, interrupt: true, do: {tell: (low), use: say, with: {level: ?event.level}}}"
 
 
 # -- beside ------------------------------------------------------------------------------------------------
@@ -68,7 +68,7 @@ def test_a_handler_runs_a_plot_beside_what_goes_on():
     run = run_of(BESIDE)
     before = run.serial("one")
     step = run.send("low", level=7)
-    assert SetParameter("voice", "says", 7) in step.output
+    assert SetParameter("voice", "level", 7) in step.output
     assert step.knowledge.added == (Fact("low"),)
     assert run.machine.state.is_active("saying")
     assert run.serial("one") == before
@@ -116,7 +116,7 @@ def test_an_interrupting_handler_leaves_what_goes_on_and_comes_back_to_it():
     run = run_of(INTERRUPT)
     before = run.serial("one")
     step = run.send("low", level=7)
-    assert SetParameter("voice", "says", 7) in step.output
+    assert SetParameter("voice", "level", 7) in step.output
     assert [path.split("/")[-1] for path in run.active][-1] == "saying"
     assert not run.machine.state.is_active("work")
     run.send("deaf")
@@ -258,6 +258,9 @@ def test_a_right_handler_has_no_findings(handler):
         ("{on: low, do: {use: say, with: {txt: a}}}", "has no parameter 'txt'"),
         ("{on: low, do: {use: say, with: {text: ?event.lvel}}}", "no variable '?event.lvel'"),
         ("{on: low, when: (< ?event.lvel 3), do: {use: say}}", "event.lvel"),
+        ("{on: low, do: {use: say, with: {text: ?event.level}}}", "'text' is of type text, and ?event.level is of type number"),
+        ("{on: low, do: {use: say, with: {text: a, loud: 3}}}", "'loud' is of type boolean, and 3 is of type number"),
+        ("{on: poor, do: {use: say}}", "nothing here fires the event 'poor'"),
         ("{on: low, interrupt: true, do: {tell: (p)}}", "interrupts nothing"),
         ("{on: low, listen: {trigger: battery.lo}, do: {use: say}}", "no component offers the skill 'battery.lo'"),
         ("{on: weak, listen: {trigger: battery.low}, do: {use: say}}", "does not bring the event 'weak'"),

@@ -247,3 +247,48 @@ def test_the_command_gives_warnings_which_count_only_if_asked_to(tmp_path):
     data = json.loads(runner.invoke(app, ["check", "--json", str(tmp_path / "p.yaml")]).output)
     assert {one["level"] for one in data} == {"warning"}
     assert data[0]["line"] == 4
+
+
+# -- handlers ----------------------------------------------------------------------------------------------
+
+HANDLING = "plot: p\nreceives: {low: {level: number}}\nstates:\n  a: {on: {done: b}}\n  b: {after: {seconds: 3, to: e}}\n  e: {final: true}\nhandlers:\n"
+
+
+def about_handlers(*handlers, text=HANDLING):
+    return warnings_of(text + "".join(f"  - {one}\n" for one in handlers), STEP)
+
+
+@pytest.mark.parametrize(
+    "handlers",
+    [
+        ["{on: low, do: {use: step}}", "{on: low, do: {tell: (p)}}"],
+        ["{on: low, when: (< ?event.level 20), do: {use: step}}", "{on: low, when: (< ?event.level 10), do: {tell: (p)}}"],
+        ["{on: low, interrupt: true, do: {use: step}}", "{on: low, interrupt: true, do: {use: step}}"],
+        ["{on: low, when: (and (p) (not (p))), do: {tell: (p)}}"],
+    ],
+)
+def test_a_handler_that_can_never_answer_is_found_where_it_stands(handlers):
+    (warning,) = about_handlers(*handlers)
+    assert warning.startswith(f"p.yaml:{7 + len(handlers)}:")
+    assert "can never answer" in warning
+
+
+@pytest.mark.parametrize(
+    "handlers",
+    [
+        ["{on: low, when: (< ?event.level 10), do: {use: step}}", "{on: low, do: {tell: (p)}}"],
+        ["{on: low, interrupt: true, do: {use: step}}", "{on: low, do: {tell: (p)}}"],  # one beside, one instead
+        ["{on: low, do: {use: step}}"],
+    ],
+)
+def test_a_handler_that_may_answer_is_no_warning(handlers):
+    assert about_handlers(*handlers) == []
+
+
+def test_a_handler_that_interrupts_is_never_asked_where_every_state_answers_itself():
+    text = HANDLING.replace("done: b}", "done: b, low: e}").replace("b: {after", "b: {on: {low: e}, after")
+    (warning,) = about_handlers("{on: low, interrupt: true, do: {use: step}}", text=text)
+    assert "every state answers 'low' itself" in warning
+    assert about_handlers("{on: low, do: {use: step}}", text=text) == []
+    guarded = text.replace("b: {on: {low: e}", "b: {on: {low: {to: e, when: (p)}}")
+    assert about_handlers("{on: low, interrupt: true, do: {use: step}}", text=guarded) == []

@@ -12,9 +12,11 @@ from dsc.engine.steps import SetParameter
 from dsc.model.actions import Tell
 from dsc.model.states import SubmachineState
 from dsc.text.plots import parse_plot, plot_to_yaml
+from dsc.validation import validate_plot
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Fact, fact
 from knowledge_base.language.expression import Constant
+from knowledge_base.world.schema import Schema
 
 STEP = """
     plot: step
@@ -500,3 +502,35 @@ def test_a_rule_to_an_unknown_state_is_refused():
         run_of(["{on: failed, do: {then: elsewere}}"])
 
 
+
+
+# -- what is handed over, by type ------------------------------------------------------------------------------
+
+KINDS = """
+    plot: p
+    states:
+      do_it: {use: step, with: {item: cup1}, on: {done: fine, broken: fine}}
+      fine: {final: true}
+    rules:
+      - RULE
+"""
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        ("{on: failed, do: {use: count, with: {n: ?event.item}, then: fine}}", "'n' is of type number, and ?event.item is of type item"),
+        ("{on: failed, do: {use: count, with: {n: ?step.item}, then: fine}}", "there is no variable '?step.item'"),  # no step is named
+        ("{on: failed, of: do_it, do: {use: count, with: {n: ?step.item}, then: fine}}", "'n' is of type number, and ?step.item is of type item"),
+        ("{on: failed, do: {then: retry, pass: {item: 3}}}", "'item' is of type item, and 3 is of type number"),
+        ("{on: failed, do: {then: retry, pass: {item: ?event.item}}}", ""),
+        ("{before: do_it, do: {use: count, with: {n: ?step.item}}}", "'n' is of type number"),
+    ],
+)
+def test_what_a_rule_hands_over_fits_by_type(rule, said):
+    count = plot("plot: count\nparameters: {n: number}\nstates: {e: {final: true}}")
+    made = [plot(KINDS.replace("RULE", rule)), plot(STEP), count]
+    schema = Schema.parse("(define (domain d) (:types item) (:constants cup1 - item))")
+    found = [str(one) for one in validate_plot(made[0], Library(made), schema) if one.rule != "every outcome is wired"]
+    assert len(found) == bool(said)
+    assert said in "".join(found)
