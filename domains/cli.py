@@ -251,15 +251,30 @@ def main() -> None:
 
 
 def _command() -> None:
+    as_json = "--json" in sys.argv
     try:
-        app()
+        status = app(standalone_mode=not as_json)  # by itself, it tells people what is wrong with their words
     except Exception as error:
         from knowledge_base.errors import InputError
 
-        if not isinstance(error, InputError):
+        wrong = _misused(error) if as_json else error
+        if not isinstance(wrong, InputError):
             raise
-        _tell(error, as_json="--json" in sys.argv)
+        _tell(wrong, as_json=as_json)
         sys.exit(BAD_INPUT)
+    sys.exit(status)
+
+
+def _misused(error: Exception) -> Exception:
+    """What is wrong with the words of a command, for programs; any other error as it is."""
+    from knowledge_base.errors import InputError
+
+    message = getattr(error, "format_message", None)
+    if message is None:
+        return error
+    option, valid = getattr(error, "option_name", None), getattr(error, "possibilities", None) or ()
+    said = f"no such option: {option}" if option else message().partition("\n")[0].removesuffix(".")
+    return InputError(said, found=option, valid=valid)
 
 
 def _tell(error: InputError, *, as_json: bool) -> None:

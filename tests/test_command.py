@@ -118,6 +118,31 @@ def test_bad_input_is_told_to_programs_as_json(dsc, tmp_path):
     assert (status, json.loads(out)["file"], json.loads(out)["nearest"], err) == (2, None, "clean-up-table", "")
 
 
+@pytest.mark.parametrize(
+    ("words", "message", "nearest"),
+    [
+        (["run", "clean-up-table", "--sed", "3"], "no such option: --sed", "--seed"),
+        (["run", "clean-up-table", "--faults", "2"], "Invalid value for '--faults': Input should be less than or equal to 1", None),
+        (["run", "clean-up-table", "--durability", "fo"], "is not one of 'process', 'power'", None),
+        (["plan"], "Missing argument 'DOMAIN... PROBLEM'", None),
+        (["fly"], "No such command 'fly'", None),
+        (["kb", "fly"], "No such command 'fly'", None),
+        (["runs", "list"], "Missing argument 'FILE'", None),
+        (["run", "clean-up-table", "--store", "."], "is a folder; a store is a file", None),
+    ],
+)
+def test_what_is_wrong_with_the_words_is_told_to_programs_as_json(dsc, words, message, nearest):
+    status, out, err = dsc(*words, "--json")
+    said = json.loads(out)
+    assert (status, err, said["outcome"], said["nearest"]) == (2, "", "bad_input", nearest)
+    assert message in said["message"]
+
+
+def test_with_json_the_exit_status_is_the_commands_own(dsc):
+    assert dsc("doctor", "--json")[0] == 0
+    assert dsc("plot", "check", "none.yaml", "--json")[0] == 2
+
+
 def installed(words, out):
     """The installed command with its output going there: its exit status and what it complains about."""
     command = [Path(sys.executable).with_name("dsc"), *map(str, words)]
