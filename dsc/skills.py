@@ -23,6 +23,7 @@ from dsc.blocking import in_process, in_thread
 from dsc.calls import Outcome, SkillCall
 from dsc.events import EXECUTIVES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.inputs import shown
 
 if TYPE_CHECKING:
     from dsc.components.component import Component
@@ -117,13 +118,31 @@ def skill(
             then whether it shall stop; or in a process, which is ended when it shall stop. What goes to a process
             and comes back is pickled, the component itself included.
         after_crash: what may be done when a run is resumed and the component does not know what became of it.
+
+    Raises:
+        InputError: the outcomes are no mapping, or it blocks in no way that there is.
     """
+    require_names(outcomes, "the outcomes of a skill", "@skill(outcomes={'grasped': {}})")
+    for event, attributes in outcomes.items():
+        require_names(attributes, f"the attributes of '{event}'", "{'item': 'item'}")
+    if blocking not in _CARRIED_OUT:
+        message = f"a skill blocks in a thread or a process, not {shown(blocking)}"
+        raise InputError(message, found=str(blocking), valid=("thread", "process"))
     declared = {event: dict(attributes) for event, attributes in outcomes.items()}
     return Declared(dict(types or {}), declared, _CARRIED_OUT[blocking], after_crash=after_crash)
 
 
+def require_names(declared: object, what: str, example: str) -> None:
+    """Raise `InputError` unless it is a mapping whose keys are names."""
+    if not isinstance(declared, Mapping) or not all(isinstance(name, str) for name in declared):
+        raise InputError(f"{what} are a mapping of names, as in {example}, not {shown(declared)}")
+
+
 async def _awaited(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-    return cast(Outcome, await body(call, **arguments))
+    coming = body(call, **arguments)
+    if not inspect.isawaitable(coming):
+        raise SchemaError("it is no coroutine: write `async def`, or say that it is `blocking`")
+    return cast(Outcome, await coming)
 
 
 async def _in_thread(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:

@@ -85,7 +85,7 @@ class InputError(Exception):
         self.message = printable(shortened(message))
         super().__init__(self.message)
         self.place = place
-        self.found = found
+        self.found = None if found is None else str(found)  # what programs hand in may be anything
         self.valid = tuple(sorted(set(valid)))
 
     @property

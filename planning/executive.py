@@ -12,8 +12,7 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
-from dsc.components.component import Component
-from dsc.components.parameters import Parameter
+from dsc.components.component import Component, require_instances
 from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
@@ -85,8 +84,10 @@ class Executive:
         durability: Durability = "process",
     ) -> None:
         self.components = tuple(components)
+        require_instances(self.components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
-        _refuse_namesakes(self.components)
+        if any(component.name == PlanningComponent.name for component in self.components):
+            raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)
         if knowledge is not None and store is not None:
             raise InputError("with a store the knowledge is the store's; none can be given beside it")
         if knowledge is not None:
@@ -316,11 +317,3 @@ def _budget(seconds: float, replans: int) -> Budget:
         first = error.errors()[0]
         wrong = f"'{first['loc'][0]}' is {first['input']!r}: {first['msg']}"
         raise InputError(wrong, found=str(first["input"])) from None
-
-
-def _refuse_namesakes(components: Iterable[Component]) -> None:
-    names = {PlanningComponent.name}
-    for component in components:
-        if component.name in names:
-            raise SchemaError(f"two components are named '{component.name}'", found=component.name)
-        names.add(component.name)

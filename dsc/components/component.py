@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Awaitable, Mapping
+from collections.abc import Awaitable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
@@ -13,7 +13,8 @@ from dsc.components.life import Life, LifeCycle
 from dsc.components.parameters import Parameter, check_relations, known
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.inputs import shown
 
 NEUTRAL = "neutral"
 """The mode at rest."""
@@ -232,3 +233,20 @@ class Component:
             "needs": list(self.needed()),
             "skills": sorted(self.skills()),
         }
+
+
+def require_instances(components: Iterable[object]) -> None:
+    """Raise an error unless these are components, each with a name of its own.
+
+    Raises:
+        InputError: something is none, e.g. a class instead of its instance.
+        SchemaError: two have one name.
+    """
+    names = set()
+    for one in components:
+        if not isinstance(one, Component):
+            hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
+            raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
+        if one.name in names:
+            raise SchemaError(f"two components are named '{one.name}'", found=one.name)
+        names.add(one.name)

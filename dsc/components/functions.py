@@ -8,6 +8,7 @@ from dataclasses import replace
 from dsc.components.component import Component
 from dsc.skills import DECLARED, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError
+from knowledge_base.language.inputs import shown
 
 
 def component_of(name: str, *functions: SkillBody) -> Component:
@@ -18,7 +19,8 @@ def component_of(name: str, *functions: SkillBody) -> Component:
     """
     for function in functions:
         if not hasattr(function, DECLARED):
-            raise InputError(f"'{function.__name__}' is no skill: decorate it with `skill`", found=function.__name__)
+            what = f"'{function.__name__}'" if hasattr(function, "__name__") else shown(function)
+            raise InputError(f"{what} is no skill: decorate a function with `skill`", found=what)
     return _OfFunctions(name, {function.__name__: function for function in functions})
 
 

@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from dsc.calls import Outcome, SkillCall
 from dsc.components.component import TAKES, Component
-from dsc.skills import Declared, SkillBody
+from dsc.skills import Declared, SkillBody, require_names
 
 ANSWERED = "answered"
 """The outcome of a query; its attributes are the answer."""
@@ -35,6 +35,7 @@ def query(answer: Mapping[str, str | None], types: Mapping[str, str] | None = No
 
     A chart asks with `trigger`, gets the event `answered`, and says `within` which time.
     """
+    require_names(answer, "the values of an answer", "@query({'hours': 'number'})")
     return Declared(dict(types or {}), {ANSWERED: dict(answer)}, _ask, own=1, pattern="query", after_crash="repeat")
 
 
@@ -50,6 +51,7 @@ def event(attributes: Mapping[str, str | None], types: Mapping[str, str] | None 
         attributes: the event's, with types.
         types: of the activation's parameters; these stand after those for the value, and have defaults.
     """
+    require_names(attributes, "the attributes of an event", "@event({'level': 'number'})")
 
     def declare(test: _Body) -> _Body:
         return Declared(

@@ -13,6 +13,7 @@ from dsc.engine.tables import CompiledPlot
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import Who
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.inputs import shown
 
 MOST_BOUND = 64
 """Plots given as data whose tables are kept: a retry binds the same plan again, a long run makes ever new ones."""
@@ -29,6 +30,8 @@ class Library:
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
+        if isinstance(plots, ActionPlot | str):
+            raise InputError(f"a library is made of a list of plots, not of {shown(plots)[:60]}")
         for plot in plots:
             self.add(plot)
 
@@ -44,8 +47,11 @@ class Library:
         """Add a plot.
 
         Raises:
+            InputError: it is no plot.
             SchemaError: another plot has its name.
         """
+        if not isinstance(plot, ActionPlot):
+            raise InputError(f"a plot is an ActionPlot, as load_plot and parse_plot give it, not {shown(plot)}")
         if self._plots.get(plot.name, plot) != plot:
             raise SchemaError(
                 f"two different plots are named '{plot.name}'", place=plot.place(("plot",)), found=plot.name

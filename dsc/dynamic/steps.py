@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from dsc.dynamic.outcomes import Plots
 from dsc.events import FAILURES
@@ -45,8 +45,26 @@ def concerns(rule: Rule, name: str, step: Step, plots: Plots) -> bool:
 
 def answers_in_plans(rule: Rule, plots: Plots) -> bool:
     """Whether a rule may answer for steps of plans: those that carry out planning actions, if it names any, theirs."""
-    carrying = [plot for plot in plots if plot.implements and (not rule.steps or plot.implements in rule.steps)]
-    return bool(carrying) and (rule.on is None or any(rule.on in FAILURES or rule.on in one.emits for one in carrying))
+    return any(True for _ in _answered_in_plans(rule, plots))
+
+
+def _answered_in_plans(rule: Rule, plots: Plots) -> Iterator[ActionPlot]:
+    carrying = (plot for plot in plots if plot.implements and (not rule.steps or plot.implements in rule.steps))
+    return (plot for plot in carrying if rule.on is None or rule.on in FAILURES or rule.on in plot.emits)
+
+
+def entered_by(rule: Rule, plot: ActionPlot, plots: Plots) -> Iterator[ActionPlot]:
+    """The plots that are handed what a rule of a plot passes, as far as they are known, each once."""
+    steps = {name: state for name, state, _ in plot.walk() if isinstance(state, Step)}
+    if rule.leads_away:
+        entered = [steps[rule.then]] if rule.then in steps else []
+    else:
+        entered = [state for name, state in steps.items() if concerns(rule, name, state, plots)]
+    found = {used.name: used for state in entered for used in contents_of(state, plots)}
+    planned = any(isinstance(state, DynamicState) and state.goal is not None for state in steps.values())
+    if planned and not rule.leads_away:
+        found.update({used.name: used for used in _answered_in_plans(rule, plots)})
+    yield from found.values()
 
 
 def mentioned_in(rule: Rule | Handler) -> frozenset[str]:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
-from dsc.components.component import Component
+from dsc.components.component import Component, require_instances
 from dsc.components.roster import Roster
 from dsc.components.stopping import GRACE, give_up, give_up_after
 from dsc.engine.steps import (
@@ -65,6 +65,8 @@ class Dispatcher:
         part_of: str = "",
     ) -> None:
         self._part_of = part_of
+        components = tuple(components)
+        require_instances(components)
         self._components = {component.name: component for component in components}
         self._roster = Roster(self._components)
         self._given_up: list[str] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dsc.calls import Outcome
@@ -10,6 +11,7 @@ from dsc.engine.steps import SendLater, Start, StartTimer
 from dsc.events import NO_ATTRIBUTES, Event
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Value
+from knowledge_base.language.inputs import shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,9 @@ Message = SkillMessage | TimerMessage | KnowledgeMessage | ParameterMessage | La
 
 
 def plain(event: Event) -> Event:
-    """The event with attributes of its own; raises `InputError` if they are no plain data."""
+    """The event with attributes of its own; raises `InputError` if it is none, or they are no plain data."""
+    if not isinstance(event, Event) or not isinstance(event.attributes, Mapping):
+        raise InputError(f'an event is an Event with its attributes, as Event("stop", {{}}), not {shown(event)}')
     if not event.attributes:
         return event if event.attributes is NO_ATTRIBUTES else event._replace(attributes=NO_ATTRIBUTES)
     try:

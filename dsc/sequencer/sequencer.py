@@ -16,6 +16,7 @@ from dsc.sequencer import together
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
+from dsc.sequencer.entrance import fitting, require_seconds
 from dsc.sequencer.inbox import Inbox
 from dsc.sequencer.messages import (
     FromOutside,
@@ -33,6 +34,7 @@ from dsc.sequencer.run_store import RunStore
 from dsc.trace import Trace
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
+from knowledge_base.language.inputs import require_delta, require_text
 from knowledge_base.store import KnowledgeBase
 
 
@@ -152,9 +154,10 @@ class Sequencer:
                 plain data.
             StoreError: it could not be kept.
         """
+        event = plain(event)
         if event.name in RESERVED:
             raise InputError(f"the event '{event.name}' is fired by the executive itself", found=event.name)
-        self._hand_in(plain(event), after)
+        self._hand_in(event, after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
         """Hand in a change of knowledge that somebody else made; from the loop's own thread.
@@ -168,6 +171,8 @@ class Sequencer:
             InputError: the change contradicts the schema; nothing was changed.
             StoreError: it could not be kept.
         """
+        require_delta(delta)
+        require_text(author, "an author")
         self.knowledge.overlay().apply(delta)
         self._hand_in(KnowledgeMessage(delta, author), after)
 
@@ -188,6 +193,8 @@ class Sequencer:
             InputError: the value is out of range, breaks a relation, or is not for operators to say.
             StoreError: it could not be kept.
         """
+        require_text(owner, "the name of a component or plot")
+        require_text(name, "a parameter's name")
         component = self.dispatcher.components.get(owner)
         if component is not None:
             component.check_parameter(name, value, "operator")
@@ -206,9 +213,10 @@ class Sequencer:
             InputError: the plot is unknown, or a parameter is missing or unknown.
             StoreError: the store cannot be written; what was committed before can be resumed.
         """
+        given = fitting(self.library.plot(plot), {} if arguments is None else arguments)
 
         async def begin() -> None:
-            self._start(plot, arguments or {})
+            self._start(plot, given)
 
         return await self._until_end(begin)
 
@@ -338,6 +346,7 @@ class Sequencer:
     # -- from outside ------------------------------------------------------------------------------------
 
     def _hand_in(self, message: FromOutside, after: float) -> None:
+        require_seconds(after)
         if after <= 0:
             self._inbox.put(message)
             return

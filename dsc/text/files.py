@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from knowledge_base.errors import InputError, Place
+from knowledge_base.language.inputs import shown
 
 MAX_BYTES = 250_000
 """A hundred times the longest plot we ship; what is larger would keep its author waiting for an error."""
@@ -16,7 +17,7 @@ def read_file(path: Path | str) -> str:
     Raises:
         InputError: it cannot be read, is not UTF-8, or has more than `MAX_BYTES`.
     """
-    file = Path(path)
+    file = path_of(path)
     try:
         data = _bytes(file)
         return data.decode("utf-8")
@@ -32,6 +33,13 @@ def read_file(path: Path | str) -> str:
         raise InputError(f"cannot read the file: {error.strerror}", place=Place(str(file))) from None
     except ValueError as error:  # a NUL in the name
         raise InputError(f"this is no name of a file: {error}", found=str(file)) from None
+
+
+def path_of(path: object) -> Path:
+    """The path of that name; raises `InputError` for anything else than a text or path."""
+    if not isinstance(path, str | Path):
+        raise InputError(f"a file or folder is named by a text or a Path, not {shown(path)}")
+    return Path(path)
 
 
 def check_size(size: int, place: Place) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.model.connectors import case_value
 from dsc.model.plot import ActionPlot
-from dsc.text.files import read_file
+from dsc.text.files import path_of, read_file
 from dsc.text.form import read_model
 from dsc.text.yaml import dump, load_document
 from knowledge_base.errors import InputError, Place
@@ -35,7 +35,7 @@ def load_library(folder: Path | str) -> Library:
     Raises:
         InputError: the folder is missing, a file is no plot, or two plots have one name.
     """
-    files = sorted(Path(folder).glob("*.yaml"))
+    files = sorted(path_of(folder).glob("*.yaml"))
     if not files:
         raise InputError(f"there are no plots (*.yaml) in '{folder}'", place=Place(str(folder)))
     return Library(load_plot(file) for file in files)

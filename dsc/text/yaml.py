@@ -35,6 +35,7 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 from dsc.model.reading import FormPath
 from dsc.text.files import check_size
 from knowledge_base.errors import ParseError, Place
+from knowledge_base.language.inputs import require_text
 
 MAX_DEPTH = 128
 MAX_PARTS = 18_000
@@ -106,6 +107,7 @@ def load_document(text: str, source: str | None = None) -> Document:
         ParseError: it is not YAML, or uses a feature that is refused.
         InputError: it is too large.
     """
+    require_text(text, "what is read as YAML")
     check_size(len(text), Place(source))
     places: dict[FormPath, Place] = {(): Place(source, 1)}
     reader = _Reader(text, source, places)

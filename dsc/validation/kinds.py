@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Step, concerns, contents_of
+from dsc.dynamic.steps import Step, contents_of, entered_by
 from dsc.errors import Finding
 from dsc.model.actions import Assign, Emit, ExternalAction, Internal, Trigger, flat
 from dsc.model.connectors import SelectState, case_value
 from dsc.model.plot import ActionPlot, Path
-from dsc.model.rules import Reaction, Rule
+from dsc.model.rules import Reaction
 from dsc.model.states import FinalState, State
 from dsc.model.transitions import TimedTransition, Transition
 from dsc.validation.attributes import Attributes, Skills, attributes_of
@@ -73,7 +73,7 @@ class _Kinds:
         for number, rule in enumerate(self._plot.rules):
             scope, here = {**self._own, **(scopes.of(rule) or {})}, ("rules", number, "do")
             yield from self._used(rule.do, scope, here)
-            for entered in self._entered(rule) if rule.do.passed else ():
+            for entered in entered_by(rule, self._plot, self._library) if rule.do.passed else ():
                 yield from self._given(entered, rule.do.passed, scope, (*here, "pass"))
         for number, handler in enumerate(self._plot.handlers):
             scope = {**self._own, **(scopes.attributes(handler) or {})}
@@ -82,13 +82,6 @@ class _Kinds:
     def _used(self, do: Reaction, scope: Attributes, path: Path) -> Iterator[Finding]:
         if do.use is not None:
             yield from self._given(self._library.plot(do.use), do.arguments, scope, (*path, "with"))
-
-    def _entered(self, rule: Rule) -> Iterable[ActionPlot]:
-        """The plots in this one that are handed what a rule passes, each once."""
-        steps = {name: state for name, state, _ in self._nesting.states if isinstance(state, Step)}
-        concerned = [state for name, state in steps.items() if concerns(rule, name, state, self._library)]
-        states = [steps[rule.then]] if rule.then in steps else concerned
-        return {used.name: used for state in states for used in contents_of(state, self._library)}.values()
 
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
         if isinstance(state, Step) and state.arguments:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Step, concerns, contents_of
+from dsc.dynamic.steps import Step, contents_of, entered_by
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Parameter, Path
 from dsc.model.ranges import Who, refuse_change
@@ -26,23 +26,16 @@ def check_parameters(plot: ActionPlot, library: Library, nesting: Nesting) -> It
             target = nesting.state(way.target) if way.passed and way.target is not None else None
             for used in contents_of(target, library) if isinstance(target, Step) else ():
                 yield from _handed(plot, used, way.passed, "plots", (*path, *inside, "pass"))
-    yield from _by_rules(plot, library, nesting)
+    yield from _by_rules(plot, library)
 
 
-def _by_rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
+def _by_rules(plot: ActionPlot, library: Library) -> Iterator[Finding]:
     for group, reactions in (("rules", [r.do for r in plot.rules]), ("handlers", [h.do for h in plot.handlers])):
         for number, do in enumerate(reactions):
             if do.use is not None:
                 yield from _handed(plot, library.plot(do.use), do.arguments, "rules", (group, number, "do", "with"))
-    steps = {name: state for name, state, _ in nesting.states if isinstance(state, Step)}
     for number, rule in enumerate(plot.rules):
-        if not rule.do.passed:
-            continue
-        mine = [steps[rule.then]] if rule.then in steps else [
-            state for name, state in steps.items() if concerns(rule, name, state, library)
-        ]  # fmt: skip
-        used = {one.name: one for state in mine for one in contents_of(state, library)}
-        for one in used.values():
+        for one in entered_by(rule, plot, library) if rule.do.passed else ():
             yield from _handed(plot, one, rule.do.passed, "rules", ("rules", number, "do", "pass"))
 
 

@@ -76,6 +76,16 @@ def test_rules_hand_what_is_left_to_them(who, allowed):
     assert allowed or "p.yaml:6:39: 'wait.seconds' is not changed by rules, but by operator" in found[0]
 
 
+def test_rules_pass_to_steps_of_plans_what_is_left_to_them():
+    drive = parse_plot("plot: drive\nimplements: go\nparameters: {speed: {type: number, default: 1, most: 2, changed_by: WHO}}\nemits: {blocked: }\nstates: {b: {on: {done: {to: f, emit: blocked}}}, f: {final: true}}".replace("WHO", "rules"))
+    text = "plot: p\nstates:\n  a: {goal: (x), on: {done: e, no_plan: e, gave_up: e}}\n  e: {final: true}\nrules:\n  - {on: blocked, do: {then: retry, pass: {speed: 1}}}\n"
+    assert findings(parse_plot(text), drive) == []
+    (finding,) = findings(parse_plot(text.replace("speed: 1", "speed: 3"), "p.yaml"), drive)
+    assert "p.yaml:6:44: 'drive.speed' is 2 or less; found 3" in finding
+    (finding,) = findings(parse_plot(text), parse_plot(drive.text.replace('"changed_by":"rules"', '"changed_by":"operator"').replace('"changed_by": "rules"', '"changed_by": "operator"')))
+    assert "'drive.speed' is not changed by rules, but by operator" in finding
+
+
 def test_a_transition_passes_what_is_in_range():
     text = "plot: p\nstates:\n  b: {on: {done: {to: a, pass: {seconds: 99}}}}\n  a: {use: wait, on: {done: e}}\n  e: {final: true}\n"
     (finding,) = findings(parse_plot(text, "p.yaml"), wait())

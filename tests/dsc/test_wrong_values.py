@@ -1,0 +1,117 @@
+"""Wrong values at the entrances for programs: words about what was found and what is wanted, never a traceback from inside."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from dsc import (
+    ActionPlot,
+    Component,
+    Event,
+    Library,
+    Outcome,
+    Sequencer,
+    component_of,
+    event,
+    load_library,
+    load_plot,
+    parse_plot,
+    primitive_plot,
+    query,
+    skill,
+)
+from dsc.sequencer.clock import LoopClock, run_simulated
+from knowledge_base import InputError, KnowledgeBase
+from knowledge_base.world.schema import Schema
+from planning import Executive
+
+PLOT = parse_plot("""
+plot: p
+parameters: {n: number, why: {type: text, default: nothing}}
+receives: {stop: }
+states: {a: {on: {stop: e}, after: {seconds: 1, to: e}}, e: {final: true}}
+""")
+
+
+class Arm(Component):
+    name = "arm"
+
+    @skill(outcomes={"ok": {}})
+    async def go(self, call) -> Outcome:
+        return Outcome("ok")
+
+
+def sequencer(components=()):
+    return Sequencer(Library([PLOT]), KnowledgeBase(Schema()), components or [Arm()], LoopClock())
+
+
+def at_work(act):
+    """The act, while there is a sequencer."""
+
+    async def main():
+        done = act(sequencer())
+        return await done if hasattr(done, "__await__") else done
+
+    return lambda: run_simulated(main())
+
+
+def executive(components, plots=(PLOT,)):
+    return lambda: Executive("(define (domain d))", plots, components)
+
+
+@pytest.mark.parametrize(
+    ("act", "said"),
+    [
+        (at_work(lambda run: run.post("stop")), "an event is an Event with its attributes, as Event(\"stop\", {}), not 'stop'"),
+        (at_work(lambda run: run.post(Event("stop", ["a"]))), "an event is an Event with its attributes"),
+        (at_work(lambda run: run.post(Event("stop"), after="soon")), "a finite number of seconds, not 'soon'"),
+        (at_work(lambda run: run.post(Event("stop"), after=float("nan"))), "a finite number of seconds, not nan"),
+        (at_work(lambda run: run.change([1], "me")), "a change is a Delta, not [1]"),
+        (at_work(lambda run: run.set_parameter("p", ["n"], 5)), "a parameter's name is text, not ['n']"),
+        (at_work(lambda run: run.run(None)), "there is no plot 'None'"),
+        (at_work(lambda run: run.run("p", ["n"])), "arguments are a mapping of parameters' names to values, not ['n']"),
+        (at_work(lambda run: run.run("p", {"n": "three"})), "'p.n' is a number; found three"),
+        (at_work(lambda run: run.run("p", {"n": 1, "why": {2}})), "the argument 'why' is no plain data"),
+        (at_work(lambda _: sequencer([Arm]) and None), "an instance is made by Arm()"),
+        (at_work(lambda _: sequencer([Arm(), Arm()]) and None), "two components are named 'arm'"),
+        (lambda: Library(["p"]), "a plot is an ActionPlot, as load_plot and parse_plot give it, not 'p'"),
+        (lambda: Library(PLOT), "a library is made of a list of plots"),
+        (lambda: parse_plot(None), "what is read as YAML is text, not None"),
+        (lambda: load_plot(5), "a file or folder is named by a text or a Path, not 5"),
+        (lambda: load_library(None), "a file or folder is named by a text or a Path, not None"),
+        (lambda: load_library("/nowhere"), "there are no plots (*.yaml) in '/nowhere'"),
+        (lambda: ActionPlot.model_validate("p"), "a mapping was expected; found 'p'"),
+        (lambda: skill(outcomes=["ok"]), "the outcomes of a skill are a mapping of names, as in @skill(outcomes={'grasped': {}})"),
+        (lambda: skill(outcomes={"ok": ["item"]}), "the attributes of 'ok' are a mapping of names"),
+        (lambda: skill(lambda call: None), "the outcomes of a skill are a mapping of names"),
+        (lambda: skill(outcomes={}, blocking="tread"), "blocks in a thread or a process, not 'tread'; did you mean 'thread'?"),
+        (lambda: query(["hours"]), "the values of an answer are a mapping of names"),
+        (lambda: event(5), "the attributes of an event are a mapping of names"),
+        (lambda: component_of("arm", "go"), "'go' is no skill: decorate a function with `skill`"),
+        (lambda: primitive_plot(Arm().skills()["go"], done="okk"), "no outcome 'okk'; did you mean 'ok'?"),
+        (executive([Arm]), "an instance is made by Arm()"),
+        (executive(["arm"]), "a component is an instance of a subclass of Component, not 'arm'"),
+        (executive([Arm(), Arm()]), "two components are named 'arm'"),
+        (executive([], ["p"]), "a plot is an ActionPlot"),
+        (lambda: Executive("nowhere.pddl", [PLOT], []), "there is no file 'nowhere.pddl'"),
+    ],
+)  # fmt: skip
+def test_a_wrong_value_is_refused_in_words(act, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        act()
+
+
+def test_a_skill_that_is_no_coroutine_says_what_to_write():
+    @skill(outcomes={"ok": {}})
+    def go(call) -> Outcome:
+        return Outcome("ok")
+
+    text = "plot: q\nemits: {because: {why: text}}\nstates:\n  a: {entry: {trigger: arm.go}, on: {ok: e, skill_error: {to: e, emit: because, with: {why: ?event.reason}}}}\n  e: {final: true}"
+
+    async def main():
+        return await Sequencer(Library([parse_plot(text)]), KnowledgeBase(Schema()), [component_of("arm", go)], LoopClock()).run("q")
+
+    (why,) = run_simulated(main()).emitted
+    assert "it is no coroutine: write `async def`, or say that it is `blocking`" in why.attributes["why"]
