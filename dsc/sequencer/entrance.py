@@ -7,9 +7,76 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from dsc.components.component import Component
+from dsc.dynamic.library import Library
+from dsc.events import NO_ATTRIBUTES, RESERVED, Event
 from dsc.model.plot import ActionPlot
-from knowledge_base.errors import InputError
-from knowledge_base.language.inputs import shown
+from dsc.sequencer.messages import KnowledgeMessage, ParameterMessage
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.facts import Delta
+from knowledge_base.language.inputs import require_delta, require_text, shown
+from knowledge_base.store import KnowledgeBase
+
+
+def event(said: object) -> Event:
+    """The event with attributes of its own.
+
+    Raises:
+        InputError: it is none, only the executive fires it, or an attribute is no plain data.
+    """
+    if not isinstance(said, Event) or not isinstance(said.attributes, Mapping):
+        raise InputError(f'an event is an Event with its attributes, as Event("stop", {{}}), not {shown(said)}')
+    if said.name in RESERVED:
+        raise InputError(f"the event '{said.name}' is fired by the executive itself", found=said.name)
+    if not said.attributes:
+        return said if said.attributes is NO_ATTRIBUTES else said._replace(attributes=NO_ATTRIBUTES)
+    return said._replace(attributes=_plain(dict(said.attributes), f"the attributes of '{said.name}' are"))
+
+
+def change(delta: Delta, author: str, knowledge: KnowledgeBase) -> KnowledgeMessage:
+    """A change of knowledge that fits its schema; raises `InputError`."""
+    require_delta(delta)
+    require_text(author, "an author")
+    knowledge.overlay().apply(delta)
+    return KnowledgeMessage(delta, author)
+
+
+def parameter(
+    owner: str, name: str, value: object, components: Mapping[str, Component], library: Library
+) -> ParameterMessage:
+    """What an operator says a parameter is worth.
+
+    Raises:
+        UnknownNameError: there is no such component or plot, or it declares no such parameter.
+        InputError: the value is out of range, breaks a relation, or is not for operators to say.
+    """
+    require_text(owner, "the name of a component or plot")
+    require_text(name, "a parameter's name")
+    if owner in components:
+        components[owner].check_parameter(name, value, "operator")
+    elif owner in library:
+        library.plot(owner).with_default(name, value, "operator")
+    else:
+        valid = [*components, *(plot.name for plot in library)]
+        raise UnknownNameError(f"there is no component or plot '{owner}'", found=owner, valid=valid)
+    assert isinstance(value, str | int | float | bool)  # noqa: S101  as everything that fits a range
+    return ParameterMessage(owner, name, value, of_plot=owner not in components)
+
+
+def arguments(plot: ActionPlot, given: object) -> Mapping[str, Any]:
+    """What a plot is begun with, if it may be handed to it.
+
+    Raises:
+        InputError: it is no mapping, a value is no plain data, or a number or truth value is wanted and it is none.
+    """
+    if not isinstance(given, Mapping):
+        raise InputError(f"arguments are a mapping of parameters' names to values, not {shown(given)}")
+    for name, value in given.items():
+        declared = plot.parameters.get(name)
+        if declared is not None and declared.type in {"number", "boolean"}:
+            declared.range.check(f"{plot.name}.{name}", value)
+        _plain(value, f"the argument '{name}' is")
+    return given
 
 
 def require_seconds(after: object) -> None:
@@ -18,20 +85,8 @@ def require_seconds(after: object) -> None:
         raise InputError(f"something comes after a finite number of seconds, not {shown(after)}")
 
 
-def fitting(plot: ActionPlot, arguments: object) -> Mapping[str, Any]:
-    """What somebody hands to a plot from outside, if it may be handed to it.
-
-    Raises:
-        InputError: it is no mapping, a value is no plain data, or a number or truth value is wanted and it is none.
-    """
-    if not isinstance(arguments, Mapping):
-        raise InputError(f"arguments are a mapping of parameters' names to values, not {shown(arguments)}")
-    for name, value in arguments.items():
-        parameter = plot.parameters.get(name)
-        if parameter is not None and parameter.type in {"number", "boolean"}:
-            parameter.range.check(f"{plot.name}.{name}", value)
-        try:
-            json.dumps(value, allow_nan=False)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"the argument '{name}' is no plain data: {error}") from None
-    return arguments
+def _plain(value: Any, what: str) -> Any:
+    try:
+        return json.loads(json.dumps(value, allow_nan=False))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} no plain data: {error}") from None

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dsc.calls import Outcome
 from dsc.engine.steps import SendLater, Start, StartTimer
-from dsc.events import NO_ATTRIBUTES, Event
-from knowledge_base.errors import InputError
+from dsc.events import Event
 from knowledge_base.facts import Delta, Value
-from knowledge_base.language.inputs import shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,16 +70,3 @@ FromOutside = Event | KnowledgeMessage | ParameterMessage
 """What somebody hands in who is no part of the run."""
 Message = SkillMessage | TimerMessage | KnowledgeMessage | ParameterMessage | LateMessage | SendLater | Event
 """A `SendLater` is the chart's own event whose time has come."""
-
-
-def plain(event: Event) -> Event:
-    """The event with attributes of its own; raises `InputError` if it is none, or they are no plain data."""
-    if not isinstance(event, Event) or not isinstance(event.attributes, Mapping):
-        raise InputError(f'an event is an Event with its attributes, as Event("stop", {{}}), not {shown(event)}')
-    if not event.attributes:
-        return event if event.attributes is NO_ATTRIBUTES else event._replace(attributes=NO_ATTRIBUTES)
-    try:
-        attributes = json.loads(json.dumps(dict(event.attributes), allow_nan=False))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"the attributes of '{event.name}' are no plain data: {error}") from None
-    return event._replace(attributes=attributes)

@@ -11,30 +11,20 @@ from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
-from dsc.events import GAVE_UP, NO_PLAN, RESERVED, Event
-from dsc.sequencer import together
+from dsc.events import GAVE_UP, NO_PLAN, Event
+from dsc.sequencer import entrance, together
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
-from dsc.sequencer.entrance import fitting, require_seconds
 from dsc.sequencer.inbox import Inbox
-from dsc.sequencer.messages import (
-    FromOutside,
-    KnowledgeMessage,
-    LateMessage,
-    Message,
-    ParameterMessage,
-    SkillMessage,
-    plain,
-)
+from dsc.sequencer.messages import FromOutside, LateMessage, Message, SkillMessage
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.resuming import require_components, take_up
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
 from dsc.trace import Trace
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
-from knowledge_base.language.inputs import require_delta, require_text
 from knowledge_base.store import KnowledgeBase
 
 
@@ -154,10 +144,7 @@ class Sequencer:
                 plain data.
             StoreError: it could not be kept.
         """
-        event = plain(event)
-        if event.name in RESERVED:
-            raise InputError(f"the event '{event.name}' is fired by the executive itself", found=event.name)
-        self._hand_in(event, after)
+        self._hand_in(entrance.event(event), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
         """Hand in a change of knowledge that somebody else made; from the loop's own thread.
@@ -171,10 +158,7 @@ class Sequencer:
             InputError: the change contradicts the schema; nothing was changed.
             StoreError: it could not be kept.
         """
-        require_delta(delta)
-        require_text(author, "an author")
-        self.knowledge.overlay().apply(delta)
-        self._hand_in(KnowledgeMessage(delta, author), after)
+        self._hand_in(entrance.change(delta, author, self.knowledge), after)
 
     def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
         """Hand in what an operator says a parameter is worth from now on; from the loop's own thread.
@@ -193,18 +177,7 @@ class Sequencer:
             InputError: the value is out of range, breaks a relation, or is not for operators to say.
             StoreError: it could not be kept.
         """
-        require_text(owner, "the name of a component or plot")
-        require_text(name, "a parameter's name")
-        component = self.dispatcher.components.get(owner)
-        if component is not None:
-            component.check_parameter(name, value, "operator")
-        elif owner in self.library:
-            self.library.plot(owner).with_default(name, value, "operator")
-        else:
-            valid = [*self.dispatcher.components, *(plot.name for plot in self.library)]
-            raise UnknownNameError(f"there is no component or plot '{owner}'", found=owner, valid=valid)
-        assert isinstance(value, str | int | float | bool)  # noqa: S101  as everything that fits a range
-        self._hand_in(ParameterMessage(owner, name, value, of_plot=component is None), after)
+        self._hand_in(entrance.parameter(owner, name, value, self.dispatcher.components, self.library), after)
 
     async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
         """Run the plot until it ends, or until nothing can happen any more.
@@ -213,7 +186,7 @@ class Sequencer:
             InputError: the plot is unknown, or a parameter is missing or unknown.
             StoreError: the store cannot be written; what was committed before can be resumed.
         """
-        given = fitting(self.library.plot(plot), {} if arguments is None else arguments)
+        given = entrance.arguments(self.library.plot(plot), {} if arguments is None else arguments)
 
         async def begin() -> None:
             self._start(plot, given)
@@ -346,7 +319,7 @@ class Sequencer:
     # -- from outside ------------------------------------------------------------------------------------
 
     def _hand_in(self, message: FromOutside, after: float) -> None:
-        require_seconds(after)
+        entrance.require_seconds(after)
         if after <= 0:
             self._inbox.put(message)
             return
