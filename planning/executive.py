@@ -13,6 +13,7 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from dsc.components.component import Component, require_instances
+from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot

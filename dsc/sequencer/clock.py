@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import heapq
+import math
 import selectors
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -51,6 +52,10 @@ class LoopClock:
     def call_at(self, due: float, call: Callable[[], object]) -> asyncio.TimerHandle:
         """Let the loop make a call at that run time, or soon if it is over."""
         return asyncio.get_running_loop().call_at(due + self._start, call)
+
+    def timeout_at(self, due: float) -> asyncio.Timeout:
+        """A bound for the waiting in a block: `TimeoutError` at that run time; none if it never comes."""
+        return asyncio.timeout_at(due + self._start if math.isfinite(due) else None)
 
     @property
     def simulated(self) -> bool:

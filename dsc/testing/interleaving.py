@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dsc.chance import uniform
 from dsc.engine.steps import SendLater
 from dsc.events import Event
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, SkillMessage, TimerMessage
+from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.sequencer import Sequencer
 
 
@@ -65,5 +65,7 @@ def _source(message: Message) -> str:
             return f"author {message.author}"
         case TimerMessage() | SendLater():
             return "timers"
+        case ParameterMessage():
+            return "operator"
         case Event():
             return "outside"
