@@ -50,7 +50,7 @@ class Record(NamedTuple):
 
 
 Listener = Callable[[Record], None]
-"""Is told every record as it happens; must not block."""
+"""Is told every record as it happens; must not block. It may keep the record, whose data nobody changes."""
 
 
 class Trace:

@@ -15,17 +15,20 @@ from knowledge_base.pddl.files import read_text
 MOST_RECORDS = 2000
 MOST_CHARACTERS = 400_000
 """What goes out at once at most: a browser takes it in without a stutter."""
+MOST_WAITING = 20_000
+"""Records that nobody has read yet; older ones are kept as text, which takes less room."""
 
 
 class RecordLog:
     """The lines of a trace; the record with number `seq` is line `seq`, counted from 1 behind the header.
 
-    One thread appends, any thread reads. Nothing is ever taken away, so that readers need no queues of their own.
+    One thread appends, any thread reads. Nothing is ever taken away, so that readers need no queues of their own. A
+    record becomes text when it is read first: a run that appends does not wait for that.
     """
 
     def __init__(self, first_line: str | None = None, lines: Iterable[str] = (), *, live: bool = False) -> None:
         self.header: dict[str, Any] = json.loads(first_line or header())
-        self._lines = list(lines)
+        self._lines: list[str | Record] = list(lines)
         self._live = live
         self._lock = Lock()
         self._wakers: list[Callable[[], None]] = []
@@ -42,7 +45,9 @@ class RecordLog:
 
     def hear(self, record: Record) -> None:
         """Take in a record; a `Listener` of a trace."""
-        self._lines.append(record.to_line())
+        self._lines.append(record)
+        if len(self._lines) > MOST_WAITING:
+            self._text(len(self._lines) - MOST_WAITING)
         self.wake()
 
     def end(self) -> None:
@@ -73,12 +78,12 @@ class RecordLog:
         end, characters = seq - 1, 0
         last = min(len(self._lines), seq - 1 + MOST_RECORDS)
         while end < last and characters < MOST_CHARACTERS:
-            characters += len(self._lines[end])
             end += 1
+            characters += len(self._text(end))
         kept = self._batch
         if kept[:2] != (seq, end):  # browsers that have caught up get the same: it is put together once
             # The lines are JSON already; writing them anew would cost more than everything else here.
-            text = f'{{"type":"records","from":{seq},"records":[{",".join(self._lines[seq - 1 : end])}]}}'
+            text = f'{{"type":"records","from":{seq},"records":[{",".join(map(self._text, range(seq, end + 1)))}]}}'
             kept = self._batch = (seq, end, text)
         return kept[2], end + 1
 
@@ -90,7 +95,13 @@ class RecordLog:
         """
         if not 1 <= seq <= len(self._lines):
             raise InputError(f"there is no record {seq}; the last one is {len(self._lines)}")
-        return self._lines[seq - 1]
+        return self._text(seq)
+
+    def _text(self, seq: int) -> str:
+        said = self._lines[seq - 1]
+        if isinstance(said, Record):
+            said = self._lines[seq - 1] = said.to_line()
+        return said
 
     def record(self, seq: int) -> dict[str, Any]:
         """The record as data; errors as for `line`."""

@@ -24,6 +24,7 @@ from dsc.viewer.access import Access
 from dsc.viewer.answers import Answers
 from dsc.viewer.control import Control
 from dsc.viewer.records import RecordLog
+from dsc.viewer.rounds import Rounds
 from dsc.viewer.stream import Stream
 from knowledge_base.errors import InputError
 
@@ -47,6 +48,7 @@ class Viewer:
     def __init__(self, log: RecordLog, control: Control | None = None, port: int = 0) -> None:
         self._log, self._control = log, control
         self._answers = Answers(log)
+        self._rounds = Rounds(log, self._status)
         self._socket = _listening(port)
         self.port: int = self._socket.getsockname()[1]
         self.token = secrets.token_urlsafe(24)
@@ -129,7 +131,7 @@ class Viewer:
 
     async def _stream(self, socket: WebSocket) -> None:
         await socket.accept()
-        await Stream(socket, self._log, self._status, control=self._control is not None).serve()
+        await Stream(socket, self._log, self._rounds, control=self._control is not None).serve()
 
     def _status(self) -> dict[str, Any]:
         return {"ended": not self._log.live, "paused": self._control.paused if self._control else None}

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dsc.viewer.records import MOST_RECORDS, RecordLog
 
-FORMAT = "dsc-view/1"
-INTERVAL_S = 1 / 30
-"""Between two messages to a browser that has caught up."""
+if TYPE_CHECKING:
+    from dsc.viewer.rounds import Rounds
 
-Status = Callable[[], dict[str, Any]]
-Sleep = Callable[[float], Awaitable[None]]
+FORMAT = "dsc-view/1"
 
 
 class Stream:
@@ -26,34 +23,28 @@ class Stream:
     slow browser costs nobody anything, and one that is gone even less.
     """
 
-    def __init__(
-        self, socket: WebSocket, log: RecordLog, status: Status, *, control: bool, sleep: Sleep = asyncio.sleep
-    ) -> None:
-        self._socket, self._log, self._status, self._control, self._sleep = socket, log, status, control, sleep
+    def __init__(self, socket: WebSocket, log: RecordLog, rounds: Rounds, *, control: bool) -> None:
+        self._socket, self._log, self._rounds, self._control = socket, log, rounds, control
         self._cursor: int | None = None
-        self._more = asyncio.Event()
-        self._loop = asyncio.get_running_loop()
-        self._woken = False
+        self._sending: asyncio.Task[None] | None = None
         self._said: tuple[object, ...] | None = None
 
     async def serve(self) -> None:
         """Until the browser goes away."""
-        forget = self._log.on_more(self._wake)
-        writer = asyncio.create_task(self._write())
+        hello = {
+            "type": "hello", "format": FORMAT, "header": self._log.header, "first": 1, "last": len(self._log),
+            "live": self._log.live, "control": self._control,
+        }  # fmt: skip
         try:
-            await self._read()
+            await self._socket.send_text(json.dumps(hello))
+            with self._rounds.serving(self):
+                await self._read()
         except WebSocketDisconnect:
             pass
         finally:
-            forget()
-            writer.cancel()
-            await asyncio.gather(writer, return_exceptions=True)
-
-    def _wake(self) -> None:
-        """Called by the run's thread for each record: it pays for waking the loop once, however many follow."""
-        if not self._woken:
-            self._woken = True
-            self._loop.call_soon_threadsafe(self._more.set)
+            if self._sending is not None:
+                self._sending.cancel()
+                await asyncio.gather(self._sending, return_exceptions=True)
 
     async def _read(self) -> None:
         while True:
@@ -61,36 +52,34 @@ class Stream:
             seq = wanted.get("want") if isinstance(wanted, dict) else None
             if isinstance(seq, int) and seq >= 1:
                 self._cursor = seq
-                self._more.set()
+                self._rounds.wake()
 
-    async def _write(self) -> None:
-        hello = {
-            "type": "hello", "format": FORMAT, "header": self._log.header, "first": 1, "last": len(self._log),
-            "live": self._log.live, "control": self._control,
-        }  # fmt: skip
-        await self._send(hello)
-        while True:
-            await self._more.wait()
-            self._more.clear()
-            self._woken = False
-            await self._tell_status()
-            while self._cursor is not None and self._cursor <= len(self._log):
-                start = self._cursor
-                text, following = self._log.batch(start)
-                await self._socket.send_text(text)
-                if self._cursor == start:  # else the page wants others meanwhile
-                    self._cursor = following
-            await self._sleep(INTERVAL_S)
+    def offer(self, status: dict[str, Any]) -> None:
+        """Begin to send what is new, records and how the run is, unless something is still on its way."""
+        if self._sending is None and (news := self._news(status)):
+            self._sending = asyncio.create_task(self._send(news))
+            self._sending.add_done_callback(self._sent)
 
-    async def _tell_status(self) -> None:
-        """Say how the run is, if that is new, or how far, if that cannot be seen from the records that follow."""
-        status = {"type": "status", "live": self._log.live, **self._status()}
+    async def _send(self, news: list[str]) -> None:
+        for text in news:
+            await self._socket.send_text(text)
+
+    def _sent(self, sending: asyncio.Task[None]) -> None:
+        if not sending.cancelled() and sending.exception() is None:  # else the browser is gone, as `serve` will hear
+            self._sending = None
+            self._rounds.wake()
+
+    def _news(self, status: dict[str, Any]) -> list[str]:
+        """The messages that go next, if there is anything to say."""
         last = len(self._log)
+        # How far the run is can be seen from the records, unless more is to come than goes at once.
         behind = self._cursor is None or last - self._cursor >= MOST_RECORDS
         said = (status, last if behind else None)
+        news = []
         if said != self._said:
             self._said = said
-            await self._send({**status, "last": last})
-
-    async def _send(self, said: dict[str, Any]) -> None:
-        await self._socket.send_text(json.dumps(said))
+            news.append(json.dumps({"type": "status", **status, "last": last}))
+        if self._cursor is not None and self._cursor <= last:
+            text, self._cursor = self._log.batch(self._cursor)
+            news.append(text)
+        return news

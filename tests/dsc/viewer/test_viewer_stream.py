@@ -14,6 +14,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from dsc.trace import Record, header
 from dsc.viewer.records import MOST_RECORDS, RecordLog
+from dsc.viewer.rounds import LOOK_EVERY_S, SHARE, Pace, Rounds
 from dsc.viewer.stream import Stream
 
 
@@ -59,7 +60,8 @@ def streamed(use) -> None:
 
     async def going() -> None:
         browser, log, how = Browser(), RecordLog(header(), live=True), {"paused": None}
-        stream = Stream(browser, log, lambda: dict(how), control=False, sleep=lambda _: asyncio.sleep(0))  # type: ignore[arg-type]
+        rounds = Rounds(log, lambda: dict(how), sleep=lambda _: asyncio.sleep(0))
+        stream = Stream(browser, log, rounds, control=False)  # type: ignore[arg-type]
         serving = asyncio.create_task(stream.serve())
         await use(browser, log, how)
         browser.wants.put_nowait(None)
@@ -115,3 +117,80 @@ def test_of_a_status_only_the_latest_is_said_and_only_if_it_is_new():
         assert browser.records == [1, 2]
 
     streamed(use)
+
+
+class Clocks:
+    """Seconds that went by, that the viewer computed, and that a run beside it did."""
+
+    def __init__(self) -> None:
+        self.now = self.viewer = self.run = 0.0
+
+    def pace(self) -> Pace:
+        return Pace(lambda: self.now, lambda: self.viewer, lambda: self.viewer + self.run)
+
+
+def test_a_run_that_computes_keeps_all_but_a_fiftieth_of_the_time():
+    clocks = Clocks()
+    pace = clocks.pace()
+    pace.begin()
+    clocks.viewer += 0.01
+    clocks.run += 0.03
+    clocks.now += 0.04
+    while (rest := pace.rest()) > 0:
+        assert rest <= LOOK_EVERY_S
+        clocks.now += rest
+        clocks.run += rest
+    assert clocks.viewer / clocks.now == pytest.approx(SHARE)
+
+
+def test_a_run_that_waits_is_not_waited_for():
+    clocks = Clocks()
+    pace = clocks.pace()
+    pace.begin()
+    clocks.viewer += 1.0
+    clocks.now += 1.0
+    clocks.run += 0.9
+    assert pace.rest() > 0
+    clocks.now += LOOK_EVERY_S  # it is held now
+    assert pace.rest() == 0
+
+
+def test_all_browsers_are_offered_the_same_in_a_round_and_one_that_takes_nothing_holds_up_nobody():
+    async def going() -> None:
+        log, made = RecordLog(header(), live=True), []
+        rounds = Rounds(log, lambda: {"paused": None}, sleep=lambda _: asyncio.sleep(0))
+        browsers = [Browser() for _ in range(3)]
+        slow, *quick = browsers
+        for browser in browsers:
+            made.append(asyncio.create_task(Stream(browser, log, rounds, control=False).serve()))  # type: ignore[arg-type]
+            browser.wants.put_nowait({"want": 1})
+        for count in (5, 10, 15):
+            feed(log, 5)
+            for browser in quick:
+                await browser.takes(4)
+                assert browser.records == list(range(1, count + 1))
+        assert slow.got == []
+        await slow.takes(4)
+        assert slow.records == list(range(1, 16))
+        for browser in browsers:
+            browser.wants.put_nowait(None)
+        await asyncio.wait_for(asyncio.gather(*made), 10)
+
+    asyncio.run(going())
+
+
+def test_a_record_that_nobody_reads_becomes_text_only_when_many_wait(monkeypatch):
+    monkeypatch.setattr("dsc.viewer.records.MOST_WAITING", 2)
+    written: list[int] = []
+
+    class Told(Record):
+        def to_line(self) -> str:
+            written.append(self.seq)
+            return super().to_line()
+
+    log = RecordLog(header(), live=True)
+    for seq in (1, 2, 3):
+        log.hear(Told(seq, 0.0, "log", None, {"text": "x"}))
+    assert written == [1]
+    assert [log.record(seq)["seq"] for seq in (3, 1, 3)] == [3, 1, 3]
+    assert written == [1, 3]
