@@ -83,7 +83,8 @@ class RecordLog:
         kept = self._batch
         if kept[:2] != (seq, end):  # browsers that have caught up get the same: it is put together once
             # The lines are JSON already; writing them anew would cost more than everything else here.
-            text = f'{{"type":"records","from":{seq},"records":[{",".join(map(self._text, range(seq, end + 1)))}]}}'
+            lines = ",\n".join(map(self._text, range(seq, end + 1)))
+            text = f'{{"type":"records","from":{seq},"records":[\n{lines}\n]}}'
             kept = self._batch = (seq, end, text)
         return kept[2], end + 1
 

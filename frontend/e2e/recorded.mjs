@@ -26,7 +26,10 @@ after(async () => {
 
 const first = (is, from = 0) => records.find((rec) => rec.seq > from && is(rec));
 const moment = () => page.getByLabel("Moment", { exact: true });
-const goTo = (seq) => moment().fill(String(seq));
+const goTo = async (seq) => {
+  await moment().fill(String(seq));
+  await page.locator("body:not([aria-busy=true])").waitFor(); // panes that take turns have all had theirs
+};
 const shown = async () => Number(await moment().inputValue());
 const active = (path) => page.locator(`.react-flow__node[data-id="${path}"] > .state.active`);
 

@@ -12,6 +12,7 @@ import { Why } from "./panes/Why";
 import { World } from "./panes/World";
 import { useKeys } from "./keys";
 import { useControl, useKind, useSelection } from "./session";
+import { Turn } from "./turn";
 
 const TABS = ["Why", "Knowledge"] as const;
 
@@ -31,9 +32,9 @@ export function Page() {
   return (
     <div className={`page ${kind}`}>
       <Header />
-      {kind === "run" && <World />}
-      {kind === "run" && <PlanPane />}
-      {kind === "store" ? <Graph /> : <Chart />}
+      {kind === "run" && <Turn><World /></Turn>}
+      {kind === "run" && <Turn><PlanPane /></Turn>}
+      <Turn>{kind === "store" ? <Graph /> : <Chart />}</Turn>
       <section className="pane side" aria-label={tab}>
         <div className="tabs" role="tablist" aria-label="Side">
           {tabs.map((name) => (
@@ -42,8 +43,10 @@ export function Page() {
             </button>
           ))}
         </div>
-        {tab === "Why" && <Why />}
-        {tab === "Knowledge" && <Knowledge />}
+        <Turn>
+          {tab === "Why" && <Why />}
+          {tab === "Knowledge" && <Knowledge />}
+        </Turn>
         {tab === "Control" && <Controls />}
       </section>
       <Timeline />

@@ -4,6 +4,7 @@ import { useSyncExternalStore } from "react";
 import { History, type Mark } from "./core/history";
 import { beginning, type Moment } from "./core/moment";
 import { connect, type Hello, type Status } from "./link/socket";
+import { turns } from "./turn";
 
 export type Selection =
   | { readonly kind: "state"; readonly path: string }
@@ -123,6 +124,7 @@ export class Session {
 
   private set(change: Partial<Shown>): void {
     this.shown = { ...this.shown, ...change };
+    turns.show(this.shown.moment);
     for (const listener of this.listeners) listener();
   }
 
@@ -173,11 +175,6 @@ export const session = new Session();
 
 export function useShown(): Shown {
   return useSyncExternalStore(session.subscribe, session.get);
-}
-
-/** The moment alone: who uses no more is not drawn anew while records come in. */
-export function useMoment(): Moment {
-  return useSyncExternalStore(session.subscribe, () => session.get().moment);
 }
 
 export function useSelection(): Selection | null {

@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { CHECKPOINT_EVERY, History } from "../src/core/history";
 import { kinOf, nextOf } from "../src/core/plans";
+import { recordsIn } from "../src/core/reading";
 import type { Rec } from "../src/core/records";
 import { repeated, run } from "./run";
 
@@ -109,6 +110,27 @@ describe("history", () => {
     made.append(3, run.slice(2, 8));
     made.append(10, run.slice(9));
     expect(made.last).toBe(8);
+  });
+
+  it("has the last decision of a state, up to a record", () => {
+    const made = history(run);
+    expect(made.decisionOf("clear/execute/step_1", run.length)?.seq).toBe(8);
+    expect(made.decisionOf("clear/execute/step_1", 7)).toBeUndefined();
+    expect(made.decisionOf("clear", run.length)).toBeUndefined();
+  });
+
+  it("reads what is heavy when it is looked at, and has then what the record says", () => {
+    const heavy = [{ type: "scene", things: [{ id: "cup", label: "a, \"cup\"" }] }, { type: "decision", state: "clear", chosen: "above" }, { type: "log", text: "x" }];
+    const said = heavy.map((rec, i) => ({ seq: i + 1, t: i + 0.5, cause: i || null, ...rec }));
+    // As Python writes it: blanks behind colons and commas.
+    const lines = said.map(({ seq, t, type, cause, ...rest }) => `{"seq": ${seq}, "t": ${t}, "type": "${type}", "cause": ${cause}, ${JSON.stringify(rest).slice(1)}`);
+    const { from, records } = recordsIn(`{"type":"records","from":1,"records":[\n${lines.join(",\n")}\n]}`);
+    expect([from, records.length]).toEqual([1, 3]);
+    expect(records[0]).not.toHaveProperty("things");
+    const made = history(records);
+    expect(made.at(3).scene).toBe(1);
+    expect([1, 2, 3].map((seq) => made.record(seq))).toEqual(said);
+    expect(made.decisionOf("clear", 3)).toEqual(said[1]);
   });
 
   it("jumps to marks both ways", () => {

@@ -1,8 +1,9 @@
 /** Where the chart is looked at: as much as can be read around what is active, and that always. */
 
 import { useReactFlow, useStore } from "@xyflow/react";
-import { useEffect, useRef } from "react";
+import { useRef } from "react";
 import type { Moment } from "../core/moment";
+import { useCalmEffect } from "../turn";
 import { innermost } from "./drawn";
 import type { Box, Layout } from "./layout";
 import type { Visible } from "./visible";
@@ -19,7 +20,7 @@ export function useCamera(shown: Visible, layout: Layout | null, moment: Moment,
   const fitted = useRef("");
   const since = (id: string) => moment.active.get(id)?.seq ?? 0;
   const active = innermost(shown).sort((a, b) => since(b) - since(a)).join("\n"); // the one entered last comes first
-  useEffect(() => {
+  useCalmEffect(() => {
     if (!follow || !layout || !width || !height) return;
     const states = active.split("\n");
     const all = union(states.flatMap((id) => layout.boxes.get(id) ?? []));
@@ -41,7 +42,6 @@ export function useCamera(shown: Visible, layout: Layout | null, moment: Moment,
     if (zoom < READABLE || fitted.current !== "near" || !holds(pane, here)) void flow.setCenter(...near(here, outer, width, height));
     fitted.current = "near";
     // `shown` changes with every record; the picture changes with the layout.
-    // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [flow, layout, active, follow, width, height]);
 }
 

@@ -2,7 +2,8 @@
 
 import { advance, beginning, copyOf, type Moment } from "./moment";
 import type { PlotForm } from "./plots";
-import type { EndRec, Rec } from "./records";
+import { whole } from "./reading";
+import type { DecisionRec, EndRec, Rec } from "./records";
 
 /** Records that are replayed at most to get to a moment. */
 export const CHECKPOINT_EVERY = 500;
@@ -50,7 +51,8 @@ export class History {
   }
 
   record(seq: number): Rec | undefined {
-    return this.records[seq - 1];
+    const rec = this.records[seq - 1];
+    return rec && (this.records[seq - 1] = whole(rec));
   }
 
   /** The moment after the record; nobody else holds it. */
@@ -76,6 +78,16 @@ export class History {
     const end = firstAfter(this.marks[mark], seq);
     const found = this.marks[mark].slice(Math.max(0, end - most), end).reverse();
     return found.map((one) => this.record(one)!);
+  }
+
+  /** The last decision of a dynamic state up to `seq`. */
+  decisionOf(path: string, seq: number): DecisionRec | undefined {
+    const { decision } = this.marks;
+    for (let at = firstAfter(decision, seq) - 1; at >= 0; at--) {
+      const found = this.record(decision[at]!) as DecisionRec;
+      if (found.state === path) return found;
+    }
+    return undefined;
   }
 
   /** The last record at or before a time. */

@@ -5,7 +5,6 @@ import { splitPath, stepsOf, stepTexts, type PlotForm } from "./plots";
 import {
   written,
   type ActionRec,
-  type DecisionRec,
   type EventRec,
   type Fact,
   type KnowledgeRec,
@@ -14,7 +13,6 @@ import {
   type PlanFoundRec,
   type PlanOrderedRec,
   type Rec,
-  type SceneRec,
   type StepRec,
   type Taken,
   type Value,
@@ -41,8 +39,6 @@ export interface Moment {
   variables: Map<string, Named>;
   /** The transitions taken last, the latest first. */
   trail: readonly Trace[];
-  /** Path of a dynamic state -> its last decision record. */
-  decisions: Map<string, number>;
   /** Skills at work, by the seq of the record that started them. */
   working: Map<number, ActionRec>;
   plans: Plan[];
@@ -56,7 +52,8 @@ export interface Moment {
   nodes: Map<string, string>;
   facts: Map<string, Fact>;
   values: Map<string, readonly Value[]>;
-  scene: SceneRec | null;
+  /** The last record of the world as it is drawn. */
+  scene: number | null;
   end: number | null;
 }
 
@@ -64,7 +61,7 @@ export type Plots = ReadonlyMap<string, PlotForm>;
 
 export function beginning(): Moment {
   return {
-    seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [], decisions: new Map(),
+    seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [],
     working: new Map(), plans: [], running: new Map(), trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
     scene: null, end: null,
   };
@@ -74,7 +71,7 @@ export function beginning(): Moment {
 export function copyOf(moment: Moment): Moment {
   return {
     ...moment, active: new Map(moment.active), bound: new Map(moment.bound), variables: new Map(moment.variables),
-    decisions: new Map(moment.decisions), working: new Map(moment.working), plans: [...moment.plans], running: new Map(moment.running),
+    working: new Map(moment.working), plans: [...moment.plans], running: new Map(moment.running),
     nodes: new Map(moment.nodes), facts: new Map(moment.facts), values: new Map(moment.values),
   };
 }
@@ -89,12 +86,11 @@ export function advance(moment: Moment, rec: Rec, plots: Plots): void {
 
 const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots) => void>> = {
   step: stepped,
-  decision: (moment, rec: DecisionRec) => void moment.decisions.set(rec.state, rec.seq),
   world: worldBegins,
   knowledge: knowledgeChanged,
   action: acted,
   event: (moment, rec: EventRec) => void (rec.cause !== null && moment.working.delete(rec.cause)),
-  scene: (moment, rec: SceneRec) => void (moment.scene = rec),
+  scene: (moment, rec: Rec) => void (moment.scene = rec.seq),
   rule: (moment, rec: Rec) => void (moment.trouble = rec.seq),
   end: (moment, rec: Rec) => void (moment.end = rec.seq),
   "plan.broken": (moment, rec: Rec) => void (moment.broken = rec.seq),
@@ -125,7 +121,6 @@ function microstepped(moment: Moment, rec: StepRec, micro: Micro, plots: Plots):
     moment.active.delete(path);
     if (moment.bound.delete(path)) planLeft(moment, rec, path);
     moment.variables.delete(path);
-    moment.decisions.delete(path);
   }
   for (const { state, plot, hash } of micro.bound ?? []) {
     moment.bound.set(state, hash);

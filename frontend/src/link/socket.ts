@@ -1,5 +1,6 @@
 /** The socket over which records come; it asks anew where it was when it was lost. */
 
+import { recordsIn } from "../core/reading";
 import type { Rec } from "../core/records";
 
 export interface Hello {
@@ -18,12 +19,6 @@ export interface Status {
   readonly paused: string | null;
 }
 
-interface Records {
-  readonly type: "records";
-  readonly from: number;
-  readonly records: readonly Rec[];
-}
-
 export interface Listener {
   /** The number of the first record that is wanted. */
   wanted(): number;
@@ -38,14 +33,18 @@ const AGAIN_MS = 1500;
 export function connect(listener: Listener): void {
   const socket = new WebSocket(`ws://${location.host}/socket`);
   let over = false;
-  socket.onmessage = (message: MessageEvent<string>) => {
-    const said = JSON.parse(message.data) as Hello | Status | Records;
-    if (said.type === "hello") {
-      listener.hello(said);
-      socket.send(JSON.stringify({ want: listener.wanted() }));
-    } else if (said.type === "status") listener.status(said);
-    else if (said.from > listener.wanted()) socket.send(JSON.stringify({ want: listener.wanted() }));
-    else listener.records(said.from, said.records);
+  const want = () => socket.send(JSON.stringify({ want: listener.wanted() }));
+  socket.onmessage = ({ data }: MessageEvent<string>) => {
+    if (data.startsWith('{"type":"records"')) {
+      const { from, records } = recordsIn(data);
+      if (from > listener.wanted()) want();
+      else listener.records(from, records);
+      return;
+    }
+    const said = JSON.parse(data) as Hello | Status;
+    if (said.type === "status") return listener.status(said);
+    listener.hello(said);
+    want();
   };
   socket.onclose = () => {
     if (over) return;

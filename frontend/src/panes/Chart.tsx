@@ -12,7 +12,8 @@ import { visible, type ChartNode, type View, type Visible } from "../chart/visib
 import { WayEdge } from "../chart/WayEdge";
 import type { Moment } from "../core/moment";
 import { joinPath } from "../core/plots";
-import { session, useMoment, useSelection, type Selection } from "../session";
+import { session, useSelection, type Selection } from "../session";
+import { turns, useMoment } from "../turn";
 import { seconds } from "./Timeline";
 
 const NODES = { state: StateNode };
@@ -94,8 +95,11 @@ function useLayout(shown: Visible): Layout | null {
   useEffect(() => {
     if (known || shown.nodes.length === 0) return;
     let wanted = true;
-    void layoutOf(shown).then((layout) => wanted && layout && setDone({ key, layout }));
-    return () => void (wanted = false);
+    const forget = turns.whenCalm(() => void layoutOf(shown).then((layout) => wanted && layout && setDone({ key, layout })));
+    return () => {
+      wanted = false;
+      forget();
+    };
     // What is active changes `shown` often; only another picture needs another layout.
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [key, known]);

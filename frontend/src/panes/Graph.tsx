@@ -1,6 +1,7 @@
 /** A store of knowledge: what there is, by type, and what one thing is related to. */
 
-import { session, useMoment, useSelection } from "../session";
+import { session, useSelection } from "../session";
+import { useMoment } from "../turn";
 import { LARGE, Neighbourhood } from "./Neighbourhood";
 
 /** Of one type, before the rest is only counted: the facts beside it can be filtered. */

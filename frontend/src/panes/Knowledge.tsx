@@ -4,7 +4,8 @@ import { useEffect, useMemo, useState } from "react";
 import { deciding } from "../core/explanations";
 import { written, type Fact, type KnowledgeRec, type Value } from "../core/records";
 import { query, type Answer } from "../link/requests";
-import { session, useKind, useMoment, useSelection } from "../session";
+import { session, useKind, useSelection } from "../session";
+import { useMoment } from "../turn";
 import { Neighbourhood, SMALL } from "./Neighbourhood";
 import { changed, RecordLink, Tree } from "./parts";
 

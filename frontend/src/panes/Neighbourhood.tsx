@@ -1,7 +1,8 @@
 /** What is said of a thing, drawn: the thing in the middle, what it is related to around it. */
 
 import { written, type Fact } from "../core/records";
-import { session, useMoment } from "../session";
+import { session } from "../session";
+import { useMoment } from "../turn";
 
 interface Size {
   readonly wide: number;

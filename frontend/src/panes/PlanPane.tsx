@@ -1,9 +1,10 @@
 /** The plan: what is done, at work, next; plans that were given up are grey. */
 
-import { useEffect, useRef } from "react";
+import { useRef } from "react";
 import { isFinished, kinOf, nextOf, type Plan, type PlanStep } from "../core/plans";
 import { lanesOf } from "../core/why";
-import { session, useMoment, useSelection } from "../session";
+import { session, useSelection } from "../session";
+import { useCalmEffect, useMoment } from "../turn";
 
 const SIGNS = { waiting: "·", running: "▶", done: "✓", failed: "✕", skipped: "»", stopped: "■" } as const;
 const EARLIER = 12;
@@ -94,7 +95,7 @@ function Step({ plan, number, step, next, lane, chosen, kin }: StepProps) {
   const moment = useMoment();
   const row = useRef<HTMLButtonElement>(null);
   const running = step.state === "running";
-  useEffect(() => {
+  useCalmEffect(() => {
     if (running) row.current?.scrollIntoView({ block: "nearest" });
   }, [running]);
   const state = next ? "next" : step.state;

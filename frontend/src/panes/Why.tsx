@@ -1,7 +1,8 @@
 /** Why: what is selected and what led to it; with nothing selected, the last decision. */
 
 import type { Rec } from "../core/records";
-import { session, useMoment, useSelection } from "../session";
+import { session, useSelection } from "../session";
+import { useMoment } from "../turn";
 import { Causes, RecordLink } from "./parts";
 import { WhyPlan, WhyStep } from "./WhyPlan";
 import { WhyRecord } from "./WhyRecord";

@@ -2,9 +2,10 @@
 
 import { isFinished, type Plan } from "../core/plans";
 import { joinPath } from "../core/plots";
-import type { DecisionRec, PlanFoundRec } from "../core/records";
+import type { PlanFoundRec } from "../core/records";
 import { changesBetween, conditionsInto } from "../core/why";
-import { session, useMoment } from "../session";
+import { session } from "../session";
+import { useMoment } from "../turn";
 import { Causes, changed, Facts, RecordLink } from "./parts";
 import { seconds } from "./Timeline";
 import { Decision, WhyRecord } from "./WhyRecord";
@@ -139,6 +140,6 @@ function Brought({ plan, number }: { plan: Plan; number: number }) {
 function HowDone({ plan, name }: { plan: Plan; name: string }) {
   const moment = useMoment();
   const path = joinPath(plan.at ?? "", name);
-  const made = session.history.before(moment.seq, "decision", 200).find((rec) => (rec as DecisionRec).state === path && rec.seq > plan.seq);
-  return made ? <><h3>How it is done</h3><Decision rec={made as DecisionRec} /></> : null;
+  const made = session.history.decisionOf(path, moment.seq);
+  return made && made.seq > plan.seq ? <><h3>How it is done</h3><Decision rec={made} /></> : null;
 }

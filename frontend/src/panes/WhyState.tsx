@@ -1,8 +1,9 @@
 /** A state: since when, with which parameters and variables, and why its content was chosen. */
 
 import { splitPath, statesOf, type PlotForm, type StateForm } from "../core/plots";
-import type { DecisionRec, Named } from "../core/records";
-import { session, useMoment } from "../session";
+import type { Named } from "../core/records";
+import { session } from "../session";
+import { useMoment } from "../turn";
 import { Values } from "./parts";
 import { Links } from "./WhyPlan";
 import { seconds } from "./Timeline";
@@ -18,7 +19,7 @@ export function WhyState({ path }: { path: string }) {
   const content = history.plots.get(moment.bound.get(path) ?? "");
   const plan = moment.running.get(holder);
   const step = plan === undefined ? undefined : moment.plans[plan]!.names.get(name);
-  const decision = moment.decisions.get(path) ?? lastDecision(path, moment.seq);
+  const decision = state?.kind === "dynamic" ? history.decisionOf(path, moment.seq) : undefined;
   return (
     <div aria-label="State">
       <div className="what">
@@ -30,7 +31,7 @@ export function WhyState({ path }: { path: string }) {
       {plan !== undefined && step !== undefined && <Links at={plan} number={step} />}
       {content && <Running path={path} content={content} />}
       {moment.variables.has(holder) && <><h3>{`Variables of ${plot?.plot ?? "its plot"}`}</h3><Values values={used(moment.variables.get(holder)!)} /></>}
-      {decision !== undefined && <><h3>Decision</h3><Decision rec={history.record(decision) as DecisionRec} /></>}
+      {decision !== undefined && <><h3>Decision</h3><Decision rec={decision} /></>}
       {state && <Leads form={state.form} />}
     </div>
   );
@@ -71,8 +72,4 @@ function Leads({ form }: { form: StateForm }) {
       </ul>
     </>
   );
-}
-
-function lastDecision(path: string, seq: number): number | undefined {
-  return session.history.before(seq, "decision", 300).find((rec) => (rec as DecisionRec).state === path)?.seq;
 }

@@ -1,15 +1,16 @@
 /** The world from above, as a domain's `scene` records describe it: metres, y upwards. */
 
 import { memo } from "react";
-import type { Thing } from "../core/records";
-import { session, useMoment } from "../session";
+import type { SceneRec, Thing } from "../core/records";
+import { session } from "../session";
+import { useMoment } from "../turn";
 
 const MARGIN = 0.12;
 const NESTED = 0.075;
 
 export function World() {
   const moment = useMoment();
-  const things = moment.scene?.things ?? [];
+  const things = moment.scene === null ? [] : (session.history.record(moment.scene) as SceneRec).things;
   const busy = new Set([...moment.working.values()].flatMap((one) => Object.values(one.arguments ?? {}).map(String)));
   const ever = session.history.marks.scene.length > 0;
   return (
