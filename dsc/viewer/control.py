@@ -155,7 +155,7 @@ class Control:
     def _after_step(self, step: Step) -> None:
         for bound in (bound for micro in step.microsteps for bound in micro.bound if bound.plot.generated):
             prefix = f"{bound.state}/" if bound.state else ""
-            for name, state in bound.plot.states.items():
+            for name, state, _ in bound.plot.walk():
                 self._plan_steps[prefix + name] = state.about or ""
         if self._steps:
             self._steps -= 1
@@ -182,7 +182,7 @@ class Control:
         """Stand still until somebody says go on."""
         if self._steps != 0 or self._go is None:
             return
-        self.paused = self.paused or "asked to"
+        self.paused = self.paused or "on request"
         self._go.clear()
         self._changed()
         with LoopClock().hold():

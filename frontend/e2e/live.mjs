@@ -33,7 +33,7 @@ test("the page follows the run, and shows the change of the active state as it h
 test("a held run stands still and says so, and goes on", { timeout: 60_000 }, async () => {
   await page.getByRole("tab", { name: "Control" }).click();
   await page.getByRole("button", { name: "Hold it" }).click();
-  await page.getByRole("banner").getByText("stands still: asked to").waitFor({ timeout: 40_000 });
+  await page.getByRole("banner").getByText("stands still: on request").waitFor({ timeout: 40_000 });
   await page.getByRole("button", { name: "Go on" }).click();
   await page.getByRole("banner").getByText("stands still").waitFor({ state: "detached" });
 });

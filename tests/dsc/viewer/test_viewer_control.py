@@ -10,9 +10,15 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 
 from domains.clean_up_table.deployment import deploy
 from domains.clean_up_table.scenario import Scenario
+from dsc import parse_plot
+from dsc.dynamic.library import Library
+from dsc.events import Event
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.sequencer.sequencer import Sequencer
+from dsc.trace import Trace
 from dsc.viewer.control import Control
 from dsc.viewer.records import RecordLog
-from knowledge_base import InputError
+from knowledge_base import InputError, KnowledgeBase, Schema
 
 
 class Watched:
@@ -89,6 +95,49 @@ def test_a_breakpoint_holds_the_run_where_it_says(on, record) -> None:
     assert met
     watched.control.obey({"do": "unbreak", "number": 1})
     assert watched.to_the_end().goal_reached
+
+
+def test_a_step_of_a_plan_is_found_in_any_of_its_regions() -> None:
+    """Two robots: each has a region of the plan's plot."""
+    held: list[str] = []
+
+    def changed() -> None:
+        if control.paused and not held:
+            held.append(control.paused)
+            threading.Thread(target=control.obey, args=({"do": "resume"},)).start()  # as a page does: not in the run
+
+    control = Control(changed)
+
+    async def main(knowledge: KnowledgeBase) -> object:
+        clock = LoopClock()
+        plan = parse_plot(PLAN).model_copy(update={"generated": True})
+        sequencer = Sequencer(Library([plan]), knowledge, [], clock, Trace(clock.now))
+        control.attach(sequencer)
+        sequencer.post(Event("go"), after=1.0)
+        sequencer.post(Event("go"), after=2.0)
+        return await sequencer.run("plan")
+
+    control.obey({"do": "break", "on": {"plan_step": "(drive bert)"}})
+    with KnowledgeBase.open(Schema.parse("(define (domain d))")) as knowledge:
+        assert run_simulated(main(knowledge)).finished
+    assert held == ["plan step (drive bert)"]
+
+
+PLAN = """
+plot: plan
+receives: {go: }
+states:
+  work:
+    regions:
+      anna: {states: {step_1: {about: (drive anna), on: {go: over_1}}, over_1: {final: true}}}
+      bert:
+        states:
+          start: {on: {go: step_2}}
+          step_2: {about: (drive bert), on: {go: over_2}}
+          over_2: {final: true}
+    on: {done: over}
+  over: {final: true}
+"""
 
 
 def test_events_and_facts_are_handed_in() -> None:

@@ -105,7 +105,7 @@ def test_of_a_status_only_the_latest_is_said_and_only_if_it_is_new():
     async def use(browser: Browser, log: RecordLog, how: dict[str, Any]) -> None:
         browser.wants.put_nowait({"want": 1})
         await browser.takes(3)
-        for reason in ("asked to", "state a", "state b"):
+        for reason in ("on request", "state a", "state b"):
             how["paused"] = reason
             log.wake()
         feed(log, 1)
