@@ -9,6 +9,7 @@ export default defineConfig({
     outDir: "../dsc/viewer/static",
     emptyOutDir: true,
     target: "es2023",
+    cssTarget: ["chrome123", "firefox120", "safari17.5"], // which know light-dark(): drawings are saved in light colours
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     license: { fileName: "licenses.md" },

@@ -33,6 +33,12 @@ const goTo = async (seq) => {
 const shown = async () => Number(await moment().inputValue());
 const active = (path) => page.locator(`.react-flow__node[data-id="${path}"] > .state.active`);
 
+/** What a button of that name saves. */
+async function saved(name) {
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name, exact: true }).click()]);
+  return readFileSync(await download.path(), "utf8");
+}
+
 /** The configuration after a record, worked out here from the steps alone. */
 function configuration(seq) {
   const paths = new Set();
@@ -110,8 +116,7 @@ test("the chart of a moment is saved as an SVG, with all that is open in it", as
   const moment = first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_2")));
   await goTo(moment.seq);
   await active("clear/execute/step_2").waitFor();
-  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "SVG" }).click()]);
-  const picture = readFileSync(await download.path(), "utf8");
+  const picture = await saved("SVG");
   assert.match(picture, new RegExp(`after record ${moment.seq}`));
   const drawn = await page.evaluate((text) => {
     const made = new DOMParser().parseFromString(text, "image/svg+xml");
@@ -120,6 +125,32 @@ test("the chart of a moment is saved as an SVG, with all that is open in it", as
   assert.equal(drawn.wrong, undefined);
   assert.ok(drawn.bold.some((text) => text.startsWith("◆ 2 ")));
   assert.ok(drawn.taken > 0);
+});
+
+test("world, plan and chart of a moment are saved as one SVG, in light colours also from a dark page", async () => {
+  const moment = first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_2")));
+  await goTo(moment.seq);
+  await active("clear/execute/step_2").waitFor();
+  await page.emulateMedia({ colorScheme: "dark" });
+  const picture = await saved("SVG of all");
+  await page.emulateMedia({ colorScheme: "light" });
+  const [plan] = records.filter((rec) => rec.type === "plan.ordered" && rec.seq < moment.seq).slice(-1);
+  const drawn = await page.evaluate((text) => {
+    const made = new DOMParser().parseFromString(text, "image/svg+xml");
+    const robot = made.querySelector("[aria-label=robot] circle");
+    return {
+      wrong: made.querySelector("parsererror")?.textContent,
+      texts: [...made.querySelectorAll("text")].map((one) => one.textContent),
+      robot: robot?.getAttribute("style"),
+      classes: [...made.querySelectorAll("svg svg [class]")].length,
+    };
+  }, picture);
+  assert.equal(drawn.wrong, undefined);
+  plan.steps.forEach((step, i) => assert.ok(drawn.texts.includes(`${i + 1} ${step.slice(1, -1)}`), step));
+  assert.ok(drawn.texts.some((text) => text.startsWith("◆ 2 ")));
+  assert.ok(drawn.texts.includes("sink"));
+  assert.match(drawn.robot, /fill:\s*rgb\(0, 114, 178\)/);
+  assert.equal(drawn.classes, 0);
 });
 
 test("the plan is there before and after a replan, with what broke it and who did", async () => {

@@ -2,6 +2,8 @@
 
 export type StepState = "waiting" | "running" | "done" | "failed" | "skipped" | "stopped";
 
+export const SIGNS: Readonly<Record<StepState, string>> = { waiting: "·", running: "▶", done: "✓", failed: "✕", skipped: "»", stopped: "■" };
+
 export interface PlanStep {
   readonly text: string;
   readonly state: StepState;

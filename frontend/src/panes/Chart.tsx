@@ -1,12 +1,11 @@
 /** The chart: what is active, what was taken lately; open, close, zoom in. */
 
-import { Controls as Zoom, MiniMap, ReactFlow, ReactFlowProvider } from "@xyflow/react";
+import { MiniMap, ReactFlow, ReactFlowProvider } from "@xyflow/react";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import { useCamera } from "../chart/camera";
 import { drawnEdges, drawnNodes, type Acts } from "../chart/drawn";
 import { knownLayout, layoutOf } from "../chart/elk";
 import { signature, type Layout } from "../chart/layout";
-import { pictureOf } from "../chart/picture";
 import { StateNode } from "../chart/StateNode";
 import { visible, type ChartNode, type View, type Visible } from "../chart/visible";
 import { WayEdge } from "../chart/WayEdge";
@@ -14,12 +13,12 @@ import type { Moment } from "../core/moment";
 import { joinPath } from "../core/plots";
 import { session, useSelection, type Selection } from "../session";
 import { turns, useMoment } from "../turn";
-import { seconds } from "./Timeline";
+import { ChartTools } from "./ChartTools";
 
 const NODES = { state: StateNode };
 const EDGES = { way: WayEdge };
 /** From so many states on, a small map says where one is. */
-const MAPPED = 60;
+const MAPPED = 40;
 const MAP = { width: 130, height: 96 };
 const PLAIN: View = { focus: "", open: new Map(), all: new Set() };
 
@@ -48,11 +47,10 @@ function ChartPane() {
     <section className="pane chart" aria-label="Chart">
       <h2>
         <Crumbs focus={focus} go={(path) => acts.zoom(path)} />
-        <span className="tools">
-          <label><input type="checkbox" checked={follow} onChange={(event) => setFollow(event.target.checked)} /> follow</label>
-          <button onClick={() => setView((before) => ({ ...PLAIN, focus: before.focus }))}>reset</button>
-          <button onClick={() => save(pictureOf(nodes, edges, captionOf(moment, focus)), moment.seq)} title="This chart at this moment, as a drawing">SVG</button>
-        </span>
+        <ChartTools
+          nodes={nodes} edges={edges} focus={focus} follow={follow} setFollow={setFollow}
+          reset={() => setView((before) => ({ ...PLAIN, focus: before.focus }))}
+        />
       </h2>
       <div className="flow">
         <Tips />
@@ -63,7 +61,6 @@ function ChartPane() {
           onlyRenderVisibleElements={nodes.length > 150} zoomOnDoubleClick={false} disableKeyboardA11y
           onMove={(event) => event && setFollow(false)} proOptions={{ hideAttribution: true }}
         >
-          <Zoom showInteractive={false} />
           {nodes.length > MAPPED && (
             <MiniMap pannable zoomable style={MAP} ariaLabel="The whole chart" nodeClassName={mapped} />
           )}
@@ -144,17 +141,4 @@ function Tips() {
       </defs>
     </svg>
   );
-}
-
-function captionOf(moment: Moment, focus: string): string {
-  const run = String(session.get().header.run ?? "a run");
-  return `${run}${focus && `, ${focus}`}: ${seconds(moment.t)}, after record ${moment.seq}`;
-}
-
-function save(picture: string, seq: number): void {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([picture], { type: "image/svg+xml" }));
-  link.download = `chart-${seq}.svg`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }

@@ -1,12 +1,11 @@
 /** The plan: what is done, at work, next; plans that were given up are grey. */
 
 import { useRef } from "react";
-import { isFinished, kinOf, nextOf, type Plan, type PlanStep } from "../core/plans";
+import { isFinished, kinOf, nextOf, SIGNS, type Plan, type PlanStep } from "../core/plans";
 import { lanesOf } from "../core/why";
 import { session, useSelection } from "../session";
 import { useCalmEffect, useMoment } from "../turn";
 
-const SIGNS = { waiting: "·", running: "▶", done: "✓", failed: "✕", skipped: "»", stopped: "■" } as const;
 const EARLIER = 12;
 
 export function PlanPane() {
