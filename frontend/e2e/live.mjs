@@ -62,10 +62,13 @@ test("a fact that is handed in is known, and stops the run at a breakpoint on it
 
 test("an event that is handed in is one of the run", { timeout: 60_000 }, async () => {
   await page.getByLabel("Send: what").selectOption("event");
-  await page.getByLabel("Send: which").fill("somebody_waves");
+  await page.getByLabel("Send: which").fill("somebody_waves hands=2");
   await page.getByRole("button", { name: "Send" }).click();
   await page.getByRole("tab", { name: "Why" }).click();
-  await page.getByText("somebody_waves from").first().waitFor({ timeout: 40_000 });
+  await page.getByText("somebody_waves from").first().click({ timeout: 40_000 });
+  await page.getByRole("row", { name: 'attributes {"hands":2}' }).waitFor();
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("End");
 });
 
 test("who goes back is no longer taken along, until he goes to the end", { timeout: 60_000 }, async () => {

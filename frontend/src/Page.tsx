@@ -47,7 +47,7 @@ export function Page() {
           {tab === "Why" && <Why />}
           {tab === "Knowledge" && <Knowledge />}
         </Turn>
-        {tab === "Control" && <Controls />}
+        {tab === "Control" && <Turn><Controls /></Turn>}
       </section>
       <Timeline />
     </div>

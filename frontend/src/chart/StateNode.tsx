@@ -43,7 +43,7 @@ export const StateNode = memo(function StateNode({ data }: NodeProps<StateNodeTy
                 {progress === "failed" && <span className="mark failed" aria-hidden="true">✕</span>}
                 {node.kind === "submachine" && <span className="mark" aria-hidden="true">▣</span>}
                 <span>{shownName(node)}</span>
-                {node.expanded && node.content && <em>{node.content}</em>}
+                {node.expanded && node.content && node.content !== node.name && <em>{node.content}</em>}
               </>
             )}
           </button>

@@ -1,8 +1,10 @@
 /** A live run in the hands of who watches it, where that was allowed: hold it, stop it at places, hand things in. */
 
-import { useCallback, useEffect, useState } from "react";
+import { useCallback, useEffect, useId, useState } from "react";
+import { eventIn } from "../core/handed";
 import { control, type Break } from "../link/requests";
 import { useShown } from "../session";
+import { useMoment } from "../turn";
 
 const KINDS = [["state", "clear/execute"], ["event", "grasp_failed"], ["condition", "(holding cup1)"], ["plan_step", "(drive table sink)"]] as const;
 
@@ -17,9 +19,12 @@ export function Controls() {
     }, (error: Error) => setWrong(error.message));
   }, []);
   useEffect(() => send({ do: "breaks" }), [send]);
+  const { active, plans } = useMoment();
   const path = selection?.kind === "state" ? selection.path : null;
+  const step = selection?.kind === "step" ? plans[selection.plan]?.steps[selection.step]?.text : undefined;
+  const known = { state: [...active.keys()], plan_step: plans.at(-1)?.steps.map((step) => step.text) ?? [] };
   return (
-    <div className="scrolls control" role="tabpanel">
+    <fieldset className="scrolls control" role="tabpanel" disabled={!live}>
       {wrong && <p className="bad note" role="alert">{wrong}</p>}
       {!live && <p className="quiet">The run is over.</p>}
       <h3>The run</h3>
@@ -35,37 +40,48 @@ export function Controls() {
           <li key={one.number}>{one.on} <button aria-label={`Remove ${one.on}`} onClick={() => send({ do: "unbreak", number: one.number })}>✕</button></li>
         ))}
       </ul>
-      {path !== null && <button onClick={() => send({ do: "break", on: { state: path } })}>{`the selected state ${path}`}</button>}
-      <Choice kinds={KINDS} act={(kind, text) => send({ do: "break", on: { [kind]: text } })} verb="Add" />
+      {path !== null && <button onClick={() => send({ do: "break", on: { state: path } })}>{`Add the selected state ${path}`}</button>}
+      {step !== undefined && <button onClick={() => send({ do: "break", on: { plan_step: step } })}>{`Add the selected step ${step}`}</button>}
+      <Choice kinds={KINDS} known={known} act={(kind, text) => send({ do: "break", on: { [kind]: text } })} verb="Add" wrong={setWrong} />
       <h3>Hand in</h3>
       <Choice
-        kinds={[["event", "stop"], ["tell", "(missing cup1)"], ["retract", "(missing cup1)"]]} verb="Send"
-        act={(kind, text) => send(kind === "event" ? { do: "event", name: text, attributes: {} } : { do: kind, statements: [text] })}
+        kinds={[["event", "low level=0.2"], ["tell", "(missing cup1)"], ["retract", "(missing cup1)"]]} verb="Send" wrong={setWrong}
+        act={(kind, text) => send(kind === "event" ? { do: "event", ...eventIn(text) } : { do: kind, statements: [text] })}
       />
-    </div>
+    </fieldset>
   );
 }
 
 interface ChoiceProps {
+  /** Of a kind, what there is. */
+  readonly known?: Readonly<Record<string, readonly string[]>>;
   readonly kinds: readonly (readonly [string, string])[];
   readonly act: (kind: string, text: string) => void;
   readonly verb: string;
+  readonly wrong: (why: string) => void;
 }
 
-function Choice({ kinds, act, verb }: ChoiceProps) {
+function Choice({ kinds, known = {}, act, verb, wrong }: ChoiceProps) {
+  const list = useId();
   const [kind, setKind] = useState(kinds[0]![0]);
   const [text, setText] = useState("");
   const example = kinds.find(([name]) => name === kind)?.[1];
   const submit = (event: React.FormEvent) => {
     event.preventDefault();
-    if (text.trim()) act(kind, text.trim());
+    if (!text.trim()) return;
+    try {
+      act(kind, text.trim());
+    } catch (error) {
+      wrong((error as Error).message);
+    }
   };
   return (
     <form className="row" onSubmit={submit}>
       <select aria-label={`${verb}: what`} value={kind} onChange={(event) => setKind(event.target.value)}>
         {kinds.map(([name]) => <option key={name} value={name}>{name.replace("_", " ")}</option>)}
       </select>
-      <input aria-label={`${verb}: which`} placeholder={example} value={text} spellCheck={false} onChange={(event) => setText(event.target.value)} />
+      <input aria-label={`${verb}: which`} placeholder={example} list={list} value={text} spellCheck={false} onChange={(event) => setText(event.target.value)} />
+      <datalist id={list}>{(known[kind] ?? []).map((one) => <option key={one} value={one} />)}</datalist>
       <button>{verb}</button>
     </form>
   );

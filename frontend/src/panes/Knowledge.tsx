@@ -25,7 +25,7 @@ export function Knowledge() {
     <div className="scrolls knowledge" role="tabpanel">
       {thing !== null && kind !== "store" && <Neighbourhood about={thing} size={SMALL} />}
       <input
-        type="search" aria-label="Filter or ask" placeholder={`a word, or a condition: ${example(moment.facts)}`} value={text}
+        type="search" aria-label="Filter or ask" placeholder={`a word, or ${example(moment.facts)}`} value={text}
         spellCheck={false} onChange={(event) => setText(event.target.value)}
       />
       {asking ? <Answers seq={moment.seq} text={text} /> : (

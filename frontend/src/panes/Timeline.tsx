@@ -79,7 +79,8 @@ function Marks({ last }: { last: number }) {
       made.height = made.clientHeight * scale;
       pen.scale(scale, scale);
       for (const [mark, y, height] of ROWS) {
-        pen.fillStyle = getComputedStyle(made).getPropertyValue(`--${mark}`);
+        made.style.color = `var(--${mark})`; // as a colour that a canvas knows: it is told of no variables
+        pen.fillStyle = getComputedStyle(made).color;
         const at = new Set(session.history.marks[mark].map((seq) => Math.round((seq / Math.max(1, last)) * (width - 16)) + 8));
         for (const x of at) pen.fillRect(x - 1, y, 2, height);
       }

@@ -7,6 +7,8 @@ import { useMoment } from "../turn";
 
 const MARGIN = 0.12;
 const NESTED = 0.075;
+/** Metres; the labels of things that lie closer could not be read. */
+const CLOSE = 0.18;
 
 export function World() {
   const moment = useMoment();
@@ -37,6 +39,7 @@ const Scene = memo(function Scene({ things, busy, moving }: { things: readonly T
   const order = [...things].sort((a, b) => rank(a) - rank(b) || (depths.get(a.id) ?? 0) - (depths.get(b.id) ?? 0));
   const robot = things.find((thing) => thing.shape === "robot");
   const held = new Set(things.map((thing) => thing.in));
+  const crowd = crowded(things);
   return (
     <svg viewBox={`${left} ${-high} ${right - left} ${high - low}`} role="group" aria-label={`The world from above: ${things.length} things`}>
       {robot && moving && <line className="way" x1={robot.x} y1={-robot.y} x2={moving.x} y2={-moving.y + (moving.depth ?? 0) / 2 + 0.2} />}
@@ -55,7 +58,10 @@ const Scene = memo(function Scene({ things, busy, moving }: { things: readonly T
           >
             <title>{`${thing.label}${thing.in ? ` in ${thing.in}` : ""}`}</title>
             <Shape thing={thing} />
-            <Label thing={thing} quiet={thing.in !== undefined && !inHand} stacked={held.has(thing.id)} />
+            <Label
+              thing={thing} quiet={(thing.in !== undefined && !inHand) || (crowd.has(thing.id) && !busy.has(thing.id))}
+              stacked={held.has(thing.id)} count={countOn(thing, things, crowd)}
+            />
           </g>
         );
       })}
@@ -67,6 +73,19 @@ const Scene = memo(function Scene({ things, busy, moving }: { things: readonly T
 function rightOf(thing: Thing): number {
   if (thing.width === undefined) return thing.x + 0.25 + (thing.in === undefined ? thing.label.length * 0.05 : 0);
   return Math.max(thing.x + thing.width / 2, thing.x - thing.width / 2 + thing.label.length * 0.12);
+}
+
+/** Things that lie too close to others: how many there are is said where they lie. */
+function crowded(things: readonly Thing[]): Set<string> {
+  const loose = things.filter((thing) => rank(thing) === 2 && thing.in === undefined);
+  const near = (one: Thing, other: Thing) => one !== other && Math.hypot(one.x - other.x, one.y - other.y) < CLOSE;
+  return new Set(loose.filter((one) => loose.some((other) => near(one, other))).map((one) => one.id));
+}
+
+/** How many things lie on a place, if some of them are crowded. */
+function countOn({ x, y, width = 0, depth = 0 }: Thing, things: readonly Thing[], crowd: ReadonlySet<string>): number {
+  const here = things.filter((one) => rank(one) === 2 && Math.abs(one.x - x) <= width / 2 && Math.abs(one.y - y) <= depth / 2);
+  return here.some((one) => crowd.has(one.id)) ? here.length : 0;
 }
 
 function rank(thing: Thing): number {
@@ -121,9 +140,11 @@ function Shape({ thing }: { thing: Thing }) {
   return <circle className="body" r={0.075} />;
 }
 
-function Label({ thing, quiet, stacked }: { thing: Thing; quiet: boolean; stacked: boolean }) {
+function Label({ thing, quiet, stacked, count }: { thing: Thing; quiet: boolean; stacked: boolean; count: number }) {
   if (quiet) return null;
   const left = -(thing.width ?? 0) / 2;
+  if (thing.shape === "operator") return <text className="place" x={left} y={-0.32}>{thing.label}</text>; // who comes stands below
+  if (count > 0) return <text className="place" x={left} y={(thing.depth ?? 0) / 2 + 0.26}>{`${thing.label}: ${count}`}</text>;
   if (thing.width !== undefined) return <text className="place" x={left} y={(thing.depth ?? 0) / 2 + 0.26}>{thing.label}</text>;
   if (thing.shape === "robot") return <text className="place" x={0.26} y={0.26}>{thing.label}</text>;
   return <text className={`item ${stacked ? "stacked" : ""}`} transform="rotate(-62)" x={stacked ? 0.34 : 0.15} y={0.05}>{thing.label}</text>;

@@ -1,7 +1,8 @@
 /** Small parts that several panes show: records by name, condition trees, tables of values. */
 
+import { Fragment } from "react";
 import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
-  type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type StepRec } from "../core/records";
+  type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
 import { session } from "../session";
 import { seconds } from "./Timeline";
 
@@ -17,6 +18,9 @@ export function inShort(rec: Rec): string {
       const taken = (rec as StepRec).microsteps.flatMap((micro) => micro.taken);
       return taken.length ? `${ending(taken[0]!.from)} → ${ending(taken.at(-1)!.to ?? "")}` : "the start";
     }
+    case "scene": return `${(rec as SceneRec).things.length} things`;
+    case "plan.ordered": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
+    case "plan.none": return String((rec as Rec & { reason?: string }).reason ?? "");
     case "decision": return `${(rec as DecisionRec).state}: ${(rec as DecisionRec).chosen ?? "no candidate"}`;
     case "knowledge": return `${(rec as KnowledgeRec).author}: ${news(rec as KnowledgeRec)}`;
     case "rule": return (rec as RuleRec).rule;
@@ -42,10 +46,15 @@ export function RecordLink({ rec }: { rec: Rec }) {
   return (
     <button className={`record ${rec.type.replace(".", "-")}`} onClick={() => session.goTo(rec.seq, { kind: "record", seq: rec.seq })}>
       <span className="type">{rec.type}</span>
-      <span className="said">{inShort(rec)}</span>
+      <span className="said"><Broken text={inShort(rec)} /></span>
       <span className="quiet">{seconds(rec.t)}</span>
     </button>
   );
+}
+
+/** Long names are broken where their parts end, if they must be. */
+function Broken({ text }: { text: string }) {
+  return text.split(/(?<=[/_])/).map((part, i) => <Fragment key={i}>{part}<wbr /></Fragment>);
 }
 
 /** What led to a record, back to where it began. */
