@@ -243,6 +243,17 @@ test("everything is moved by the keyboard", async () => {
   await page.getByRole("button", { name: "Play" }).waitFor();
 });
 
+test("the list of keys is opened and closed by the keyboard, and moves nothing meanwhile", async () => {
+  await page.keyboard.press("Home");
+  const list = page.getByRole("dialog", { name: "Keys and signs" });
+  await page.getByRole("button", { name: "Keys and signs" }).press("Enter");
+  await list.waitFor();
+  await page.keyboard.press("End");
+  await page.keyboard.press("Escape");
+  await list.waitFor({ state: "hidden" });
+  assert.equal(await shown(), 0);
+});
+
 test("every control has a name, and the page asks nobody else for anything", async () => {
   const nameless = await page.locator("button, input, select, [role=button]").evaluateAll((all) =>
     all.filter((one) => !(one.ariaLabel || one.title || one.textContent.trim() || one.labels?.length)).map((one) => one.outerHTML));

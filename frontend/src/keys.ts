@@ -7,6 +7,7 @@ export function useKeys(): void {
   useEffect(() => {
     const pressed = (event: KeyboardEvent) => {
       if (event.ctrlKey || event.metaKey || event.altKey || writes(event.target)) return;
+      if (document.querySelector("dialog[open]")) return; // the keys are its own, Esc too
       const act = KEYS[event.shiftKey && event.key.startsWith("Arrow") ? `Shift+${event.key}` : event.key];
       if (!act || (event.key === " " && event.target instanceof HTMLButtonElement)) return;
       event.preventDefault();

@@ -18,7 +18,7 @@ import { ChartTools } from "./ChartTools";
 const NODES = { state: StateNode };
 const EDGES = { way: WayEdge };
 /** From so many states on, a small map says where one is. */
-const MAPPED = 40;
+const MAPPED = 60;
 const MAP = { width: 130, height: 96 };
 const PLAIN: View = { focus: "", open: new Map(), all: new Set() };
 

@@ -18,7 +18,7 @@ export function PlanPane() {
     <section className="pane plan" aria-label="Plan">
       <h2>Plan</h2>
       <div className="scrolls">
-        {plans.length === 0 && <p className="quiet note">No plan has been made yet: all that was done was foreseen.</p>}
+        {plans.length === 0 && <p className="quiet note">{`No plan has been made yet${moment.active.size ? ": all that was done was foreseen" : ""}.`}</p>}
         {shown.map(({ plan, number }, i) => (
           <PlanView key={`${number} ${plan.name}`} plan={plan} number={number} open={i === 0 || chosen === number} />
         ))}

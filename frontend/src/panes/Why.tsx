@@ -26,6 +26,7 @@ export function Why() {
     <Body>
       {decision && <WhyRecord rec={decision} />}
       <h3>What happened lately</h3>
+      {moment.seq === 0 && <p className="quiet">Nothing yet.</p>}
       <ul className="records">{lately(moment.seq).map((one) => <li key={one.seq}><RecordLink rec={one} /></li>)}</ul>
     </Body>
   );
