@@ -1,8 +1,9 @@
 """What the page costs: its weight, its layouts, a run that is watched, a long run opened (`make bench-viewer`).
 
 Runs are measured with nobody, 1 and 8 browsers attached, in turn, each browser a process that takes in all records;
-what counts is the ratio to the same runs without a page: of the time they take, and of the computing time of their own
-process, in which the page is served too. All plans are known before, so that nothing but the run is measured. Eight
+what counts is the ratio to the same runs without a page: of the time they take (median of the rounds), and of the
+computing time of their own process, in which the page is served too (the least of all rounds, since what else the
+machine does only adds to it). All plans are known before, so that nothing but the run is measured. Eight
 processes that read at the same time on two cores slow the run besides; that is in the first ratio and not in the
 second. Layouts and pages are measured by `frontend/bench.mjs`.
 """
@@ -80,9 +81,9 @@ def print_watched(rounds: int) -> None:
     bare = figures["no page"]
     for name, taken in figures.items():
         wall = statistics.median(one.wall / other.wall for one, other in zip(taken, bare, strict=True))
-        cpu = statistics.median(one.cpu / other.cpu for one, other in zip(taken, bare, strict=True))
         seconds = statistics.median(one.wall for one in taken)
-        computed = statistics.median(one.cpu for one in taken)
+        computed = min(one.cpu for one in taken)
+        cpu = computed / min(one.cpu for one in bare)
         print(f"{RUNS} runs, {name:<12} {seconds:6.2f} s {wall:5.2f} x, computing {computed:5.2f} s {cpu:5.2f} x")
 
 

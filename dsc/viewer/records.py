@@ -31,7 +31,7 @@ class RecordLog:
         self._lines: list[str | Record] = list(lines)
         self._live = live
         self._lock = Lock()
-        self._wakers: list[Callable[[], None]] = []
+        self._wakers: tuple[Callable[[], None], ...] = ()
         self._batch: tuple[int, int, str] = (0, 0, "")
 
     def __len__(self) -> int:
@@ -58,19 +58,17 @@ class RecordLog:
     def on_more(self, waker: Callable[[], None]) -> Callable[[], None]:
         """Call `waker` whenever there is more to read, from whatever thread; the function returned ends that."""
         with self._lock:
-            self._wakers.append(waker)
+            self._wakers = (*self._wakers, waker)
 
         def forget() -> None:
             with self._lock:
-                self._wakers.remove(waker)
+                self._wakers = tuple(one for one in self._wakers if one is not waker)
 
         return forget
 
     def wake(self) -> None:
         """Tell everybody who waits that there is something new."""
-        with self._lock:
-            wakers = tuple(self._wakers)
-        for waker in wakers:
+        for waker in self._wakers:  # a tuple that nobody changes: a run does not take a lock for each record
             waker()
 
     def batch(self, seq: int) -> tuple[str, int]:

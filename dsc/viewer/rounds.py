@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 INTERVAL_S = 1 / 30
 """Between two rounds of a live run at least: more could not be seen."""
 SHARE = 1 / 50
-"""Of the time, what all browsers together may take from a run that computes."""
-IDLE = 1 / 5
+"""Of what a run computes, what all browsers together may at most, while it does."""
+IDLE = 1 / 10
 """Of the time: who computes less than that has no use for what would be left to it."""
 LOOK_EVERY_S = 0.1
 
@@ -27,8 +27,8 @@ class Pace:
     """How long to rest after a round.
 
     Run and viewer are threads of one process, of which one computes at a time. After a round the viewer rests until
-    what it computed is a fiftieth of the time that went by, but not while nobody else computes: a run in real time
-    mostly waits, one that is held or over does nothing, and that of another process is not slowed from here.
+    what it computed is a fiftieth of what the others did, but not while nobody else computes: a run in real time mostly
+    waits, one that is held or over does nothing, and that of another process is not slowed from here.
 
     Args:
         now: tells the time, in seconds as the others.
@@ -44,18 +44,17 @@ class Pace:
 
     def begin(self) -> None:
         """A round begins."""
-        self._began = self._looked = self._now()
-        self._own_before = self._own()
-        self._others_before = self._total() - self._own_before
+        self._looked, self._own_before = self._now(), self._own()
+        self._others_before = self._others_looked = self._total() - self._own_before
 
     def rest(self) -> float:
         """Seconds to rest before this is asked again; 0 if it was enough."""
         now, own = self._now(), self._own()
         others = self._total() - own
-        busy = others - self._others_before > IDLE * (now - self._looked)
-        self._looked, self._others_before = now, others
-        left = self._began + (own - self._own_before) / SHARE - now
-        return min(left, LOOK_EVERY_S) if busy and left > 0 else 0.0
+        enough = own - self._own_before <= SHARE * (others - self._others_before)
+        busy = others - self._others_looked > IDLE * (now - self._looked)
+        self._looked, self._others_looked = now, others
+        return LOOK_EVERY_S if busy and not enough else 0.0
 
 
 class Served(Protocol):

@@ -129,7 +129,7 @@ class Clocks:
         return Pace(lambda: self.now, lambda: self.viewer, lambda: self.viewer + self.run)
 
 
-def test_a_run_that_computes_keeps_all_but_a_fiftieth_of_the_time():
+def test_while_a_run_computes_the_viewer_does_a_fiftieth_of_that():
     clocks = Clocks()
     pace = clocks.pace()
     pace.begin()
@@ -137,10 +137,9 @@ def test_a_run_that_computes_keeps_all_but_a_fiftieth_of_the_time():
     clocks.run += 0.03
     clocks.now += 0.04
     while (rest := pace.rest()) > 0:
-        assert rest <= LOOK_EVERY_S
         clocks.now += rest
-        clocks.run += rest
-    assert clocks.viewer / clocks.now == pytest.approx(SHARE)
+        clocks.run += rest / 3  # the machine is busy with other things besides
+    assert SHARE * (clocks.run - LOOK_EVERY_S) <= clocks.viewer <= SHARE * clocks.run
 
 
 def test_a_run_that_waits_is_not_waited_for():
