@@ -83,9 +83,11 @@ export function Tree({ why, decider }: { why: Explanation; decider: Explanation 
     <div className="tree" role="treeitem" aria-label={`${whole} is ${truth}${decides ? ", this decided" : ""}`}>
       <div className={`leaf ${truth} ${decides ? "decides" : ""}`} title={whole}>
         <span className="sign" aria-hidden="true">{sign}</span>
-        <code>{text}</code>
-        {why.detail && <span className="quiet">{why.detail}</span>}
-        {decides && <span className="badge decided">decided</span>}
+        <span>
+          <code>{text}</code>
+          {why.detail && <span className="quiet">{` ${why.detail}`}</span>}
+          {decides && <span className="badge decided">decided</span>}
+        </span>
       </div>
       {parts.length > 0 && <div role="group">{parts.map((part, i) => <Tree key={i} why={part} decider={decider} />)}</div>}
     </div>
