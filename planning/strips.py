@@ -194,6 +194,10 @@ class Problem:
         missing_bounds = [bound for bound in self.bounds if not bound.holds(numbers)]
         if missing_goals or missing_bounds:
             return f"goal fact {[*missing_goals, *missing_bounds][0]} does not hold at the end"
+        return self.taking(chosen)
+
+    def taking(self, chosen: Iterable[int]) -> Plan:
+        """The steps of the actions with these indices, without bookkeeping."""
         steps = (self.actions[index].step for index in chosen)
         return Plan(tuple(step for step in steps if step is not None))
 

@@ -17,6 +17,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from knowledge_base.language.memory import IdentityCache
+from planning.elimination import indispensable
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import can_time, cannot, in_concert, nobody
 from planning.patience import aside
@@ -220,6 +221,9 @@ class PlannerProcess:
             return EngineFailed(self.engine, f"no answer: {str(answer)[:80]}")
         if isinstance(plan, str):
             return EngineFailed(self.engine, f"its plan is no solution: {plan}")
+        if not durations:
+            chosen = indispensable(problem, chosen)
+            plan = problem.taking(chosen)
         cost = plan.seconds if durations else problem.cost(chosen)
         translated = answer.get("translated", 0.0)
         return PlanFound(

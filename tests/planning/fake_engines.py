@@ -15,13 +15,14 @@ from planning.strips import GroundAction, Problem
 READY = "import json, sys, time, os, signal\nprint('{\"ready\": true}', flush=True)\n"
 HANGING = READY + "time.sleep(600)\n"
 
-START, MIDDLE, GOAL = Fact("start"), Fact("middle"), Fact("goal")
+START, MIDDLE, ASIDE, GOAL = Fact("start"), Fact("middle"), Fact("aside"), Fact("goal")
 FIRST = GroundAction(PlanStep("first", ("a",)), (START,), (MIDDLE,), (START,))
 SECOND = GroundAction(PlanStep("second", ("b",)), (MIDDLE,), (GOAL,), ())
-DETOUR = GroundAction(PlanStep("detour"), (MIDDLE,), (), ())
-PROBLEM = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND, DETOUR))
+DETOUR = GroundAction(PlanStep("detour"), (MIDDLE,), (ASIDE,), (MIDDLE,))
+ARRIVAL = GroundAction(PlanStep("arrival"), (ASIDE,), (GOAL,), ())
+PROBLEM = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND, DETOUR, ARRIVAL))
 SOLVED = '{"actions": [0, 1]}'
-LONGER = '{"actions": [0, 2, 1]}'
+LONGER = '{"actions": [0, 2, 3]}'
 
 
 def answering(*answers):

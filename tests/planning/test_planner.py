@@ -64,7 +64,7 @@ def test_a_goal_that_holds_is_not_even_asked():
         (answering('{"steps": []}'), "no answer"),
         (answering('{"actions": [1, 0]}'), "(second b) is not applicable, (middle) does not hold"),
         (answering('{"actions": [0]}'), "goal fact (goal) does not hold"),
-        (answering('{"actions": [0, 1, 3]}'), "no action number 3"),
+        (answering('{"actions": [0, 1, 4]}'), "no action number 4"),
         (answering('{"actions": [-1]}'), "no action number -1"),
         (answering('{"failed": "MemoryError: "}'), "MemoryError"),
         ("raise SystemExit(3)", "did not start: the process ended with status 3"),

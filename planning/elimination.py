@@ -1,0 +1,103 @@
+"""Plans without the steps that they reach their goal without: action elimination (Nakhost & Müller 2010).
+
+Engines that give the first plan they find often go somewhere and back again. Each action is left out on trial, and with
+it what cannot be taken any more without it; if the goal is reached all the same, they stay out. A robot would have
+taken every one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from knowledge_base.facts import Fact
+    from planning.quantities import Numbers
+    from planning.strips import GroundAction, Problem
+
+
+@dataclass(frozen=True, slots=True)
+class _Act:
+    """A ground action; sets of facts are bits of numbers, which makes a trial cost a microsecond."""
+
+    index: int
+    action: GroundAction
+    needs: int
+    adds: int
+    keeps: int
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    facts: int
+    numbers: Numbers
+
+    def after(self, act: _Act) -> _State | None:
+        """The state after it; `None` if it cannot be taken."""
+        if act.needs & ~self.facts:
+            return None
+        action, numbers = act.action, self.numbers
+        if action.bounds and not all(bound.holds(numbers) for bound in action.bounds):
+            return None
+        if action.assignments:
+            try:
+                numbers = action.count(numbers)
+            except ArithmeticError:
+                return None
+        return _State(self.facts & act.keeps | act.adds, numbers)
+
+
+def indispensable(problem: Problem, chosen: Sequence[int]) -> list[int]:
+    """The actions of a plan, by index, that are left when none can be left out with what depends on it.
+
+    Args:
+        problem: without durations.
+        chosen: the actions of a plan for it, in order.
+    """
+    acts, start, goal = _encoded(problem, chosen)
+    before = None
+    while before != len(acts):  # what an earlier action is for may have gone only now
+        before = len(acts)
+        acts = _once(problem, acts, start, goal)
+    return [act.index for act in acts]
+
+
+def _once(problem: Problem, acts: list[_Act], state: _State, goal: int) -> list[_Act]:
+    """Each act is left out on trial, from the first to the last."""
+    position = 0
+    while position < len(acts):
+        fewer, end = _without(state, acts[position + 1 :])
+        if not goal & ~end.facts and all(bound.holds(end.numbers) for bound in problem.bounds):
+            acts = [*acts[:position], *fewer]
+            continue
+        state = state.after(acts[position]) or state
+        position += 1
+    return acts
+
+
+def _without(state: _State, acts: Sequence[_Act]) -> tuple[list[_Act], _State]:
+    """Those acts that can still be taken, and where they lead."""
+    taken = []
+    for act in acts:
+        ahead = state.after(act)
+        if ahead is not None:
+            state = ahead
+            taken.append(act)
+    return taken, state
+
+
+def _encoded(problem: Problem, chosen: Sequence[int]) -> tuple[list[_Act], _State, int]:
+    bit: dict[Fact, int] = {}
+
+    def bits(facts: Sequence[Fact]) -> int:
+        found = 0
+        for fact in facts:
+            found |= bit.setdefault(fact, 1 << len(bit))
+        return found
+
+    actions = [(index, problem.actions[index]) for index in chosen]
+    acts = [_Act(i, one, bits(one.precondition), bits(one.adds), ~bits(one.deletes)) for i, one in actions]
+    goal = bits(problem.goal)
+    present = bits([fact for fact in problem.init if fact in bit])
+    return acts, _State(present, problem.numbers), goal
