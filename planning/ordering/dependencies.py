@@ -17,6 +17,7 @@ from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, F
 from knowledge_base.language.evaluation import World, evaluate_argument, holds
 from knowledge_base.language.expression import (
     And,
+    Arithmetic,
     Atom,
     Call,
     Comparison,
@@ -42,6 +43,7 @@ Rank = Callable[[Support], int]
 """Of several supports the one with the lowest rank is taken."""
 
 _COMMUTING = frozenset({"increase", "decrease"})
+_DIRECTIONS = {">": 1, ">=": 1, "<": -1, "<=": -1}
 
 
 @dataclass(slots=True)
@@ -132,6 +134,40 @@ def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> 
         case _:
             found = (support(part, world, rank, wanted=wanted) for part in _parts(e, world))
             return _all(found) if _is_conjunction(e, wanted=wanted) else _best(found, rank)
+
+
+def favours(e: Expression, fluent: Fact, world: World) -> float | None:
+    """The factor by which a greater number is good for a comparison: positive, negative, or 0 if it does not matter.
+
+    `None` if that cannot be said of the condition by itself.
+    """
+    match e:
+        case Not(Comparison(operator, left, right)) if operator in _DIRECTIONS:
+            sign = -_DIRECTIONS[operator]
+        case Comparison(operator, left, right) if operator in _DIRECTIONS:
+            sign = _DIRECTIONS[operator]
+        case _:
+            return None
+    more, less = _slope(left, fluent, world), _slope(right, fluent, world)
+    return None if more is None or less is None else sign * (more - less)
+
+
+def _slope(term: Term, fluent: Fact, world: World) -> float | None:
+    match term:
+        case Call():
+            return float(ground(term, world) == fluent)
+        case Arithmetic("+" | "-" as operator, args):
+            slopes = [_slope(arg, fluent, world) for arg in args]
+            if None in slopes:
+                return None
+            first, *rest = (slope or 0.0 for slope in slopes)
+            if operator == "+":
+                return first + sum(rest)
+            return first - sum(rest) if rest else -first
+        case Arithmetic():
+            return None if fluent in _fluents(term, world) else 0.0
+        case _:
+            return 0.0
 
 
 def ground(form: Atom | Call, world: World) -> Fact:

@@ -20,13 +20,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from knowledge_base.errors import InputError
+from knowledge_base.facts import Fact
 from knowledge_base.language.effect import substitute_effect
 from knowledge_base.language.evaluation import World, apply_effect, holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.printer import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.ordering.dependencies import Changes, Ground, Support, changes, conjuncts, support
+from planning.ordering.dependencies import Changes, Ground, Support, changes, conjuncts, favours, support
 from planning.plan import Plan, PlanStep
 from planning.posing.conditions import Literal
 from planning.posing.derived import derivation
@@ -172,6 +173,7 @@ class _Tracing:
         since: the step that made a fact what it is; without one, it was so from the beginning.
         makers: the steps that make a literal true.
         setters: the steps that change a number, and whether they only add to it.
+        moves: by how much a step made a number greater.
         users: the steps that rely on a literal or a number.
     """
 
@@ -181,6 +183,7 @@ class _Tracing:
     since: dict[Literal, int] = field(default_factory=dict)
     makers: dict[Literal, list[int]] = field(default_factory=lambda: defaultdict(list))
     setters: dict[Ground, list[tuple[int, bool]]] = field(default_factory=lambda: defaultdict(list))
+    moves: dict[tuple[Fact, int], float] = field(default_factory=dict)
     users: dict[Ground, list[int]] = field(default_factory=lambda: defaultdict(list))
 
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
@@ -200,8 +203,15 @@ class _Tracing:
         for fluent in doing.reads:
             self._rely(number, fluent)
         self._change(number, doing)
-        plain = action.timed is None and not doing.numbers
-        self.world.apply(doing.delta() if plain else apply_effect(effect, self.world))
+        if action.timed is None and not doing.numbers:
+            self.world.apply(doing.delta())
+            return
+        made = apply_effect(effect, self.world)
+        for fluent, now in made.values.items():
+            before = self.world.value(fluent.predicate, fluent.args)
+            if isinstance(now, int | float) and isinstance(before, int | float):
+                self.moves[fluent, number] = now - before
+        self.world.apply(made)
 
     def need(self, user: int, condition: Expression, whose: str) -> None:
         """A step, or the goal, needs a ground condition now."""
@@ -210,7 +220,7 @@ class _Tracing:
             raise InputError(f"the plan does not lead to the goal: {whose} needs {to_text(condition)}")
         if not found:  # nothing can change it
             return
-        providers = {provider for ground in found for provider in self._providers(ground)}
+        providers = {one for ground in found for one in self._providers(ground) if self._helps(one, ground, condition)}
         self.links += [CausalLink(one, condition, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
         for ground in found:
             self._rely(user, ground)
@@ -238,6 +248,13 @@ class _Tracing:
         if isinstance(ground, Literal):
             return (self.since.get(ground, PRESENT),)
         return tuple(setter for setter, _ in self.setters[ground]) or (PRESENT,)
+
+    def _helps(self, provider: int, ground: Ground, condition: Expression) -> bool:
+        """Whether the condition owes something to the provider: who uses up fuel does not provide what is left."""
+        if isinstance(ground, Literal) or provider == PRESENT or not all(adds for _, adds in self.setters[ground]):
+            return True
+        good = favours(condition, ground, self.world)
+        return good is None or good * self.moves.get((ground, provider), 0.0) > 0
 
     def _latest(self, found: Support) -> int:
         return max((provider for ground in found for provider in self._providers(ground)), default=PRESENT)

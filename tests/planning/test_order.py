@@ -187,3 +187,20 @@ def test_no_more_pairs_are_kept_than_by_unified_planning(texts, domain_file, cle
     order = deordered(Plan(taken), clean_up, world, parse_condition("(and)"))
     allowed = PartialOrder(taken).restricted(theirs).earlier
     assert all(order.earlier[n] <= allowed[n] for n in allowed)
+
+
+def test_who_uses_up_a_number_does_not_provide_what_is_left_of_it(world_of):
+    domain = PlanningDomain.parse("""
+(define (domain drive) (:types place) (:predicates (at ?p - place)) (:functions (fuel) (warmth))
+  (:action go :parameters (?from ?to - place) :precondition (and (at ?from) (>= (- (fuel) 2) 1) (not (< (warmth) 1)))
+    :effect (and (not (at ?from)) (at ?to) (decrease (fuel) 3) (decrease (warmth) 1)))
+  (:action refuel :parameters () :effect (increase (fuel) 3))
+  (:action heat :parameters () :effect (increase (warmth) 3)))
+""")
+    world = world_of(domain.schema, dict.fromkeys("abc", "place"), (fact("at", "a"),), {fact("fuel"): 3})
+    order = deordered(Plan(steps("heat", "go a b", "refuel", "go b c")), domain, world, parse_condition("(at c)"))
+    assert set(map(str, order.links)) == {
+        "1 -(not (< (warmth) 1))-> 2", "0 -(>= (- (fuel) 2) 1)-> 2", "0 -(at a)-> 2",
+        "1 -(not (< (warmth) 1))-> 4", "3 -(>= (- (fuel) 2) 1)-> 4", "2 -(at b)-> 4", "4 -(at c)-> 5",
+    }  # fmt: skip
+    assert order.before == {(1, 2), (2, 3), (3, 4)}
