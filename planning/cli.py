@@ -58,7 +58,8 @@ def plan_command(
 
     Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
     """
-    from planning.ordering.order import deordered, scheduled
+    from planning.ordering.order import deordered
+    from planning.ordering.timed_links import linked
     from planning.patience import OutOfPatienceError
     from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
     from planning.posing.constructs import why_no_engine
@@ -80,7 +81,7 @@ def plan_command(
         answer["why"] = _why(domain, read, world, seconds)
     if isinstance(outcome, PlanFound):
         plan = outcome.plan
-        order = scheduled(plan) if plan.schedule else deordered(plan, domain, world, read.goal)
+        order = (linked if plan.schedule else deordered)(plan, domain, world, read.goal)
         answer |= _ordered(order) if parallel else {}
         answer |= _purposes(order) if explain else {}
         if plot is not None:

@@ -74,9 +74,9 @@ def carried_out(
     """
     moments: dict[int, list[tuple[int, Event[State]]]] = {}
     for number, act in enumerate(acts):
-        moments.setdefault(_moment(act.timing.start), []).append((number, act.start))
+        moments.setdefault(moment(act.timing.start), []).append((number, act.start))
         if act.end is not None:
-            moments.setdefault(_moment(act.timing.end), []).append((number, act.end))
+            moments.setdefault(moment(act.timing.end), []).append((number, act.end))
     for now in sorted(moments):
         happening = moments[now]
         flaw = _flaw(happening, state, after)
@@ -84,14 +84,15 @@ def carried_out(
             return flaw
         state = _together(happening, state, after)
         for number, act in enumerate(acts):
-            if act.lasting is not None and _moment(act.timing.start) <= now < _moment(act.timing.end):
+            if act.lasting is not None and moment(act.timing.start) <= now < moment(act.timing.end):
                 lost = act.lasting(state)
                 if lost is not None:
                     return Flaw(number, lost)
     return state
 
 
-def _moment(seconds: float) -> int:
+def moment(seconds: float) -> int:
+    """Which moment that is: times that are nearer to each other than `FINEST` are one."""
     return round(seconds / FINEST)
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from planning.generation.plot import plot_from_plan
-from planning.ordering.order import PartialOrder, deordered, in_sequence, scheduled
+from planning.ordering.order import PartialOrder, deordered, in_sequence
+from planning.ordering.timed_links import linked
 from planning.plan import Plan
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Plotting:
     def order(self, plan: Plan, goal: Expression) -> PartialOrder:
         """Which steps wait for which."""
         if plan.schedule:
-            return scheduled(plan)
+            return linked(plan, self.derivation.original, self.knowledge, goal)
         order = deordered(plan, self.derivation.original, self.knowledge, goal)
         return order if self.parallel else replace(order, before=in_sequence(plan).before)
 

@@ -41,8 +41,7 @@ class Telling:
         """The plan of that name is going to be carried out: its steps, and its causal links.
 
         A link says which step, from 1, brings about what for which; 0 is what holds already, one past the last the
-        goal. What holds already and only the goal needs is left out: it may be as much as the goal has parts. A plan
-        with a schedule of its own comes without links.
+        goal. What holds already and only the goal needs is left out: it may be as much as the goal has parts.
         """
         goal = len(order.steps) + 1
         kept = [link for link in order.links if (link.provider, link.user) != (PRESENT, goal)]

@@ -9,6 +9,7 @@ from knowledge_base.language.expression import Expression
 from knowledge_base.language.printer import to_text
 from planning.domain import PlanningDomain
 from planning.ordering.order import CausalLink, PartialOrder, deordered
+from planning.ordering.timed_links import linked
 from planning.plan import Plan, PlanStep
 
 
@@ -55,16 +56,13 @@ def purposes(plan: Plan, domain: PlanningDomain, world: World, goal: Expression)
     Raises:
         InputError: the plan does not lead to the goal.
     """
-    order = deordered(plan, domain, world, goal)
+    order = (linked if plan.schedule else deordered)(plan, domain, world, goal)
     return tuple(why(order, number) for number in range(1, len(plan.steps) + 1))
 
 
 def _served(links: tuple[CausalLink, ...], number: int, goal: int) -> tuple[Expression, ...]:
-    reached = {number}
-    served: dict[Expression, None] = {}
-    for link in links:  # by user, so that who provides something was reached before
-        if link.provider in reached:
-            reached.add(link.user)
-            if link.user == goal:
-                served[link.fact] = None
-    return tuple(served)
+    reached, before = {number}, 0
+    while before != len(reached):  # along a time line, a later step may provide what an earlier one needs
+        before = len(reached)
+        reached |= {link.user for link in links if link.provider in reached}
+    return tuple(dict.fromkeys(link.fact for link in links if link.provider in reached and link.user == goal))

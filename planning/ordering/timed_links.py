@@ -1,0 +1,123 @@
+"""What the steps of a plan with a schedule do for each other: causal links along its time line.
+
+A step may need something at its start, all the time, and at its end, and bring things about at both ends; so one that
+begins later can provide what an earlier one needs at its end.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from knowledge_base.errors import InputError
+from knowledge_base.language.effect import AllOf, Effect, substitute_effect
+from knowledge_base.language.evaluation import World, apply_effect, holds
+from knowledge_base.language.expression import And, Expression, substitute
+from knowledge_base.language.printer import to_text
+from knowledge_base.world.overlay import Overlay
+from planning.domain import PlanningDomain
+from planning.ordering.dependencies import Changes, Ground, Support, changes, conjuncts, support
+from planning.ordering.order import PRESENT, CausalLink, PartialOrder, scheduled
+from planning.plan import Plan, PlanStep, Timing
+from planning.posing.derived import derivation
+from planning.timeline import moment
+
+_NOTHING: Expression = And(())
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """One end of a step: what it needs just before, what it does, and what it needs from then on."""
+
+    number: int
+    step: PlanStep
+    condition: Expression
+    effect: Effect
+    lasting: Expression = _NOTHING
+
+
+def linked(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
+    """The order of the plan's schedule, with what its steps do for each other.
+
+    Raises:
+        InputError: the plan does not lead to the goal.
+    """
+    derived = derivation(domain)
+    tracing = _Tracing(Overlay(derived.world(world)))
+    moments: dict[int, list[_End]] = defaultdict(list)
+    for number, (step, timing) in enumerate(zip(plan.steps, plan.schedule, strict=True), start=1):
+        for seconds, end in _ends(number, step, timing, derived.domain):
+            moments[moment(seconds)].append(end)
+    for now in sorted(moments):
+        tracing.happen(moments[now])
+    tracing.need(len(plan.steps) + 1, derived.expand(goal), "the goal")
+    links = sorted(dict.fromkeys(tracing.links), key=lambda link: (link.user, link.provider))
+    return replace(scheduled(plan), links=tuple(links))
+
+
+def _ends(number: int, step: PlanStep, timing: Timing, domain: PlanningDomain) -> Iterator[tuple[float, _End]]:
+    action, bindings = domain.action(step), domain.bindings(step)
+    timed = action.timed
+
+    def end(condition: Expression, effect: Effect, lasting: Expression = _NOTHING) -> _End:
+        condition, lasting = substitute(condition, bindings), substitute(lasting, bindings)
+        return _End(number, step, condition, substitute_effect(effect, bindings), lasting)
+
+    if timed is None:
+        yield timing.start, end(action.precondition, action.effect)
+        return
+    yield timing.start, end(timed.start, timed.start_effect, timed.over_all)
+    yield timing.end, end(timed.end, timed.end_effect)
+
+
+@dataclass(slots=True)
+class _Tracing:
+    """A schedule carried out in thought; remembers who made what.
+
+    Attributes:
+        world: the state reached.
+        links: what was found so far.
+        makers: the steps that made a fact, or a number, what it is; without any, it was so from the beginning.
+    """
+
+    world: Overlay
+    links: list[CausalLink] = field(default_factory=list)
+    makers: dict[Ground, list[int]] = field(default_factory=lambda: defaultdict(list))
+
+    def happen(self, ends: list[_End]) -> None:
+        """What happens at one moment: all of it finds the world before."""
+        for end in ends:
+            self.need(end.number, end.condition, str(end.step))
+        made = [(end, changes(end.effect, self.world)) for end in ends]
+        for end, doing in made:
+            for condition in doing.conditions:
+                if holds(condition, self.world, {}):
+                    self.need(end.number, condition, str(end.step))
+        delta = apply_effect(AllOf(tuple(end.effect for end in ends)), self.world)
+        for end, doing in made:
+            self._make(end.number, doing)
+        self.world.apply(delta)
+        for end in ends:
+            self.need(end.number, end.lasting, str(end.step))
+
+    def need(self, user: int, condition: Expression, whose: str) -> None:
+        """A step, or the goal, needs a condition now; what it has brought about itself is no link."""
+        for part in dict.fromkeys(conjuncts(condition, self.world)):
+            found = support(part, self.world, self._latest)
+            if found is None:
+                raise InputError(f"the plan does not lead to the goal: {whose} needs {to_text(part)}")
+            providers = {one for ground in found for one in self.makers.get(ground, [PRESENT])}
+            if found and user not in providers:
+                self.links += [CausalLink(one, part, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
+
+    def _make(self, number: int, doing: Changes) -> None:
+        for literal in doing.makes:
+            fact = literal.fact
+            if self.world.holds(fact.predicate, fact.args) is not literal.positive:
+                self.makers[literal] = [number]
+        for fluent in doing.numbers:
+            self.makers[fluent].append(number)
+
+    def _latest(self, found: Support) -> int:
+        return max((one for ground in found for one in self.makers.get(ground, [PRESENT])), default=PRESENT)

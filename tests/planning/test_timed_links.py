@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import pytest
+
+from knowledge_base.errors import InputError
+from knowledge_base.facts import fact
+from knowledge_base.language.parser import parse_condition
+from planning.domain import PlanningDomain
+from planning.ordering.purposes import purposes
+from planning.ordering.timed_links import linked
+from planning.plan import Plan, PlanStep, Timing
+
+CELLAR = PlanningDomain.parse("""
+(define (domain cellar) (:types match fuse)
+  (:predicates (unused ?m - match) (light ?m - match) (free) (mended ?f - fuse) (open) (shut) (aired))
+  (:durative-action strike :parameters (?m - match) :duration (= ?duration 5)
+    :condition (and (at start (unused ?m)) (over all (light ?m)))
+    :effect (and (at start (light ?m)) (at start (not (unused ?m))) (at end (not (light ?m)))))
+  (:durative-action mend :parameters (?f - fuse ?m - match) :duration (= ?duration 2)
+    :condition (and (at start (free)) (over all (light ?m)))
+    :effect (and (at start (not (free))) (at end (mended ?f)) (at end (free))))
+  (:durative-action air :parameters () :duration (= ?duration 4)
+    :condition (at end (open)) :effect (at end (aired)))
+  (:action unlatch :parameters () :precondition (shut) :effect (and (open) (not (shut)))))
+""")
+
+
+@pytest.fixture
+def cellar(world_of):
+    facts = (fact("unused", "m"), fact("free"), fact("shut"))
+    return world_of(CELLAR.schema, {"m": "match", "f": "fuse", "g": "fuse"}, facts)
+
+
+def timed(*steps):
+    rows = [(text.split(), start, seconds) for text, start, seconds in steps]
+    return Plan(
+        tuple(PlanStep(name, tuple(args)) for (name, *args), _, _ in rows),
+        tuple(Timing(start, seconds) for _, start, seconds in rows),
+    )
+
+
+MENDING = timed(("strike m", 0, 5), ("mend f m", 0, 2), ("mend g m", 2.5, 2))
+
+
+def test_what_must_hold_all_the_time_is_provided_by_who_has_begun(cellar):
+    order = linked(MENDING, CELLAR, cellar, parse_condition("(and (mended f) (mended g))"))
+    assert list(map(str, order.links)) == [
+        "0 -(unused m)-> 1", "0 -(free)-> 2", "1 -(light m)-> 2", "1 -(light m)-> 3", "2 -(free)-> 3",
+        "2 -(mended f)-> 4", "3 -(mended g)-> 4",
+    ]  # fmt: skip
+    assert (order.before, order.begin_before) == ({(2, 3)}, {(1, 3)})
+
+
+def test_a_later_step_may_provide_what_an_earlier_one_needs_at_its_end(cellar):
+    plan, goal = timed(("air", 0, 4), ("unlatch", 1, 0)), parse_condition("(aired)")
+    assert [str(link) for link in linked(plan, CELLAR, cellar, goal).links if link.provider] == [
+        "2 -(open)-> 1", "1 -(aired)-> 3",
+    ]  # fmt: skip
+    assert list(map(str, purposes(plan, CELLAR, cellar, goal))) == [
+        "1 (air): (aired) for the goal", "2 (unlatch): (open) for step 1; serves (aired)",
+    ]  # fmt: skip
+
+
+def test_a_schedule_that_does_not_lead_to_the_goal_has_no_links(cellar):
+    late = timed(("strike m", 0, 5), ("mend f m", 6, 2))
+    with pytest.raises(InputError, match=r"\(mend f m\) needs \(light m\)"):
+        linked(late, CELLAR, cellar, parse_condition("(mended f)"))
+    with pytest.raises(InputError, match=r"the goal needs \(aired\)"):
+        linked(MENDING, CELLAR, cellar, parse_condition("(and (mended g) (aired))"))
