@@ -88,6 +88,20 @@ class Assignment:
         return numbers.get(self.fluent, 0.0) + amount if self.increase else amount
 
 
+def helps(change: Assignment, bound: Bound) -> bool:
+    """Whether a change may make a bound true that is not; `False` is certain.
+
+    Who only ever uses up fuel does not bring about that there is enough of it.
+    """
+    if not change.increase or isinstance(change.amount, Fact | Operation) or bound.operator == "=":
+        return True
+    slopes = linear(Operation("-", (bound.left, bound.right)))
+    if slopes is None:
+        return True
+    gain = slopes.get(change.fluent, 0.0) * change.amount
+    return gain > 0 if bound.operator in {">", ">="} else gain < 0
+
+
 def value(quantity: Quantity, numbers: Numbers) -> float:
     """What the quantity is worth.
 

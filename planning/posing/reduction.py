@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from planning.posing.ways import Way, Ways
-from planning.quantities import fluents
+from planning.quantities import Bound, fluents, helps
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -53,7 +53,7 @@ class Reach:
 
 
 def reachable(task: Task) -> Reach:
-    """What can hold and happen; a bound counts as possible as soon as one of its numbers can change."""
+    """What can hold and happen; a bound counts as possible as soon as a number can change to its good."""
     ways, users, supports = task.ways.all, task.ways.users, task.numbering.supports
     reached, agenda = set(task.init), list(task.init)
     missing = list(task.ways.counts)
@@ -65,7 +65,11 @@ def reachable(task: Task) -> Reach:
             taken[i] = 1
             for one in ways[i].adds:
                 if one not in reached:
-                    fresh = [one, *(bound for bound in supports.get(one, ()) if bound not in reached)]
+                    reached.add(one)
+                    agenda.append(one)
+                if one in supports:
+                    hoped = [bound for bound in supports[one] if bound not in reached]
+                    fresh = _helped(hoped, ways[i], task.numbering) if hoped else hoped
                     reached.update(fresh)
                     agenda += fresh
         else:
@@ -74,6 +78,16 @@ def reachable(task: Task) -> Reach:
                 if not missing[i]:
                     ready.append(i)
     return Reach(reached, taken)
+
+
+def _helped(bounds: Iterable[int], way: Way, numbering: Numbering) -> list[int]:
+    """Those bounds that the way may make true."""
+    named = [(number, numbering.named(number)) for number in bounds]
+    return [
+        number
+        for number, bound in named
+        if isinstance(bound, Bound) and any(helps(change, bound) for change in way.assignments)
+    ]
 
 
 def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:

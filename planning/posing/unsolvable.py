@@ -15,11 +15,12 @@ from planning.patience import Patience
 from planning.plan import PlanStep
 from planning.posing.conditions import Every, Grounder, Literal, Residual, Some, is_so
 from planning.posing.derived import derivation
+from planning.posing.exclusion import excluding
 from planning.posing.grounding import Reached, Rule
-from planning.posing.numbering import as_fact
+from planning.posing.numbering import NOT, as_fact
 from planning.posing.problem import Poser, check_goal
 from planning.posing.reduction import Task, reachable
-from planning.quantities import Bound, worth
+from planning.quantities import Assignment, Bound, helps, worth
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -51,9 +52,27 @@ def why_unsolvable(
     reach = _Reach.of(posing.task, world)
     known = dict.fromkeys([*_present(rules, world), *sorted(reach.facts, key=str)])
     causes = _Causes(domain, rules, grounder, reach, frozenset(known), Reached(known))
-    return tuple(dict.fromkeys(causes.of(posing.wanted))) or (
-        "each goal fact can be reached by itself, but not all of them together",
-    )
+    return tuple(dict.fromkeys(causes.of(posing.wanted))) or _not_together(domain, world, goal, patience or Patience())
+
+
+def _not_together(domain: PlanningDomain, world: World, goal: Expression, patience: Patience) -> tuple[str, ...]:
+    """Which goal facts exclude each other; that there must be some, if no two of them do."""
+    patience.doing = "looking for goal facts that exclude each other"
+    problem = Poser(domain).pose(world, goal, patience=patience)
+    pairs = [] if problem.one_at_a_time else list(excluding(problem.whole or problem, patience))
+    told = [(one, other) for one, other in pairs if _declared(one) and _declared(other)]
+    said = [f"{_as_written(one)} and {_as_written(other)} can never hold together" for one, other in told]
+    return tuple(said) or ("each goal fact can be reached by itself, but not all of them together",)
+
+
+def _declared(fact: Fact) -> bool:
+    """Not one that stands for a disjunction, whose name has a blank."""
+    return " " not in fact.predicate.removeprefix(NOT)
+
+
+def _as_written(fact: Fact) -> str:
+    denied = fact.predicate.startswith(NOT)
+    return f"(not {replace(fact, predicate=fact.predicate.removeprefix(NOT))})" if denied else str(fact)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,20 +81,21 @@ class _Reach:
 
     Attributes:
         facts: in positive normal form.
-        fluents: the numbers that can change.
+        changes: how numbers can change.
         world: the present.
     """
 
     facts: frozenset[Fact]
-    fluents: frozenset[Fact]
+    changes: tuple[Assignment, ...]
     world: World
 
     @staticmethod
     def of(task: Task, world: World) -> _Reach:
-        reached, numbering = reachable(task).facts, task.numbering
-        named = [one for one in reached if isinstance(numbering.named(one), Fact)]
-        fluents = frozenset(numbering.fact(one) for one in named if one in numbering.fluents)
-        return _Reach(frozenset(map(numbering.fact, named)) - fluents, fluents, world)
+        reach, numbering = reachable(task), task.numbering
+        named = [one for one in reach.facts - numbering.fluents if isinstance(numbering.named(one), Fact)]
+        taken = itertools.compress(task.ways.all, reach.taken)
+        changes = dict.fromkeys(change for way in taken for change in way.assignments)
+        return _Reach(frozenset(map(numbering.fact, named)), tuple(changes), world)
 
     def allows(self, condition: Residual) -> bool:
         """Whether the condition holds, or may hold: each of its leaves by itself."""
@@ -86,9 +106,10 @@ class _Reach:
                 present = is_so(fact, self.world) is positive
                 return present or as_fact(condition) in self.facts
             case Bound():
-                asked = set(condition.fluents())
-                numbers = {one: worth(self.world, one) for one in asked}
-                return condition.holds(numbers) or not self.fluents.isdisjoint(asked)
+                numbers = {one: worth(self.world, one) for one in condition.fluents()}
+                return condition.holds(numbers) or any(
+                    helps(change, condition) for change in self.changes if change.fluent in numbers
+                )
             case Every(parts):
                 return all(map(self.allows, parts))
             case Some(parts):
@@ -135,18 +156,20 @@ class _Causes:
     def chain(self, fact: Fact) -> str:
         """From the fact through the nearest actions to what cannot be had."""
         said: list[str] = []
-        agenda, seen = [fact], {fact}
+        agenda, seen, rooted = [fact], {fact}, False
         while agenda and len(said) < _LONGEST_CHAIN:
             here = agenda.pop(0)
             nearest = self.nearest(here)
             if nearest is None:
+                rooted = True
                 said.append(f"{here} does not hold, and no planning action makes it true")
                 continue
+            rooted |= not nearest.facts or bool(nearest.conditions)
             said.append(f"{here} needs {nearest.step}, which needs {_listed(nearest)}")
             fresh = [missing for missing in nearest.facts if missing not in seen]
             seen.update(fresh)
             agenda.extend(fresh)
-        return "; ".join(said)
+        return "; ".join(said if rooted or agenda else [*said, "none of these can come first"])
 
     def nearest(self, fact: Fact) -> _Nearest | None:
         """The action that lacks least for adding the fact; the first of the domain among equals."""

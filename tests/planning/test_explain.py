@@ -5,6 +5,8 @@ import pytest
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.parser import parse_condition
+from planning.domain import PlanningDomain
+from planning.posing.problem import pose
 from planning.posing.unsolvable import why_unsolvable
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
@@ -54,8 +56,6 @@ def test_goals_that_no_action_affects(clean_up, table, goal, why):
 
 
 def test_a_condition_that_cannot_change_is_named(world_of):
-    from planning.domain import PlanningDomain
-
     domain = PlanningDomain.parse("""(define (domain d) (:types lamp) (:predicates (on ?l - lamp))
       (:functions (limit))
       (:action press :parameters (?l - lamp) :precondition (< 3 (limit)) :effect (on ?l)))""")
@@ -69,8 +69,6 @@ def test_a_typo_in_the_goal_is_an_error(clean_up, table):
 
 
 def test_a_conditional_effect_needs_its_condition(world_of):
-    from planning.domain import PlanningDomain
-
     domain = PlanningDomain.parse("""(define (domain lift) (:types person floor)
       (:predicates (at ?f - floor) (boarded ?p - person) (served ?p - person) (bound ?p - person ?f - floor))
       (:action stop :parameters (?f - floor) :precondition (at ?f) :effect
@@ -82,3 +80,54 @@ def test_a_conditional_effect_needs_its_condition(world_of):
         "(served ann) needs (stop f2), which needs (boarded ann); "
         "(boarded ann) does not hold, and no planning action makes it true"
     )
+
+
+BLOCKS = """(define (domain blocks) (:types block)
+  (:predicates (on ?a ?b - block) (on-table ?a - block) (clear ?a - block))
+  (:action lift :parameters (?a ?b - block) :precondition (and (clear ?a) (on-table ?a) (clear ?b) (not (= ?a ?b)))
+    :effect (and (on ?a ?b) (not (on-table ?a)) (not (clear ?b))))
+  (:action lower :parameters (?a ?b - block) :precondition (and (clear ?a) (on ?a ?b))
+    :effect (and (not (on ?a ?b)) (on-table ?a) (clear ?b))))"""
+
+
+@pytest.mark.parametrize(
+    ("goal", "why"),
+    [
+        ("(and (on a b) (on c b))", "(on a b) and (on c b) can never hold together"),
+        ("(and (on a b) (clear b))", "(on a b) and (clear b) can never hold together"),
+        ("(and (on a b) (not (on a b)))", "(on a b) and (not (on a b)) can never hold together"),
+        ("(and (on a b) (on b c) (on c a))", "each goal fact can be reached by itself, but not all of them together"),
+    ],
+)
+def test_goal_facts_that_exclude_each_other_are_named(world_of, goal, why):
+    domain = PlanningDomain.parse(BLOCKS)
+    facts = [fact(name, block) for name in ("on-table", "clear") for block in "abc"]
+    world = world_of(domain.schema, dict.fromkeys("abc", "block"), facts)
+    assert why_unsolvable(domain, world, parse_condition(goal)) == (why,)
+
+
+def test_what_would_have_to_come_before_itself_is_said(world_of):
+    domain = PlanningDomain.parse("""(define (domain d) (:predicates (empty) (full) (done))
+      (:action take :parameters () :precondition (empty) :effect (and (full) (not (empty))))
+      (:action put :parameters () :precondition (full) :effect (and (empty) (done) (not (full)))))""")
+    [why] = why_unsolvable(domain, world_of(domain.schema, {}), parse_condition("(done)"))
+    assert why == (
+        "(done) needs (put), which needs (full); (full) needs (take), which needs (empty); (empty) needs (put), which"
+        " needs (full); none of these can come first"
+    )
+
+
+@pytest.mark.parametrize(
+    ("fuel", "goal", "why"),
+    [
+        (5, "(there)", "(there) needs (drive), which needs (>= (fuel) 7)"),
+        (9, "(> (fuel) 9)", "(> (fuel) 9) does not hold, and no planning action that can be taken changes that"),
+    ],
+)
+def test_who_only_uses_up_a_number_does_not_make_enough_of_it(world_of, fuel, goal, why):
+    domain = PlanningDomain.parse("""(define (domain d) (:predicates (there)) (:functions (fuel))
+      (:action drive :parameters () :precondition (>= (fuel) 7) :effect (and (there) (decrease (fuel) 7)))
+      (:action idle :parameters () :effect (decrease (fuel) 1)))""")
+    world, wanted = world_of(domain.schema, {}, (), {fact("fuel"): fuel}), parse_condition(goal)
+    assert pose(domain, world, wanted).unreachable == (goal,)
+    assert why_unsolvable(domain, world, wanted) == (why,)

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import itertools
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from knowledge_base.facts import Fact
+from planning.patience import Patience
+from planning.plan import PlanStep
+from planning.posing.exclusion import excluding
+from planning.strips import GroundAction, Problem
+
+FACTS = tuple(Fact("p", (i,)) for i in range(5))
+HOME, AWAY, TIRED = Fact("home"), Fact("away"), Fact("tired")
+GO = GroundAction(PlanStep("go"), (HOME,), (AWAY, TIRED), (HOME,))
+
+
+def pairs(problem):
+    return list(excluding(problem, Patience()))
+
+
+def test_what_one_action_takes_for_giving_the_other_excludes_it():
+    assert pairs(Problem("d", {}, (HOME,), (HOME, AWAY, TIRED), (GO,))) == [(HOME, AWAY), (HOME, TIRED)]
+
+
+def test_what_can_be_had_one_after_the_other_does_not():
+    back = GroundAction(PlanStep("back"), (AWAY,), (HOME,), (AWAY,))
+    assert pairs(Problem("d", {}, (HOME,), (HOME, AWAY, TIRED), (GO, back))) == [(HOME, AWAY)]
+
+
+_some = st.lists(st.sampled_from(FACTS), max_size=2).map(lambda facts: tuple(dict.fromkeys(facts)))
+
+
+@given(st.lists(st.tuples(_some, _some, _some), max_size=4), _some)
+def test_what_is_said_to_exclude_each_other_never_holds_together(actions, init):
+    made = [
+        GroundAction(PlanStep(f"a{i}"), needs, adds, tuple(one for one in gone if one not in adds))
+        for i, (needs, adds, gone) in enumerate(actions)
+    ]
+    seen, agenda = {frozenset(init)}, [frozenset(init)]
+    while agenda:
+        state = agenda.pop()
+        agenda += (fresh := {one.apply(state) for one in made if one.applicable(state)} - seen)
+        seen |= fresh
+    held = {pair for state in seen for pair in itertools.permutations(state, 2)}
+    assert held.isdisjoint(pairs(Problem("d", {}, init, FACTS, tuple(made))))
