@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from knowledge_base.exchange.problem_text import TOTAL_TIME
 from knowledge_base.language.expression import Arithmetic, Call, Term
 from knowledge_base.language.printer import to_text
 from planning.posing.relevance import names_of
@@ -36,6 +37,8 @@ def metric_of(metric: Metric | None, schema: Vocabulary) -> Term | None:
 
 def ignored(metric: Term) -> str:
     """The note for a metric that is no action cost."""
+    if TOTAL_TIME.function in names_of(metric):
+        return f"the metric {to_text(metric)} is ignored: one action at a time is planned for without regard to time"
     return f"the metric {to_text(metric)} is ignored: it is no sum of numbers that actions raise by fixed amounts"
 
 

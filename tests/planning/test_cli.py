@@ -173,7 +173,7 @@ def test_the_doctor_lists_every_engine_with_what_it_can_do_and_what_it_lacks(mon
 
 
 def test_the_doctor_fits_a_terminal_of_100_columns(monkeypatch):
-    monkeypatch.setattr("planning.cli.PIPE_WIDTH", 100)
+    monkeypatch.setattr("planning.cli.doctor.PIPE_WIDTH", 100)
     app = typer.Typer()
     app.command()(doctor_command)
     lines = CliRunner().invoke(app, [], catch_exceptions=False).stdout.splitlines()
@@ -255,7 +255,7 @@ class Anytime:
 )
 def test_where_actions_have_costs_a_cheaper_plan_is_waited_for(run, tmp_path, monkeypatch, function, steps, cost):
     monkeypatch.setattr("planning.engines.race.PlannerRace", Anytime)
-    monkeypatch.setattr("planning.cli.PATIENT_SECONDS", 0.05)
+    monkeypatch.setattr("planning.cli.solving.PATIENT_SECONDS", 0.05)
     monkeypatch.setattr(Anytime, "stopped", False)
     (tmp_path / "tolls.pddl").write_text(TOLLS.replace("total-cost", function))
     lines = run(problem=ROUND, domains=[tmp_path / "tolls.pddl"]).stdout.splitlines()
@@ -331,3 +331,27 @@ def test_the_time_is_for_posing_as_well(run, tmp_path):
     assert result.stderr == "no plan within 0.05 s (while grounding action 'a')\n"
     answer = json.loads(run("--json", "--seconds", "0.05", problem=problem, domains=[domain]).stdout)
     assert (answer["outcome"], answer["while"]) == ("timed_out", "grounding action 'a'")
+
+
+ERRAND = """(define (domain errand) (:types place) (:predicates (at ?p - place) (near ?p - place))
+  (:functions (toll ?p - place) (left) (total-cost))
+  (:derived (near ?p - place) (at ?p))
+  (:action go :parameters (?p - place) :precondition (<= (left) 3)
+    :effect (and (at ?p) (increase (total-cost) (toll ?p)))))"""
+
+
+@pytest.mark.parametrize(
+    ("init", "notes"),
+    [
+        ("(= (left) 0) (= (toll a) 2)", []),
+        ("(= (left) 0)", ["(toll a) has no value and counts as 0"]),
+        ("", ["(left) has no value and counts as 0", "(toll a) has no value and counts as 0"]),
+        ("(= (left) 0) (= (toll a) 2) (near a)", ["problem.pddl: what :init says of 'near' is not heeded: it is derived"]),
+    ],
+)
+def test_numbers_without_a_value_and_facts_that_only_follow_from_others_are_noted(run, tmp_path, init, notes):
+    (tmp_path / "errand.pddl").write_text(ERRAND)
+    problem = f"(define (problem p) (:domain errand) (:objects a - place) (:init {init}) (:goal (near a)))"
+    answer = json.loads(run("--json", "--engine", "pyperplan", problem=problem, domains=[tmp_path / "errand.pddl"]).stdout)
+    assert answer["steps"] == ["(go a)"]
+    assert [one.replace(f"{tmp_path}/", "") for one in answer["notes"]] == notes

@@ -1,0 +1,99 @@
+"""`dsc plan`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from planning.cli.answers import TIMED_OUT, answer_of, end, ordered, purposes
+from planning.cli.solving import read_files, solved, why_none
+
+if TYPE_CHECKING:
+    from planning.domain import PlanningDomain
+    from planning.ordering.order import PartialOrder
+    from planning.plan import Plan
+
+PLOT_NAME = "plan"
+
+
+def plan_command(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DOMAIN... PROBLEM", help="PDDL: the domain, in one file or several, and the problem.",
+            show_default=False,
+        ),
+    ],
+    engine: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which engine plans.  [default: those that suit it race]")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Stop posing and planning after this long.")] = 10.0,
+    parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can go side by side.")] = False,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete.")] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Say what each step is for, or why there is no plan.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:  # fmt: skip
+    """Find a plan and print its steps.
+
+    Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
+    """
+    from planning.cli.notes import valueless
+    from planning.ordering.order import deordered
+    from planning.ordering.timed_links import linked
+    from planning.patience import OutOfPatienceError
+    from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
+    from planning.posing.constructs import why_no_engine
+
+    if plot is not None:
+        _refuse_unwritable(plot)
+    domain, read, world = read_files(files)
+    notes = [*domain.notes, *read.notes]
+    try:
+        problem, outcome = solved(domain, read, world, seconds, engine)
+    except OutOfPatienceError as error:
+        late: dict[str, Any] = {"outcome": "timed_out", "steps": [], "engine": None, "seconds": seconds}
+        end(TIMED_OUT, late | {"while": error.doing}, notes, as_json=as_json)
+    notes += problem.notes
+    status, answer = answer_of(outcome)
+    if isinstance(outcome, NobodyCan):
+        answer["reason"] = why_no_engine(domain, read.goal, outcome)
+    if isinstance(outcome, ProvenUnsolvable) and explain:
+        answer["why"] = why_none(domain, read, world, seconds)
+    if isinstance(outcome, PlanFound):
+        plan = outcome.plan
+        notes += valueless(plan, domain, read)
+        order = (linked if plan.schedule else deordered)(plan, domain, world, read.goal)
+        answer |= ordered(order) if parallel else {}
+        answer |= purposes(order) if explain else {}
+        if plot is not None:
+            _write_plot(plot, outcome.plan, domain, order if parallel else None)
+    end(status, answer, notes, as_json=as_json)
+
+
+def _refuse_unwritable(file: Path) -> None:
+    """Before any search, and without making the file: there may be no plan to put there."""
+    from knowledge_base.errors import InputError
+
+    if file.is_dir():
+        raise InputError(f"cannot write the plot to '{file}': it is a folder")
+    if not file.parent.is_dir():
+        raise InputError(f"cannot write the plot to '{file}': there is no folder '{file.parent}'")
+    if not os.access(file if file.exists() else file.parent, os.W_OK):
+        raise InputError(f"cannot write the plot to '{file}': it may not be written")
+
+
+def _write_plot(file: Path, plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> None:
+    from dsc.text.plots import plot_to_yaml
+    from knowledge_base.errors import InputError
+    from planning.generation.plot import plot_from_plan
+
+    text = plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write the plot to '{file}': {error.strerror}") from None

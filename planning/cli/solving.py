@@ -1,0 +1,149 @@
+"""What `dsc plan` does: read files, ask for a plan, wait for a cheaper one, find out why there is none."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from knowledge_base.exchange.pddl import ProblemText
+    from knowledge_base.store import KnowledgeBase
+    from planning.domain import PlanningDomain
+    from planning.engines.planner import PlannerProcess
+    from planning.engines.race import PlannerRace
+    from planning.plan import PlanningOutcome
+    from planning.strips import Problem
+
+PATIENCE, PATIENT_SECONDS = 3.0, 2.0
+"""A cheaper plan is waited for that many times as long as the first took, and for as many seconds at least."""
+
+
+def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, KnowledgeBase]:
+    """The domain, the problem and the world that it begins with.
+
+    Raises:
+        InputError: a file cannot be read or has a mistake, or there is no problem or no goal.
+    """
+    from knowledge_base.errors import InputError, Place
+    from knowledge_base.exchange.pddl import read_problem
+    from knowledge_base.store import KnowledgeBase
+    from planning.cli.notes import without_derived
+    from planning.domain import PlanningDomain
+
+    if len(files) < 2:
+        raise InputError(f"dsc plan takes a domain and a problem, there is only '{files[0]}'")
+    *fragments, file = files
+    domain = PlanningDomain.from_fragments(fragments)
+    read = without_derived(read_problem(file, domain.schema, domain=domain.name), domain, file)
+    if not read.has_goal:
+        raise InputError("the problem has no goal: (:goal CONDITION)", place=Place(str(file), 1))
+    world = KnowledgeBase(domain.schema)
+    world.apply(read.delta(), author=str(file))
+    return domain, read, world
+
+
+def solved(
+    domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float, engine: str | None
+) -> tuple[Problem, PlanningOutcome]:
+    """The problem and what comes of it; the time is for both together.
+
+    Raises:
+        OutOfPatienceError: it was not even posed in time.
+    """
+    import asyncio
+
+    from planning.engines.registry import chosen, timing
+    from planning.patience import Patience, aside
+    from planning.plan import TimedOut
+    from planning.posing.problem import pose
+
+    patience = Patience(seconds)
+    durations = bool(timing()) or engine is not None
+
+    def posed() -> Problem:
+        return pose(domain, world, read.goal, read.metric, durations=durations, patience=patience)
+
+    async def solve() -> tuple[Problem, PlanningOutcome]:
+        with _progress("grounding the problem"):
+            problem = await aside(posed, patience)
+        planner = _planner(problem, engine)
+        names = [engine] if engine else [one.name for one in chosen(problem)]
+        with _progress(f"planning with {' and '.join(names)}, {len(problem.actions)} ground actions"):
+            try:
+                outcome = await _cheapest(planner, problem, patience.left)
+            finally:
+                await planner.close()
+        return problem, replace(outcome, seconds=seconds) if isinstance(outcome, TimedOut) else outcome
+
+    return asyncio.run(solve())
+
+
+def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float) -> list[str]:
+    """Why there is no plan, one sentence a line, or that this was not found out in time."""
+    import asyncio
+
+    from planning.patience import OutOfPatienceError, Patience, aside
+    from planning.posing.unsolvable import why_unsolvable
+
+    patience = Patience(seconds)
+    try:
+        return list(asyncio.run(aside(lambda: why_unsolvable(domain, world, read.goal, patience), patience)))
+    except OutOfPatienceError:
+        return [f"what is missing was not found out within {seconds:g} s"]
+
+
+async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, seconds: float) -> PlanningOutcome:
+    """The first outcome; where actions have costs, the cheapest plan that comes in some more of the time."""
+    import asyncio
+    import time
+    from contextlib import aclosing, suppress
+
+    from planning.plan import PlanFound
+
+    started = time.monotonic()
+    async with aclosing(planner.plans(problem, seconds)) as plans:
+        best = await anext(plans)
+        if isinstance(best, PlanFound) and "costs" in problem.features:
+            spent = time.monotonic() - started
+            with suppress(TimeoutError):
+                async with asyncio.timeout(min(seconds - spent, max(PATIENT_SECONDS, PATIENCE * spent))):
+                    async for cheaper in plans:
+                        best = cheaper
+    return best
+
+
+def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRace:
+    """The named engine, if it can do the problem and is installed; else a race."""
+    from knowledge_base.errors import InputError, UnknownNameError
+    from planning.engines.planner import PlannerProcess
+    from planning.engines.race import PlannerRace
+    from planning.engines.registry import ENGINES, able
+
+    if engine is None:
+        return PlannerRace()
+    forms = [problem, *([problem.timed] if problem.timed else ())]
+    suited = {one.name: one for form in forms for one in able(form.features)}
+    could = f"; for this problem there are {', '.join(suited)}" if suited else ""
+    known = [one.name for one in ENGINES]
+    if engine not in known:
+        raise UnknownNameError(f"there is no engine '{engine}'{could}", found=engine, valid=known)
+    if engine not in suited:
+        raise InputError(f"the engine '{engine}' cannot do {', '.join(sorted(problem.features))}{could}")
+    if lacks := suited[engine].lacks():
+        raise InputError(f"the engine '{engine}' is not installed: {lacks}")
+    return PlannerProcess(engine)
+
+
+def _progress(text: str) -> AbstractContextManager[object]:
+    if not sys.stderr.isatty():
+        return nullcontext()
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    progress = Progress(*columns, console=Console(stderr=True), transient=True)
+    progress.add_task(text, total=None)
+    return progress
