@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.exchange.domain_writer import action_to_text, axiom_to_text, domain_to_text
-from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
-from knowledge_base.language.effect import Add, Delete, Effect, effect_leaves, substitute_effect
+from knowledge_base.language.effect import Effect, substitute_effect
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
 from knowledge_base.language.expression import (
     And,
@@ -25,9 +24,9 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.language.vocabulary import ROOT_TYPE
-from knowledge_base.pddl.action_text import ActionText
-from knowledge_base.pddl.domain_text import AxiomText, DomainText, parse_domain, read_domain
+from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
 from knowledge_base.world.schema import Schema
+from planning.actions import Axiom, PlanningAction, checked, checked_axiom, refuse_changed
 from planning.fragments import merged_text, searched, text_of
 
 if TYPE_CHECKING:
@@ -40,41 +39,6 @@ if TYPE_CHECKING:
 _MOST_GROUND = 1024  # steps; a plan for 50 items has about 130
 
 __all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain", "Timed"]
-
-
-@dataclass(frozen=True, slots=True)
-class PlanningAction:
-    """What the planner may do, in general; with arguments it becomes a `PlanStep`.
-
-    Attributes:
-        name, parameters: as declared.
-        precondition: what must hold before; of a durative action, what it needs when it is done alone.
-        effect: what has changed afterwards; of a durative action, when it was done alone.
-        place: where it is defined.
-        duration: how long it takes, in seconds; `None` for an action without duration.
-        timed: what a durative action needs and does at its start, all the time, and at its end.
-    """
-
-    name: str
-    parameters: tuple[TypedVariable, ...]
-    precondition: Expression
-    effect: Effect
-    place: Place | None = field(default=None, compare=False, repr=False)
-    duration: Duration | None = None
-    timed: Timed | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Axiom:
-    """A derived predicate (PDDL 2.2): it holds of these parameters wherever the condition does.
-
-    Several axioms for one predicate are alternatives.
-    """
-
-    predicate: str
-    parameters: tuple[TypedVariable, ...]
-    condition: Expression
-    place: Place | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +132,9 @@ class PlanningDomain:
             InputError: it contains a mistake; it says where.
         """
         schema = Schema.from_text(read).with_computed(*computed)
-        actions = {a.name: _checked(a, schema) for a in read.actions}
-        axioms = tuple(_checked_axiom(a, schema) for a in read.axioms)
-        _refuse_changed(actions.values(), axioms)
+        actions = {a.name: checked(a, schema) for a in read.actions}
+        axioms = tuple(checked_axiom(a, schema) for a in read.axioms)
+        refuse_changed(actions.values(), axioms)
         return cls(read.name, schema, actions, axioms, tuple(dict.fromkeys(read.remarks())))
 
     def to_pddl(self) -> str:
@@ -267,47 +231,3 @@ def _type_test(parameter: TypedVariable, arg: str, schema: Schema) -> Expression
         return Exists((parameter,), Comparison("=", it, Constant(arg)))
     tests = tuple(Atom(one, (Constant(arg),)) for one in types)
     return tests[0] if len(tests) == 1 else Or(tests)
-
-
-def _checked(action: ActionText, schema: Schema) -> PlanningAction:
-    for parameter in action.parameters:
-        for one in parameter.types:
-            schema.require_type(one, parameter.place)  # a parameter is a thing: a plan names it
-    variables = check_parameters(action.parameters, schema)
-    # A name that is no constant is a mistake here: the problem's objects are not known to the domain.
-    timed = action.timed or Timed(start=action.precondition, end_effect=action.effect)
-    for condition in (timed.start, timed.over_all, timed.end):
-        check(condition, schema, variables, objects=schema.constants)
-    for effect in (timed.start_effect, timed.end_effect):
-        check_effect(effect, schema, variables, objects=schema.constants)
-    if action.duration is not None:
-        bounds = Comparison("<=", action.duration.least, action.duration.most)
-        check(bounds, schema, variables, objects=schema.constants)
-    return PlanningAction(
-        action.name, action.parameters, action.precondition, action.effect, action.place, action.duration, action.timed
-    )
-
-
-def _checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
-    head = axiom.head
-    signature = schema.predicate(head.name, head.place)
-    check_arity(signature, len(head.parameters), head.place)
-    declared = zip(head.parameters, signature.parameters, strict=True)
-    parameters = tuple(own if own.types else replace(own, types=theirs.types) for own, theirs in declared)
-    variables = check_parameters(parameters, schema)
-    check(Atom(head.name, tuple(Variable(p.name) for p in parameters), place=head.place), schema, variables)
-    check(axiom.condition, schema, variables, objects=schema.constants)
-    return Axiom(head.name, parameters, axiom.condition, head.place)
-
-
-def _refuse_changed(actions: Iterable[PlanningAction], axioms: tuple[Axiom, ...]) -> None:
-    """A derived predicate follows from others; no action may say otherwise."""
-    derived = {axiom.predicate: axiom for axiom in axioms}
-    for action in actions:
-        for leaf in effect_leaves(action.effect):
-            if isinstance(leaf, Add | Delete) and leaf.atom.predicate in derived:
-                name = leaf.atom.predicate
-                raise SchemaError(
-                    f"the action '{action.name}' changes '{name}', which is derived (at {derived[name].place})",
-                    place=leaf.atom.place,
-                )

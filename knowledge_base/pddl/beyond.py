@@ -13,6 +13,7 @@ _TEMPORAL = "temporal planners, such as OPTIC or Tamer"
 _HIERARCHICAL = "hierarchical planners (HDDL), such as Aries or PANDA"
 _CONTINGENT = "contingent planners, such as CPOR"
 _WHOLE_PLANS = "planners for PDDL 3, such as OPTIC or SGPlan"
+_CHANCE = "probabilistic planners (PPDDL), such as FF-Replan"
 _OBJECTS = "planners with object fluents, such as Tamer"
 
 
@@ -46,6 +47,7 @@ _FORMS: Mapping[str, _Construct] = {
     "preference": _Construct("conditions that may be given up", _WHOLE_PLANS),
     "oneof": _Construct("a world that is not known at first", _CONTINGENT),
     "unknown": _Construct("a world that is not known at first", _CONTINGENT),
+    "probabilistic": _Construct("effects that happen by chance", _CHANCE),
     **dict.fromkeys(_TRAJECTORIES, _Construct("conditions on whole plans", _WHOLE_PLANS)),
 }
 _CONTINUOUS = _Construct("numbers that change while the action goes on", _HYBRID)

@@ -14,13 +14,11 @@ import networkx as nx
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.effect import AllOf, Effect, ForEach, When, effect_conditions
+from knowledge_base.language.effect import effect_conditions
 from knowledge_base.language.evaluation import query
 from knowledge_base.language.expression import (
     And,
-    Arithmetic,
     Atom,
-    Call,
     Comparison,
     Constant,
     Exists,
@@ -30,23 +28,24 @@ from knowledge_base.language.expression import (
     Not,
     Or,
     Term,
-    TypedVariable,
     Variable,
-    free_variables,
     parts_of,
 )
 from knowledge_base.language.memory import IdentityCache
-from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES
 from knowledge_base.world.overlay import Overlay
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.posing.relevance import changed, names_of
+from planning.posing.rewriting import instantiated, rewritten, type_test
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator
 
     from knowledge_base.facts import Value
     from knowledge_base.language.evaluation import World
     from planning.domain import Axiom, PlanningAction, PlanningDomain
+
+
+_AXIOMS = "planners with axioms of their own, such as Fast Downward run by itself"
 
 
 def derivation(domain: PlanningDomain) -> Derivation:
@@ -158,7 +157,7 @@ class Derivation:
         changing = ", ".join(f"'{one}'" for one in sorted(self._unsupported[name]))
         return (
             f"'{name}', a derived predicate that follows from itself (at {self._axioms[name][0].place}) and from what"
-            f" planning actions change ({changing}); no engine of unified-planning takes that"
+            f" planning actions change ({changing}); what can do it: {_AXIOMS}"
         )
 
     def _unsupported_in(self, e: Expression | Term) -> Iterator[Atom]:
@@ -187,19 +186,19 @@ class Derivation:
         """The axiom's condition for the atom's arguments, and their types where the axiom asks for narrower ones."""
         declared = self._schema.predicates[axiom.predicate].parameters
         tests = tuple(
-            _type_test(own, term)
+            type_test(own, term)
             for own, wide, term in zip(axiom.parameters, declared, atom.args, strict=True)
             if own.types != wide.types
         )
         terms = dict(zip((p.name for p in axiom.parameters), atom.args, strict=True))
-        condition = _instantiated(axiom.condition, terms)
+        condition = instantiated(axiom.condition, terms)
         return And((*tests, condition)) if tests else condition
 
     def _consequences(self, circle: Iterable[str], world: World) -> Iterator[Fact]:
         """What the axioms for these predicates say in `world`."""
         for name in sorted(circle):
             for axiom in self._axioms[name]:
-                tests = (_type_test(p, Variable(p.name)) for p in axiom.parameters)
+                tests = (type_test(p, Variable(p.name)) for p in axiom.parameters)
                 for found in query(And((*tests, self.expand(axiom.condition))), world):
                     yield Fact(name, tuple(found[p.name] for p in axiom.parameters))
 
@@ -254,32 +253,6 @@ def _equal(term: Term, value: Value) -> Expression:
 _known: IdentityCache[PlanningDomain, Derivation] = IdentityCache(size=64)
 
 
-def rewritten(action: PlanningAction, rewrite: Callable[[Expression], Expression]) -> PlanningAction:
-    """The action with each of its conditions rewritten."""
-    timed = action.timed and replace(
-        action.timed,
-        start=rewrite(action.timed.start),
-        over_all=rewrite(action.timed.over_all),
-        end=rewrite(action.timed.end),
-        start_effect=_rewritten(action.timed.start_effect, rewrite),
-        end_effect=_rewritten(action.timed.end_effect, rewrite),
-    )
-    effect = _rewritten(action.effect, rewrite)
-    return replace(action, precondition=rewrite(action.precondition), effect=effect, timed=timed)
-
-
-def _rewritten(effect: Effect, rewrite: Callable[[Expression], Expression]) -> Effect:
-    match effect:
-        case AllOf(parts):
-            return replace(effect, parts=tuple(_rewritten(part, rewrite) for part in parts))
-        case ForEach(_, body):
-            return replace(effect, effect=_rewritten(body, rewrite))
-        case When(condition, body):
-            return replace(effect, condition=rewrite(condition), effect=_rewritten(body, rewrite))
-        case _:
-            return effect
-
-
 def _strata(graph: nx.DiGraph[str]) -> Iterator[frozenset[str]]:
     """Predicates that follow from each other, after those that they follow from."""
     components = nx.condensation(graph)
@@ -308,52 +281,3 @@ def _denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
         case _:
             for part in parts_of(e):
                 yield from _denied(part, wanted=wanted)
-
-
-def _type_test(parameter: TypedVariable, term: Term) -> Expression:
-    types = [one for one in parameter.types or (ROOT_TYPE,) if one not in VALUE_TYPES]
-    return Or(tuple(Atom(one, (term,)) for one in types)) if types else And(())
-
-
-def _instantiated(e: Expression, terms: Mapping[str, Term]) -> Expression:
-    """The condition with terms in the place of free variables; its own variables are renamed where they would clash."""
-    match e:
-        case Atom(_, args):
-            return replace(e, args=_all(args, terms))
-        case Not(body):
-            return replace(e, body=_instantiated(body, terms))
-        case And(parts) | Or(parts):
-            return replace(e, parts=tuple(_instantiated(part, terms) for part in parts))
-        case Imply(premise, conclusion):
-            return Imply(_instantiated(premise, terms), _instantiated(conclusion, terms), place=e.place)
-        case Comparison(operator, left, right):
-            return Comparison(operator, _term(left, terms), _term(right, terms), place=e.place)
-        case Exists(variables, body) | Forall(variables, body):
-            renamed = _renamed(variables, terms)
-            inner = {**terms, **{old.name: Variable(new.name) for old, new in zip(variables, renamed, strict=True)}}
-            return replace(e, variables=renamed, body=_instantiated(body, inner))
-
-
-def _renamed(variables: tuple[TypedVariable, ...], terms: Mapping[str, Term]) -> tuple[TypedVariable, ...]:
-    taken = frozenset().union(*map(free_variables, terms.values()))
-
-    def fresh(name: str) -> str:
-        while name in taken:
-            name += "'"
-        return name
-
-    return tuple(replace(variable, name=fresh(variable.name)) for variable in variables)
-
-
-def _all(args: tuple[Term, ...], terms: Mapping[str, Term]) -> tuple[Term, ...]:
-    return tuple(_term(arg, terms) for arg in args)
-
-
-def _term(term: Term, terms: Mapping[str, Term]) -> Term:
-    match term:
-        case Variable(name):
-            return terms.get(name, term)
-        case Call(_, args) | Arithmetic(_, args):
-            return replace(term, args=_all(args, terms))
-        case _:
-            return term

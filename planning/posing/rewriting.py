@@ -1,0 +1,107 @@
+"""Actions with other conditions, and conditions with terms, in the place of what was there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from knowledge_base.language.effect import AllOf, Effect, ForEach, When
+from knowledge_base.language.expression import (
+    And,
+    Arithmetic,
+    Atom,
+    Call,
+    Comparison,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    TypedVariable,
+    Variable,
+    free_variables,
+)
+from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from planning.domain import PlanningAction
+
+
+def rewritten(action: PlanningAction, rewrite: Callable[[Expression], Expression]) -> PlanningAction:
+    """The action with each of its conditions rewritten."""
+    timed = action.timed and replace(
+        action.timed,
+        start=rewrite(action.timed.start),
+        over_all=rewrite(action.timed.over_all),
+        end=rewrite(action.timed.end),
+        start_effect=_rewritten(action.timed.start_effect, rewrite),
+        end_effect=_rewritten(action.timed.end_effect, rewrite),
+    )
+    effect = _rewritten(action.effect, rewrite)
+    return replace(action, precondition=rewrite(action.precondition), effect=effect, timed=timed)
+
+
+def _rewritten(effect: Effect, rewrite: Callable[[Expression], Expression]) -> Effect:
+    match effect:
+        case AllOf(parts):
+            return replace(effect, parts=tuple(_rewritten(part, rewrite) for part in parts))
+        case ForEach(_, body):
+            return replace(effect, effect=_rewritten(body, rewrite))
+        case When(condition, body):
+            return replace(effect, condition=rewrite(condition), effect=_rewritten(body, rewrite))
+        case _:
+            return effect
+
+
+def type_test(parameter: TypedVariable, term: Term) -> Expression:
+    """Whether a term is of the parameter's type; a value is checked where it is written."""
+    types = [one for one in parameter.types or (ROOT_TYPE,) if one not in VALUE_TYPES]
+    return Or(tuple(Atom(one, (term,)) for one in types)) if types else And(())
+
+
+def instantiated(e: Expression, terms: Mapping[str, Term]) -> Expression:
+    """The condition with terms in the place of free variables; its own variables are renamed where they would clash."""
+    match e:
+        case Atom(_, args):
+            return replace(e, args=_all(args, terms))
+        case Not(body):
+            return replace(e, body=instantiated(body, terms))
+        case And(parts) | Or(parts):
+            return replace(e, parts=tuple(instantiated(part, terms) for part in parts))
+        case Imply(premise, conclusion):
+            return Imply(instantiated(premise, terms), instantiated(conclusion, terms), place=e.place)
+        case Comparison(operator, left, right):
+            return Comparison(operator, _term(left, terms), _term(right, terms), place=e.place)
+        case Exists(variables, body) | Forall(variables, body):
+            renamed = _renamed(variables, terms)
+            inner = {**terms, **{old.name: Variable(new.name) for old, new in zip(variables, renamed, strict=True)}}
+            return replace(e, variables=renamed, body=instantiated(body, inner))
+
+
+def _renamed(variables: tuple[TypedVariable, ...], terms: Mapping[str, Term]) -> tuple[TypedVariable, ...]:
+    taken = frozenset().union(*map(free_variables, terms.values()))
+
+    def fresh(name: str) -> str:
+        while name in taken:
+            name += "'"
+        return name
+
+    return tuple(replace(variable, name=fresh(variable.name)) for variable in variables)
+
+
+def _all(args: tuple[Term, ...], terms: Mapping[str, Term]) -> tuple[Term, ...]:
+    return tuple(_term(arg, terms) for arg in args)
+
+
+def _term(term: Term, terms: Mapping[str, Term]) -> Term:
+    match term:
+        case Variable(name):
+            return terms.get(name, term)
+        case Call(_, args) | Arithmetic(_, args):
+            return replace(term, args=_all(args, terms))
+        case _:
+            return term
