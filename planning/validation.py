@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from knowledge_base.language.vocabulary import Vocabulary
     from planning.domain import PlanningDomain
     from planning.plan import PlanStep, Timing
+    from planning.posing.derived import Derivation
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,34 +50,34 @@ def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression)
     invalid like any other; so does a goal about an object that is not there any more.
     """
     derived = derivation(domain)
-    take = _as_scheduled if plan.schedule else _in_turn
-    ahead = take(plan, derived.domain, derived.world(world))
+    ahead = (_as_scheduled if plan.schedule else _in_turn)(plan, derived, derived.world(world))
     if isinstance(ahead, Validation):
         return ahead
     try:
-        wanted = derived.expand(goal)
-        reached = holds(wanted, ahead)
-        return Validation(reached, why="" if reached else str(explain(wanted, ahead).deciding))
+        wanted, seen = derived.expand(goal), derived.complete(ahead) if derived.unsupported else ahead
+        reached = holds(wanted, seen)
+        return Validation(reached, why="" if reached else str(explain(wanted, seen).deciding))
     except InputError as error:
         return Validation(valid=False, why=str(error))
 
 
-def _in_turn(plan: Plan, domain: PlanningDomain, world: World) -> Overlay | Validation:
+def _in_turn(plan: Plan, derived: Derivation, world: World) -> Overlay | Validation:
     """The world after the steps one after the other, or at which one that ends."""
     ahead = Overlay(world)
     for index, step in enumerate(plan.steps):
-        why_not = _obstacle(step, domain, ahead)
+        seen = derived.complete(ahead) if derived.unsupported else ahead
+        why_not = _obstacle(step, derived.domain, seen, ahead)
         if why_not is not None:
             return Validation(valid=False, failing_step=index, why=why_not)
     return ahead
 
 
-def _as_scheduled(plan: Plan, domain: PlanningDomain, world: World) -> Overlay | Validation:
+def _as_scheduled(plan: Plan, derived: Derivation, world: World) -> Overlay | Validation:
     """The world after the steps at their times, or at which one that ends."""
     acts = []
     for index, (step, timing) in enumerate(zip(plan.steps, plan.schedule, strict=True)):
         try:
-            acts.append(_act(step, timing, domain, world))
+            acts.append(_act(step, timing, derived.domain, world))
         except InputError as error:
             return Validation(valid=False, failing_step=index, why=str(error))
 
@@ -142,12 +143,12 @@ def _delta(changes: Changes, schema: Vocabulary) -> Delta:
     )
 
 
-def _obstacle(step: PlanStep, domain: PlanningDomain, ahead: Overlay) -> str | None:
-    """Take the step, or say why that cannot be."""
+def _obstacle(step: PlanStep, domain: PlanningDomain, seen: World, ahead: Overlay) -> str | None:
+    """Take the step, or say why that cannot be; `seen` is what is ahead with all that follows from it."""
     try:
-        if not domain.applicable(step, ahead):
-            return str(domain.why_not(step, ahead).deciding)
-        ahead.apply(domain.effects(step, ahead))
+        if not domain.applicable(step, seen):
+            return str(domain.why_not(step, seen).deciding)
+        ahead.apply(domain.effects(step, seen))
     except InputError as error:
         return str(error)
     return None

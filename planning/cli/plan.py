@@ -12,6 +12,8 @@ from planning.cli.answers import TIMED_OUT, answer_of, end, ordered, purposes
 from planning.cli.solving import read_files, solved, why_none
 
 if TYPE_CHECKING:
+    from knowledge_base.language.expression import Expression
+    from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
     from planning.ordering.order import PartialOrder
     from planning.plan import Plan
@@ -43,8 +45,6 @@ def plan_command(
     Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
     """
     from planning.cli.notes import valueless
-    from planning.ordering.order import deordered
-    from planning.ordering.timed_links import linked
     from planning.patience import OutOfPatienceError
     from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
     from planning.posing.constructs import why_no_engine
@@ -67,12 +67,33 @@ def plan_command(
     if isinstance(outcome, PlanFound):
         plan = outcome.plan
         notes += valueless(plan, domain, read)
-        order = (linked if plan.schedule else deordered)(plan, domain, world, read.goal)
+        order = _order(plan, domain, world, read.goal)
+        notes += _untraced(domain) if parallel or explain or plot else []
         answer |= ordered(order) if parallel else {}
         answer |= purposes(order) if explain else {}
         if plot is not None:
             _write_plot(plot, outcome.plan, domain, order if parallel else None)
     end(status, answer, notes, as_json=as_json)
+
+
+def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expression) -> PartialOrder:
+    from planning.ordering.order import deordered, in_sequence
+    from planning.ordering.timed_links import linked
+    from planning.posing.axioms import Derivable
+
+    if Derivable.of(domain) is not None:
+        return in_sequence(plan)
+    return (linked if plan.schedule else deordered)(plan, domain, world, goal)
+
+
+def _untraced(domain: PlanningDomain) -> list[str]:
+    """A note where plans are only for looking at."""
+    from planning.posing.axioms import Derivable
+
+    form = Derivable.of(domain)
+    names = ", ".join(f"'{one}'" for one in sorted(form.predicates)) if form else ""
+    why = "planning actions change what it follows from, itself included"
+    return [f"{names}: {why}, so who needs what is not traced, and no robot can carry the plan out"] if form else []
 
 
 def _refuse_unwritable(file: Path) -> None:

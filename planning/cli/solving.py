@@ -58,12 +58,16 @@ def solved(
     from planning.engines.registry import chosen, timing
     from planning.patience import Patience, aside
     from planning.plan import TimedOut
+    from planning.posing.axioms import Derivable
     from planning.posing.problem import pose
 
     patience = Patience(seconds)
     durations = bool(timing()) or engine is not None
 
     def posed() -> Problem:
+        form = Derivable.of(domain)
+        if form is not None:
+            return form.pose(world, read.goal, read.metric, durations=durations, patience=patience)
         return pose(domain, world, read.goal, read.metric, durations=durations, patience=patience)
 
     async def solve() -> tuple[Problem, PlanningOutcome]:
@@ -86,11 +90,17 @@ def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, se
     import asyncio
 
     from planning.patience import OutOfPatienceError, Patience, aside
+    from planning.posing.axioms import Derivable
     from planning.posing.unsolvable import why_unsolvable
 
     patience = Patience(seconds)
+
+    def why() -> tuple[str, ...]:
+        form = Derivable.of(domain)
+        return form.why_none(world, read.goal, patience) if form else why_unsolvable(domain, world, read.goal, patience)
+
     try:
-        return list(asyncio.run(aside(lambda: why_unsolvable(domain, world, read.goal, patience), patience)))
+        return list(asyncio.run(aside(why, patience)))
     except OutOfPatienceError:
         return [f"what is missing was not found out within {seconds:g} s"]
 

@@ -38,7 +38,7 @@ from planning.posing.relevance import changed, names_of
 from planning.posing.rewriting import instantiated, rewritten, type_test
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from knowledge_base.facts import Value
     from knowledge_base.language.evaluation import World
@@ -63,6 +63,7 @@ class Derivation:
     Attributes:
         original: the domain as it is written.
         domain: the domain with conditions in their place, as far as that can be.
+        unsupported: the recursive predicates that actions affect, with what of it actions change.
     """
 
     def __init__(self, domain: PlanningDomain) -> None:
@@ -78,7 +79,7 @@ class Derivation:
         self._changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
         reached = {name: {name, *nx.descendants(graph, name)} for name in self._recursive}
         affected = {name: self._changing & follows for name, follows in reached.items()}
-        self._unsupported = {name: causes for name, causes in affected.items() if causes}
+        self.unsupported = {name: causes for name, causes in affected.items() if causes}
         if domain.axioms:
             actions = {name: rewritten(action, self.expand) for name, action in domain.actions.items()}
             domain = replace(domain, actions=actions, axioms=())
@@ -107,11 +108,17 @@ class Derivation:
 
     def world(self, world: World) -> World:
         """The world with the facts of those recursive predicates that no action affects."""
-        supported = [circle for circle in self._circles if self._unsupported.keys().isdisjoint(circle)]
-        if not supported:
+        return self._closed(world, [one for one in self._circles if self.unsupported.keys().isdisjoint(one)])
+
+    def complete(self, world: World) -> World:
+        """The world with the facts of all recursive predicates, as they are now."""
+        return self._closed(world, self._circles)
+
+    def _closed(self, world: World, circles: Collection[frozenset[str]]) -> World:
+        if not circles:
             return world
         closed = Overlay(world)
-        for circle in supported:  # each comes after those that it follows from
+        for circle in circles:  # each comes after those that it follows from
             while facts := [fact for fact in self._consequences(circle, closed) if not _holds(fact, closed)]:
                 closed.apply(Delta(added=tuple(dict.fromkeys(facts))))
         return closed
@@ -119,7 +126,7 @@ class Derivation:
     def at(self, world: World) -> Settled:
         """The domain for the world as it is, and as long as nothing changes that recursive predicates follow from."""
         closed = self.world(world)
-        supported = [name for circle in self._circles for name in sorted(circle) if name not in self._unsupported]
+        supported = [name for circle in self._circles for name in sorted(circle) if name not in self.unsupported]
         facts = frozenset(
             Fact(name, tuple(args))
             for name in supported
@@ -129,7 +136,7 @@ class Derivation:
 
     def may_change(self, e: Expression) -> bool:
         """Whether some action may make the expanded condition true or false; `False` is certain."""
-        changing = self._changing.union(self._schema.computed, self._unsupported)
+        changing = self._changing.union(self._schema.computed, self.unsupported)
         fixed = self._schema.predicates.keys() - changing
         return not all(name in fixed or self._schema.is_type(name, 1) for name in names_of(e))
 
@@ -145,23 +152,24 @@ class Derivation:
             UnsupportedGoalError, UnsupportedActionError: which, why, and where it is asked for.
         """
         for atom in self._unsupported_in(goal):
-            raise UnsupportedGoalError(f"the goal asks for {self._why(atom.predicate)}", place=atom.place)
+            raise UnsupportedGoalError(f"the goal asks for {self.why(atom.predicate)}", place=atom.place)
         for action in actions:
             for condition in (action.precondition, *effect_conditions(action.effect)):
                 for atom in self._unsupported_in(condition):
                     raise UnsupportedActionError(
-                        f"the planning action '{action.name}' asks for {self._why(atom.predicate)}", place=atom.place
+                        f"the planning action '{action.name}' asks for {self.why(atom.predicate)}", place=atom.place
                     )
 
-    def _why(self, name: str) -> str:
-        changing = ", ".join(f"'{one}'" for one in sorted(self._unsupported[name]))
+    def why(self, name: str) -> str:
+        """What is the matter with an unsupported predicate, and who could plan with it."""
+        changing = ", ".join(f"'{one}'" for one in sorted(self.unsupported[name]))
         return (
             f"'{name}', a derived predicate that follows from itself (at {self._axioms[name][0].place}) and from what"
             f" planning actions change ({changing}); what can do it: {_AXIOMS}"
         )
 
     def _unsupported_in(self, e: Expression | Term) -> Iterator[Atom]:
-        if isinstance(e, Atom) and e.predicate in self._unsupported:
+        if isinstance(e, Atom) and e.predicate in self.unsupported:
             yield e
         for part in parts_of(e):
             yield from self._unsupported_in(part)
@@ -173,7 +181,7 @@ class Derivation:
             graph.add_node(axiom.predicate)
             graph.add_edges_from((axiom.predicate, name) for name in names_of(axiom.condition))
         for axiom in axioms:
-            for atom in _denied(axiom.condition, wanted=True):
+            for atom in denied(axiom.condition, wanted=True):
                 if atom.predicate in graph and nx.has_path(graph, atom.predicate, axiom.predicate):
                     raise SchemaError(
                         f"the derived predicate '{axiom.predicate}' follows from its own negation, through"
@@ -268,16 +276,16 @@ def _holds(fact: Fact, world: World) -> bool:
     return world.holds(fact.predicate, fact.args)
 
 
-def _denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
+def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
     """The atoms that stand under an odd number of negations (`wanted`: seen from outside)."""
     match e:
         case Atom():
             yield from () if wanted else (e,)
         case Not(body):
-            yield from _denied(body, wanted=not wanted)
+            yield from denied(body, wanted=not wanted)
         case Imply(premise, conclusion):
-            yield from _denied(premise, wanted=not wanted)
-            yield from _denied(conclusion, wanted=wanted)
+            yield from denied(premise, wanted=not wanted)
+            yield from denied(conclusion, wanted=wanted)
         case _:
             for part in parts_of(e):
-                yield from _denied(part, wanted=wanted)
+                yield from denied(part, wanted=wanted)

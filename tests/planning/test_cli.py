@@ -355,3 +355,28 @@ def test_numbers_without_a_value_and_facts_that_only_follow_from_others_are_note
     answer = json.loads(run("--json", "--engine", "pyperplan", problem=problem, domains=[tmp_path / "errand.pddl"]).stdout)
     assert answer["steps"] == ["(go a)"]
     assert [one.replace(f"{tmp_path}/", "") for one in answer["notes"]] == notes
+
+
+TOWERS = """(define (domain towers) (:types block)
+  (:predicates (on ?a ?b - block) (above ?a ?b - block) (clear ?a - block))
+  (:derived (above ?a ?b - block) (or (on ?a ?b) (exists (?c - block) (and (on ?a ?c) (above ?c ?b)))))
+  (:action stack :parameters (?a ?b - block) :precondition (and (clear ?a) (clear ?b) (not (= ?a ?b)))
+    :effect (and (on ?a ?b) (not (clear ?b)))))"""
+
+
+@pytest.mark.parametrize(
+    ("goal", "status", "said"),
+    [
+        ("(and (above a c) (not (on a c)))", 0, "cost 2"),
+        ("(and (above a c) (above c a))", 1, "there is no plan"),
+        ("(above a a)", 1, "there is no plan"),
+    ],
+)
+def test_a_predicate_that_follows_from_itself_and_from_what_actions_change_is_planned_with(run, tmp_path, goal, status, said):
+    (tmp_path / "towers.pddl").write_text(TOWERS)
+    problem = f"(define (problem p) (:domain towers) (:objects a b c - block) (:init (clear a) (clear b) (clear c)) (:goal {goal}))"
+    result = run("--engine", "pyperplan", "--explain", problem=problem, domains=[tmp_path / "towers.pddl"])
+    assert result.exit_code == status
+    assert said in result.output
+    assert ("'above': planning actions change what it follows from" in result.stderr) == (status == 0)
+    assert "derive" not in result.stdout
