@@ -67,9 +67,10 @@ class Derivable:
             name: replace(action, effect=AllOf((action.effect, reset))) if name in ending else action
             for name, action in plain.actions.items()
         }
-        for number, (axiom, body) in enumerate(zip(axioms, bodies, strict=True)):
-            for case, action in enumerate(_deriving(axiom, body)):
-                name = f"{_DERIVE}{axiom.predicate} {number}.{case}"
+        for axiom, body in zip(axioms, bodies, strict=True):
+            for action in _deriving(axiom, body):
+                known = sum(name.startswith(action.name + " ") for name in actions)
+                name = f"{action.name} #{known + 1}"
                 actions[name] = replace(action, name=name)
         return Derivable(original, replace(plain, actions=actions), predicates)
 
@@ -161,7 +162,7 @@ def _deriving(axiom: Axiom, body: Expression) -> Iterator[PlanningAction]:
                 yield replace(action, parameters=(*action.parameters, *variables))
         case _:
             head = Atom(axiom.predicate, tuple(Variable(p.name) for p in axiom.parameters))
-            yield PlanningAction(_DERIVE, axiom.parameters, body, Add(head), axiom.place)
+            yield PlanningAction(_DERIVE + axiom.predicate, axiom.parameters, body, Add(head), axiom.place)
 
 
 def _names(parameters: Collection[TypedVariable]) -> set[str]:

@@ -10,7 +10,7 @@ from knowledge_base.facts import Fact, Value
 from knowledge_base.language.expression import And, Atom, Constant, Expression, Variable
 from planning.errors import UnsupportedActionError
 from planning.plan import PlanStep
-from planning.posing.conditions import Grounder, Leaf, Literal, Residual, alternatives, every, negation
+from planning.posing.conditions import Change, Every, Grounder, Leaf, Literal, Residual, alternatives, every, negation
 from planning.quantities import Assignment, combined, fluents
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _MOST_CONDITIONS = 6  # of one ground action; each doubles the number of ways to take it
 _MOST_ALTERNATIVES = 64
+_AS_THEY_ARE = "planners that take ADL as it is, such as Fast Downward run by itself"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +52,45 @@ def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Gr
     if precondition is False:
         return
     step = PlanStep(action.name, tuple([str(bindings[p.name]) for p in action.parameters]))
-    effects = list(grounder.effects(action.effect, bindings))
-    conditions = list(dict.fromkeys(e.condition for e in effects if e.condition is not True))
+    effects = _eased(list(grounder.effects(action.effect, bindings)))
+    conditions: dict[Residual, None] = {}
+    for one in effects:
+        if one.condition is not True and negation(one.condition) not in conditions:
+            conditions[one.condition] = None
     if len(conditions) > _MOST_CONDITIONS:
         raise UnsupportedActionError(
             f"planning action '{action.name}' has {len(conditions)} conditional effects for {step};"
-            f" at most {_MOST_CONDITIONS} can be planned with",
+            f" at most {_MOST_CONDITIONS} can be compiled away; what can do it: {_AS_THEY_ARE}",
             place=action.place,
         )
     grounder.patience.spend()
     for taken in itertools.product((True, False), repeat=len(conditions)):
         chosen = [c if yes else negation(c) for c, yes in zip(conditions, taken, strict=True)]
-        happening = {True, *(c for c, yes in zip(conditions, taken, strict=True) if yes)}
+        happening = {True, *chosen}
         changes = [e.what for e in effects if e.condition in happening]
         for condition in _bounded(every([precondition, *chosen]), action):
             yield Variant(step, condition, _literals(changes), _assignments(changes, action))
+
+
+def _eased(effects: list[Change]) -> list[Change]:
+    """The same effects under fewer conditions: what is taken away if it is there can be taken away in any case.
+
+    So can what is given if it is not there, unless something else takes it away at the same time.
+    """
+    if all(one.condition is True for one in effects):
+        return effects
+    deleted = {one.what.fact for one in effects if isinstance(one.what, Literal) and not one.what.positive}
+    return [
+        Change(_except(one.condition, one.what.negated), one.what)
+        if isinstance(one.what, Literal) and not (one.what.positive and one.what.fact in deleted)
+        else one
+        for one in effects
+    ]
+
+
+def _except(condition: Residual, known: Literal) -> Residual:
+    parts = condition.parts if isinstance(condition, Every) else (condition,)
+    return every(part for part in parts if part != known)
 
 
 def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ...]]:
@@ -73,7 +98,7 @@ def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ..
     if len(found) > _MOST_ALTERNATIVES:
         raise UnsupportedActionError(
             f"the precondition of planning action '{action.name}' has over {_MOST_ALTERNATIVES} alternatives"
-            " ('or', 'imply' or 'exists' over what actions change)",
+            f" ('or', 'imply' or 'exists' over what actions change); what can do it: {_AS_THEY_ARE}",
             place=action.place,
         )
     return found

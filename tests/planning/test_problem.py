@@ -19,6 +19,8 @@ from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep
+from planning.posing.conditions import Grounder
+from planning.posing.grounding import variants
 from planning.posing.problem import Poser, pose
 from planning.posing.unsolvable import why_unsolvable
 from planning.strips import Problem
@@ -269,8 +271,27 @@ def test_too_many_conditional_effects_are_told():
       (:action carry :effect (forall (?t - thing) (when (in ?t) (moved ?t)))))""")
     kb = KnowledgeBase(domain.schema)
     kb.apply(Delta(nodes={f"t{i}": "thing" for i in range(9)}), author="test")
-    with pytest.raises(UnsupportedActionError, match="'carry' has 9 conditional effects"):
+    with pytest.raises(UnsupportedActionError, match=r"'carry' has 9 conditional effects.*Fast Downward"):
         pose(domain, kb, parse_condition("(moved t1)"))
+
+
+@pytest.mark.parametrize(
+    ("effect", "ways"),
+    [
+        ("(forall (?c - colour) (when (has ?c) (not (has ?c))))", 1),  # what is taken away need not be there
+        ("(forall (?c - colour) (when (not (has ?c)) (has ?c)))", 1),
+        ("(and (when (dry) (not (dry))) (when (not (dry)) (dry)))", 2),  # a switch
+        ("(and (when (dry) (shiny)) (when (not (dry)) (not (shiny))))", 2),  # one condition and its opposite
+    ],
+)
+def test_effects_under_conditions_that_do_not_matter_are_no_ways_of_their_own(effect, ways):
+    domain = PlanningDomain.parse(f"""(define (domain paint) (:types colour)
+      (:predicates (has ?c - colour) (dry) (shiny) (done))
+      (:action dip :parameters () :effect (and (done) {effect})))""")
+    kb = KnowledgeBase(domain.schema)
+    kb.apply(Delta(nodes={f"c{i}": "colour" for i in range(9)}, added=(fact("has", "c1"), fact("dry"))), author="test")
+    grounder = Grounder(kb, frozenset({"has", "dry", "shiny", "done"}))
+    assert len(list(variants(domain.actions["dip"], {}, grounder))) == ways
 
 
 def test_a_free_variable_is_an_error(clean_up, table):
