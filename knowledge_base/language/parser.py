@@ -158,7 +158,14 @@ def _keyword_effect(head: str, args: Sequence[Node], group: Group) -> Effect:
         condition, effect = _take(args, 2, group, "(when CONDITION EFFECT)")
         return When(parse_condition(condition), parse_effect(effect), place=place)
     fluent, value = _take(args, 2, group, f"({head} (FUNCTION ...) NUMBER)")
-    return Assign(head, _call(_group(fluent, "a function")), parse_term(value), place=place)
+    return Assign(head, _fluent(fluent), parse_term(value), place=place)
+
+
+def _fluent(node: Node) -> Call:
+    """A function that changes; files in the wild write `(increase total-cost 1)`, which can mean nothing else."""
+    if isinstance(node, Word) and not node.quoted and not node.text.startswith("?"):
+        return Call(node.folded(), (), place=node.place)
+    return _call(_group(node, "a function"))
 
 
 def _effect_atom(node: Node) -> Atom:

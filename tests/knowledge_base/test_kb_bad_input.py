@@ -109,7 +109,7 @@ EFFECTS = [
     ("(or (quiet))", "'or' is no effect"),
     ("(not (not (quiet)))", "only a predicate can be deleted"),
     ("(increase (weight cup1))", r"\(increase \(FUNCTION ...\) NUMBER\)"),
-    ("(increase weight 1)", "in parentheses"),
+    ("(increase ?weight 1)", "in parentheses"),
     ("(when (quiet))", r"\(when CONDITION EFFECT\)"),
 ]
 

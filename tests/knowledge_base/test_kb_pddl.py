@@ -77,6 +77,10 @@ def test_a_domain_in_the_wild() -> None:
     assert (noop.parameters, noop.precondition, noop.effect) == ((), And(()), AllOf(()))
 
 
+def test_a_function_without_arguments_may_change_without_parentheses() -> None:
+    assert parse_effect("(increase Total-Cost 2)") == parse_effect("(increase (total-cost) 2)")
+
+
 def test_a_schema_in_the_wild() -> None:
     schema = Schema.parse(WILD)
     assert schema.subtypes("thing") == ("truck", "airplane", "package", "vehicle", "thing")
