@@ -11,6 +11,11 @@ import typer
 PIPE_WIDTH = 120
 """Columns of a table that is not printed on a terminal."""
 
+EVERY_ENGINE = (
+    "Negative conditions, disjunctions, quantifiers, conditional effects and derived predicates are compiled away,"
+    " so that every engine can do them."
+)
+
 
 def doctor_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
@@ -29,6 +34,7 @@ def doctor_command(
     for one in found["engines"]:
         if not one["ready"]:
             console.print(f"  {one['name']}: {one['to_do']}", markup=False, highlight=False)
+    console.print(EVERY_ENGINE, highlight=False)
     versions = {"Python": found["python"], "Java": found["java"], **found["packages"]}
     said = ", ".join(f"{name} {version or '(none)'}" for name, version in versions.items())
     console.print(f"\n{said}; {found['system']}", markup=False, highlight=False)

@@ -170,6 +170,7 @@ def test_the_doctor_lists_every_engine_with_what_it_can_do_and_what_it_lacks(mon
     assert all(one.name in shown.stdout for one in ENGINES)
     assert "put 'java' on the path" in shown.stdout
     assert "Java (none)" in shown.stdout
+    assert "conditional effects and derived predicates are compiled away" in " ".join(shown.stdout.split())
 
 
 def test_the_doctor_fits_a_terminal_of_100_columns(monkeypatch):
