@@ -73,7 +73,8 @@ def mending(
     ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))
     known = ((before.steps_of(end), before.needed_by(end)) for end in ends)
     allowed = [(end, needed) for end, needed in known if excluded.isdisjoint(end)]
-    gaps = [(end, needed, _unmet(needed, closed)) for end, needed in allowed if needed is not None]
+    truths = _Truths(closed)
+    gaps = [(end, needed, truths.unmet(needed)) for end, needed in allowed if needed is not None]
     near = [(end, needed, gap) for end, needed, gap in gaps if len(gap) <= _MOST_UNMET]
     if not near:
         return None
@@ -87,9 +88,22 @@ def mending(
     return None if problem.unreachable else Mending(end, problem)
 
 
-def _unmet(needed: Iterable[Expression], world: World) -> list[Expression]:
-    """What does not hold of what is needed, as soon as it is too much no more of it."""
-    return list(islice((one for one in needed if not _true(one, world)), _MOST_UNMET + 1))
+class _Truths:
+    """What holds of what is needed, asked once: one end of a plan needs most of what a shorter one does."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._known: dict[int, bool] = {}  # by identity: conditions live as long as the plan that they are about
+
+    def unmet(self, needed: Iterable[Expression]) -> list[Expression]:
+        """What does not hold of what is needed, as soon as it is too much no more of it."""
+        return list(islice((one for one in needed if not self._holds(one)), _MOST_UNMET + 1))
+
+    def _holds(self, condition: Expression) -> bool:
+        found = self._known.get(id(condition))
+        if found is None:
+            found = self._known[id(condition)] = _true(condition, self._world)
+        return found
 
 
 def _true(condition: Expression, world: World) -> bool:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
-from knowledge_base.language.effect import Assign
-from knowledge_base.language.expression import Atom, Constant, Expression
-from planning.domain import PlanningDomain
+from knowledge_base.language.effect import Add, Assign
+from knowledge_base.language.expression import TRUE, Atom, Constant, Expression
+from knowledge_base.language.memory import IdentityCache
+from planning.domain import GroundStep, PlanningDomain
 from planning.execution.regression import Leaf, UnregressableError, conjuncts, leaves, regressed
 from planning.plan import PlanStep
 from planning.posing.relevance import changed, names_of
@@ -26,16 +28,10 @@ class Needs:
     """
 
     def __init__(self, steps: Sequence[PlanStep], domain: PlanningDomain, goal: Expression) -> None:
-        self._goal = len(steps) + 1
-        ground = [domain.ground(step) for step in steps]
-        self._preconditions = [conjuncts(one.typed) for one in ground]
-        self._changes = [leaves(one.effect) for one in ground]
-        self._changed = [changed(one.effect) for one in ground]
-        self._plain = [_plain(changes) for changes in self._changes]
+        self._steps = [_Regressing.of(domain.ground(step)) for step in steps]
         self._names: dict[int, frozenset[str]] = {}  # by identity: all conditions live as long as what was found
-        self._found: dict[tuple[int, ...], dict[Expression, int] | None] = {
-            (): dict.fromkeys(conjuncts(goal), self._goal)
-        }
+        wanted = dict.fromkeys(conjuncts(goal), len(steps) + 1)
+        self._found: dict[tuple[int, ...], _Found | None] = {(): _Found(wanted, tuple(filter(_is_open, wanted)))}
 
     def before(self, left: tuple[int, ...]) -> Mapping[Expression, int] | None:
         """Conditions that hold now exactly if the steps with these numbers, in this order, lead to the goal.
@@ -43,49 +39,121 @@ class Needs:
         Each with the number of the first step that needs it (the goal's is one more than the last step's).
         `None` if what is needed cannot be written as a condition, see `UnregressableError`.
         """
-        for cut in range(len(left) - 1, -1, -1):  # not by recursion: a plan may be long
-            if left[cut:] not in self._found:
-                self._found[left[cut:]] = self._prepended(left[cut], self._found[left[cut + 1 :]])
+        known = next(cut for cut in range(len(left) + 1) if left[cut:] in self._found)
+        for cut in range(known - 1, -1, -1):  # not by recursion: a plan may be long
+            self._found[left[cut:]] = self._prepended(left[cut], self._found[left[cut + 1 :]])
         found = self._found[left]
-        return None if found is None else MappingProxyType(found)
+        return None if found is None else MappingProxyType(found.needed)
 
-    def _prepended(self, step: int, after: dict[Expression, int] | None) -> dict[Expression, int] | None:
+    def _prepended(self, number: int, after: _Found | None) -> _Found | None:
         if after is None:
             return None
-        own, changes = dict.fromkeys(self._preconditions[step - 1], step), self._changes[step - 1]
-        # Of what later steps need, a step has to do with little: the rest is taken over as it is.
-        names, changed_here = self._names, self._changed[step - 1]
-        about = [one for one in after if not changed_here.isdisjoint(names.get(id(one)) or self._asked(one))]
-        touched = [one for one in about if self._touches(step, one)]
-        rest = dict(after)
-        for condition in touched:
+        step = self._steps[number - 1]
+        own = dict.fromkeys(step.needed, number)
+        brought, touched = self._touched(step, after)
+        rest = dict(after.needed)
+        for condition in brought:
             del rest[condition]
+        users = [rest.pop(condition) for condition in touched]
         needed = {**own, **rest, **own}
+        fresh: list[Expression] = []
         try:
-            for condition in touched:
-                for part in conjuncts(regressed(condition, changes)):
-                    needed.setdefault(part, after[condition])
+            for condition, user in zip(touched, users, strict=True):
+                for part in conjuncts(regressed(condition, step.changes)):
+                    before = len(needed)
+                    needed.setdefault(part, user)  # hashed once: it may be long
+                    if len(needed) > before and _is_open(part):
+                        fresh.append(part)
         except UnregressableError:
             return None
-        return needed
+        gone = set(map(id, touched))
+        kept = [one for one in after.open if id(one) not in gone]
+        if step.open:
+            kept = [*step.open, *(one for one in kept if one not in own)]
+        return _Found(needed, (*kept, *fresh))
 
-    def _touches(self, step: int, condition: Expression) -> bool:
-        """Whether the step may have to do with a condition about what it changes; `False` is certain."""
-        plain = self._plain[step - 1]
-        return plain is None or not isinstance(condition, Atom) or not _is_ground(condition) or condition in plain
+    def _touched(self, step: _Regressing, after: _Found) -> tuple[list[Expression], list[Expression]]:
+        """Of what later steps need: what the step brings about in any case, and what else it may have to do with.
 
-    def _asked(self, condition: Expression) -> frozenset[str]:
+        That is little; the rest is taken over as it is.
+        """
+        plain, changed_here = step.plain, step.changed
+        if plain is None:  # what it changes depends on the world: everything about the same predicates
+            return [], [one for one in after.needed if not changed_here.isdisjoint(self._about(one))]
+        touched = [one for one in after.open if not changed_here.isdisjoint(self._about(one))]
+        if not after.needed.keys().isdisjoint(plain.deletes):
+            hit = {*plain.deletes, *touched}
+            touched = [one for one in after.needed if one in hit]  # in their order
+        return [atom for atom in plain.adds if atom in after.needed], touched
+
+    def _about(self, condition: Expression) -> frozenset[str]:
         """The predicates and functions that the condition asks about."""
-        found = self._names[id(condition)] = frozenset(names_of(condition))
+        found = self._names.get(id(condition))
+        if found is None:
+            found = self._names[id(condition)] = frozenset(names_of(condition))
         return found
 
 
-def _plain(changes: Iterable[Leaf]) -> frozenset[Atom] | None:
-    """The ground facts that are changed in any case, if there are no other changes."""
-    atoms = [None if one.variables or isinstance(one.change, Assign) else one.change.atom for one in changes]
-    plain = frozenset(atom for atom in atoms if atom is not None and _is_ground(atom))
-    return plain if len(plain) == len(atoms) else None
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """What is needed before some steps, with its first user; and which of it is no ground fact, in order."""
+
+    needed: Mapping[Expression, int]
+    open: tuple[Expression, ...]
 
 
-def _is_ground(atom: Atom) -> bool:
-    return all(isinstance(term, Constant) for term in atom.args)
+@dataclass(frozen=True, slots=True)
+class _Regressing:
+    """What has to be known of a step to see what is needed before it.
+
+    Attributes:
+        needed: its own conditions, as an ordered set.
+        open: those of them that are no ground facts.
+        changes: what it changes.
+        changed: predicates and functions of that.
+        plain: the ground facts among it, if there are no other changes.
+    """
+
+    needed: Mapping[Expression, None]
+    open: tuple[Expression, ...]
+    changes: tuple[Leaf, ...]
+    changed: frozenset[str]
+    plain: _Plain | None
+
+    @staticmethod
+    def of(step: GroundStep) -> _Regressing:
+        """Made once: one plan has most steps of the one before."""
+        known = _regressing.find(step, None)
+        if known is None:
+            needed, changes = dict.fromkeys(conjuncts(step.typed)), leaves(step.effect)
+            open_ = tuple(filter(_is_open, needed))
+            known = _Regressing(needed, open_, changes, changed(step.effect), _plain(changes))
+            _regressing.keep(step, None, known)
+        return known
+
+
+_regressing: IdentityCache[GroundStep, _Regressing] = IdentityCache(size=1024)
+
+
+@dataclass(frozen=True, slots=True)
+class _Plain:
+    """The ground facts that a step makes true and false, whatever the world is like."""
+
+    adds: tuple[Expression, ...]
+    deletes: tuple[Expression, ...]
+
+
+def _plain(changes: Iterable[Leaf]) -> _Plain | None:
+    """What is changed in any case, if there are no other changes."""
+    adds: dict[Expression, None] = {}
+    deletes: dict[Expression, None] = {}
+    for one in changes:
+        if one.variables or one.condition != TRUE or isinstance(one.change, Assign) or _is_open(one.change.atom):
+            return None
+        (adds if isinstance(one.change, Add) else deletes)[one.change.atom] = None
+    return _Plain(tuple(adds), tuple([atom for atom in deletes if atom not in adds]))  # an addition wins
+
+
+def _is_open(e: Expression) -> bool:
+    """Whether it is anything but a ground fact."""
+    return not isinstance(e, Atom) or not all(isinstance(term, Constant) for term in e.args)

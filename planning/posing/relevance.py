@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from knowledge_base.language.effect import Add, Assign, Delete, Effect, effect_conditions, effect_leaves
-from knowledge_base.language.expression import Atom, Call, Expression, Term, parts_of
+from knowledge_base.language.expression import Atom, Call, Constant, Expression, Term, Variable, parts_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -66,12 +66,16 @@ def _counted(metric: Term | None, leaves: Collection[Add | Delete | Assign]) -> 
 
 def names_of(e: Expression | Term) -> Iterator[str]:
     """The predicates, types and functions an expression asks about."""
-    if isinstance(e, Atom):
-        yield e.predicate
-    elif isinstance(e, Call):
-        yield e.function
-    for part in parts_of(e):
-        yield from names_of(part)
+    agenda = [e]
+    while agenda:
+        one = agenda.pop()
+        if isinstance(one, Constant | Variable):
+            continue
+        if isinstance(one, Atom):
+            yield one.predicate
+        elif isinstance(one, Call):
+            yield one.function
+        agenda.extend(reversed(parts_of(one)))
 
 
 def name_of(leaf: Add | Delete | Assign) -> str:
