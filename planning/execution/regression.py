@@ -134,7 +134,7 @@ def _atom(atom: Atom, changes: Sequence[Leaf]) -> Expression:
 
 def _comparison(e: Comparison, changes: Sequence[Leaf]) -> Expression:
     if isinstance(e.left, Constant | Variable) and isinstance(e.right, Constant | Variable):
-        return _compared(e.operator, e.left, e.right)  # as that does below, only sooner
+        return _decided(e.operator, e.left, e.right) or e  # as that does below, only sooner
     return disjunction(
         conjunction((before_left, before_right, _compared(e.operator, new_left, new_right)))
         for before_left, new_left in _values(e.left, changes)
@@ -153,11 +153,14 @@ def _hit(leaf: Leaf, own: tuple[Term, ...], asked: tuple[Term, ...]) -> Expressi
 
 
 def _compared(operator: str, left: Term, right: Term) -> Expression:
+    return _decided(operator, left, right) or Comparison(operator, left, right)
+
+
+def _decided(operator: str, left: Term, right: Term) -> Expression | None:
+    """`TRUE` or `FALSE` where that does not depend on the world or on variables."""
     if operator in ("=", "!=") and isinstance(left, Constant) and isinstance(right, Constant):
         return TRUE if (left.value == right.value) is (operator == "=") else FALSE
-    if operator == "=" and isinstance(left, Variable) and left == right:
-        return TRUE
-    return Comparison(operator, left, right)
+    return TRUE if operator == "=" and isinstance(left, Variable) and left == right else None
 
 
 def _values(term: Term, changes: Sequence[Leaf]) -> list[tuple[Expression, Term]]:
