@@ -29,14 +29,14 @@ from planning.plan import PlanFound, PlanningOutcome
 from planning.strips import Problem
 
 PARTS = (
-    "mend", "pose", "write", "translate", "engine", "validate", "de-order", "generate", "bind, dispatch and the rest",
+    "mend", "pose", "write", "translate", "engine", "validate, de-order", "generate", "bind, dispatch and the rest",
 )  # fmt: skip
 OURS = tuple(part for part in PARTS if part != "engine")
 _HERE = tuple(part for part in OURS if part != "translate")  # that the engine's process does
 _WRAPPED = (
-    (search, "mending", "mend"), (search, "pose", "pose"), (search, "validate", "validate"),
+    (search, "mending", "mend"), (search, "pose", "pose"), (search, "deordered", "validate, de-order"),
     (asking, "written", "write"),
-    (plotting, "deordered", "de-order"), (plotting, "plot_from_plan", "generate"),
+    (plotting, "deordered", "validate, de-order"), (plotting, "plot_from_plan", "generate"),
 )  # fmt: skip
 
 

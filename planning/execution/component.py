@@ -222,7 +222,8 @@ class PlanningComponent(Component):
             if isinstance(found, NotFound):
                 return self._none(found.kind, found.reason)
             now = self._derivation.at(self._knowledge)
-            order = self._plotting.order(found.answer.plan, wanted)
+            known = found.order if found.version == self._knowledge.version else None
+            order = self._plotting.order(found.answer.plan, wanted, known)
             course = Course(found.steps, now.domain, now.condition(wanted), order.before)
             attempt = Attempt() if before is None else before.attempt
             carried = Carried(self._plans.new_name(), wanted, course, attempt, holder, seconds, replans, found.better)

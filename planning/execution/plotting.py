@@ -39,11 +39,11 @@ class Plotting:
     parallel: bool
     shared: Collection[str]
 
-    def order(self, plan: Plan, goal: Expression) -> PartialOrder:
-        """Which steps wait for which."""
+    def order(self, plan: Plan, goal: Expression, known: PartialOrder | None = None) -> PartialOrder:
+        """Which steps wait for which; `known` if that was found out already."""
         if plan.schedule:
             return linked(plan, self.derivation.original, self.knowledge, goal)
-        order = deordered(plan, self.derivation.original, self.knowledge, goal)
+        order = known or deordered(plan, self.derivation.original, self.knowledge, goal)
         return order if self.parallel else replace(order, before=in_sequence(plan).before)
 
     def form(self, carried: Carried, order: PartialOrder, instead_of: str | None = None) -> dict[str, Any]:

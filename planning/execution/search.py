@@ -12,10 +12,12 @@ import threading
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from knowledge_base.errors import InputError
 from planning.engines.improving import Improving
 from planning.engines.registry import timing
 from planning.execution.mending import mending
 from planning.execution.repair import EXCLUDED_SECONDS, without
+from planning.ordering.order import deordered
 from planning.patience import OutOfPatienceError, Patience, aside
 from planning.plan import (
     EngineFailed,
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     from planning.execution.course import Course
     from planning.execution.foresight import Foresight
     from planning.execution.telling import Telling
+    from planning.ordering.order import PartialOrder
     from planning.strips import Problem
 
 MAX_ATTEMPTS = 3
@@ -66,11 +69,15 @@ class Found:
         answer: the plan, and where it comes from.
         kept: how many steps at the end of the plan before it keeps.
         better: what comes of a planner that goes on; to be closed.
+        order: which steps wait for which, found out while the plan was validated; `None` for one with a schedule.
+        version: of the knowledge that it was validated on.
     """
 
     answer: PlanFound
     kept: int = 0
     better: AsyncGenerator[PlanningOutcome, None] | None = None
+    order: PartialOrder | None = None
+    version: int = -1
 
     @property
     def steps(self) -> tuple[PlanStep, ...]:
@@ -156,13 +163,14 @@ class Search:
                 return found
             if self._clock.simulated:
                 await sleep(found.answer.simulated_seconds)
-            verdict = validate(found.answer.plan, self._domain, self._knowledge, goal)
+            verdict, order = self._judged(found.answer.plan, goal)
             if verdict.valid and found.answer.plan.schedule:
                 alone = validate(Plan(found.steps), self._domain, self._knowledge, goal)
                 if not alone.valid:
                     await found.close()
                     return NotFound("failed", f"{_IN_CONCERT}: {alone.why} ({found.answer.engine})")
             if verdict.valid:
+                found = replace(found, order=order, version=self._knowledge.version)
                 verdict = await self._foreseen(found)
                 if verdict.valid:
                     return found
@@ -179,6 +187,13 @@ class Search:
                 return NotFound("failed", wrong)
             if changed == MAX_ATTEMPTS:
                 return NotFound("failed", f"the world changes faster than plans are made: {verdict.why}")
+
+    def _judged(self, plan: Plan, goal: Expression) -> tuple[Validation, PartialOrder | None]:
+        """Whether the plan leads to the goal, and its order, for which it is carried out in thought only once."""
+        if not plan.schedule:
+            with contextlib.suppress(InputError):
+                return Validation(valid=True), deordered(plan, self._domain, self._knowledge, goal)
+        return validate(plan, self._domain, self._knowledge, goal), None
 
     async def _bound(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
         """Simulated time is held while anybody searches; one that is simulated may let it pass, not for ever."""

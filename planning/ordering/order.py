@@ -16,24 +16,21 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
-from knowledge_base.errors import InputError
-from knowledge_base.facts import Fact
-from knowledge_base.language.effect import substitute_effect
-from knowledge_base.language.evaluation import World, apply_effect, holds
+from knowledge_base.language.evaluation import World
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.printer import to_text
-from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.ordering.dependencies import Changes, Ground, Support, changes, conjuncts, favours, support
+from planning.ordering.tracing import PRESENT, Tracing
 from planning.plan import Plan, PlanStep
-from planning.posing.conditions import Literal
 from planning.posing.derived import derivation
 
-PRESENT = 0
-"""Who provides what holds already."""
+__all__ = [
+    "PRESENT", "CausalLink", "PartialOrder", "causal_links", "deordered", "in_sequence", "reduced", "scheduled",
+    "standing",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,16 +122,16 @@ def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression
     which is NP-hard to find.
 
     Raises:
-        InputError: the plan does not lead to the goal.
+        InputError: the plan does not lead to the goal; `planning.validation.validate` says at which step and why.
     """
     derived = derivation(domain)
-    tracing = _Tracing(Overlay(derived.world(world)))
+    tracing = Tracing(derived.world(world))
     for number, step in enumerate(plan.steps, start=1):
         tracing.take(number, step, derived.domain)
-    for condition in conjuncts(derived.expand(goal), tracing.world):
-        tracing.need(len(plan.steps) + 1, condition, "the goal")
-    pairs = {(first, second) for first, second in tracing.pairs if PRESENT < first < second <= len(plan.steps)}
-    return PartialOrder(plan.steps, tuple(dict.fromkeys(tracing.links)), reduced(pairs))
+    tracing.reach(len(plan.steps) + 1, derived.expand(goal))
+    links = tuple(dict.fromkeys(CausalLink(*link) for link in tracing.links))
+    steps = {number: bits for number, bits in tracing.earlier.items() if number <= len(plan.steps)}
+    return PartialOrder(plan.steps, links, _reduced(steps))
 
 
 def standing(
@@ -148,113 +145,22 @@ def standing(
 
 def reduced(pairs: Iterable[tuple[int, int]]) -> frozenset[tuple[int, int]]:
     """The pairs (the smaller number first) that do not follow from others."""
-    direct: dict[int, set[int]] = defaultdict(set)
+    direct: dict[int, int] = defaultdict(int)
     for first, second in pairs:
-        direct[second].add(first)
-    earlier: dict[int, int] = {}  # sets of numbers as bits
-    kept: set[tuple[int, int]] = set()
+        direct[second] |= 1 << first
+    return _reduced(direct)
+
+
+def _reduced(direct: Mapping[int, int]) -> frozenset[tuple[int, int]]:
+    """As `reduced`; for each step, those before it as bits."""
+    earlier: dict[int, int] = {}
+    kept: list[tuple[int, int]] = []
     for number in sorted(direct):
-        covered = 0
-        for one in sorted(direct[number], reverse=True):  # what is before it has a smaller number
-            if not covered >> one & 1:
-                kept.add((one, number))
-                covered |= earlier.get(one, 0) | 1 << one
+        open_, covered = direct[number], 0
+        while open_:
+            one = open_.bit_length() - 1  # what is before it has a smaller number
+            kept.append((one, number))
+            covered |= earlier.get(one, 0) | 1 << one
+            open_ &= ~covered
         earlier[number] = covered
     return frozenset(kept)
-
-
-@dataclass(slots=True)
-class _Tracing:
-    """A plan carried out in thought; remembers who made what, and who relied on it.
-
-    Attributes:
-        world: the state reached.
-        links, pairs: what was found so far.
-        since: the step that made a fact what it is; without one, it was so from the beginning.
-        makers: the steps that make a literal true.
-        setters: the steps that change a number, and whether they only add to it.
-        moves: by how much a step made a number greater.
-        users: the steps that rely on a literal or a number.
-    """
-
-    world: Overlay
-    links: list[CausalLink] = field(default_factory=list)
-    pairs: set[tuple[int, int]] = field(default_factory=set)
-    since: dict[Literal, int] = field(default_factory=dict)
-    makers: dict[Literal, list[int]] = field(default_factory=lambda: defaultdict(list))
-    setters: dict[Ground, list[tuple[int, bool]]] = field(default_factory=lambda: defaultdict(list))
-    moves: dict[tuple[Fact, int], float] = field(default_factory=dict)
-    users: dict[Ground, list[int]] = field(default_factory=lambda: defaultdict(list))
-
-    def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
-        """Step number `number` comes next."""
-        action, bindings = domain.action(step), domain.bindings(step)
-        ground = domain.ground(step)
-        effect = ground.effect
-        if action.timed is None:
-            doing = changes(effect, self.world)
-        else:
-            start, end = (substitute_effect(e, bindings) for e in (action.timed.start_effect, action.timed.end_effect))
-            doing = changes(end, self.world, after=start)
-        needed = conjuncts(ground.condition, self.world)
-        asked = (one for one in doing.conditions if holds(one, self.world, {}))  # else its own start brings it about
-        for condition in dict.fromkeys((*needed, *asked)):
-            self.need(number, condition, str(step))
-        for fluent in doing.reads:
-            self._rely(number, fluent)
-        self._change(number, doing)
-        if action.timed is None and not doing.numbers:
-            self.world.apply(doing.delta())
-            return
-        made = apply_effect(effect, self.world)
-        for fluent, now in made.values.items():
-            before = self.world.value(fluent.predicate, fluent.args)
-            if isinstance(now, int | float) and isinstance(before, int | float):
-                self.moves[fluent, number] = now - before
-        self.world.apply(made)
-
-    def need(self, user: int, condition: Expression, whose: str) -> None:
-        """A step, or the goal, needs a ground condition now."""
-        found = support(condition, self.world, self._latest)
-        if found is None:
-            raise InputError(f"the plan does not lead to the goal: {whose} needs {to_text(condition)}")
-        if not found:  # nothing can change it
-            return
-        providers = {one for ground in found for one in self._providers(ground) if self._helps(one, ground, condition)}
-        self.links += [CausalLink(one, condition, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
-        for ground in found:
-            self._rely(user, ground)
-
-    def _rely(self, user: int, ground: Ground) -> None:
-        self.pairs.update((provider, user) for provider in self._providers(ground))
-        self.users[ground].append(user)
-
-    def _change(self, number: int, doing: Changes) -> None:
-        for literal in doing.makes:
-            opposite = literal.negated
-            rivals = (*self.users[opposite], *self.makers[opposite])
-            self.pairs.update((rival, number) for rival in rivals if rival != number)
-        for literal in doing.makes:
-            self.makers[literal].append(number)
-            fact = literal.fact
-            if literal.negated in doing.makes or self.world.holds(fact.predicate, fact.args) is not literal.positive:
-                self.since[literal] = number
-        for fluent, adds in doing.numbers.items():
-            others = [setter for setter, also_adds in self.setters[fluent] if not (adds and also_adds)]
-            self.pairs.update((other, number) for other in (*self.users[fluent], *others) if other != number)
-            self.setters[fluent].append((number, adds))
-
-    def _providers(self, ground: Ground) -> tuple[int, ...]:
-        if isinstance(ground, Literal):
-            return (self.since.get(ground, PRESENT),)
-        return tuple(setter for setter, _ in self.setters[ground]) or (PRESENT,)
-
-    def _helps(self, provider: int, ground: Ground, condition: Expression) -> bool:
-        """Whether the condition owes something to the provider: who uses up fuel does not provide what is left."""
-        if isinstance(ground, Literal) or provider == PRESENT or not all(adds for _, adds in self.setters[ground]):
-            return True
-        good = favours(condition, ground, self.world)
-        return good is None or good * self.moves.get((ground, provider), 0.0) > 0
-
-    def _latest(self, found: Support) -> int:
-        return max((provider for ground in found for provider in self._providers(ground)), default=PRESENT)

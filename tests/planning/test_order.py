@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from order_strategies import Planned, planned
 
 from knowledge_base.errors import InputError
@@ -14,6 +15,7 @@ from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.ordering.order import PartialOrder, causal_links, deordered, reduced, standing
 from planning.plan import Plan, PlanStep
+from planning.validation import validate
 
 
 def linearisations(order: PartialOrder):
@@ -51,6 +53,18 @@ def test_every_linearisation_leads_to_the_goal_and_to_the_same_world_and_keeps_w
         assert all(holds(link.fact, ahead) for link in standing(order.links, taken, taken)), taken
         ends.append((set(ahead.delta.added), set(ahead.delta.removed), ahead.delta.values))
     assert all(end == ends[0] for end in ends)
+
+
+@settings(max_examples=150, derandomize=True, deadline=None)
+@given(planned(), st.data())
+def test_there_is_an_order_for_exactly_those_plans_that_are_valid(case: Planned, data):
+    steps = case.plan.steps
+    plan = Plan(tuple(data.draw(st.lists(st.sampled_from(steps), max_size=6)))) if steps else case.plan
+    if validate(plan, case.domain, case.world, case.goal).valid:
+        assert deordered(plan, case.domain, case.world, case.goal).steps == plan.steps
+    else:
+        with pytest.raises(InputError):
+            deordered(plan, case.domain, case.world, case.goal)
 
 
 # -- what waits for what, and why ----------------------------------------------------------------------------
