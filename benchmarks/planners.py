@@ -27,9 +27,10 @@ import replanning
 import set_table
 
 from planning.engines.fast_downward import sas
-from planning.engines.planner import PlannerProcess, written
+from planning.engines.planner import PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, installed
+from planning.engines.request import written
 from planning.generation.plot import plot_from_plan
 from planning.ordering.order import deordered
 from planning.plan import Plan, PlanFound

@@ -7,14 +7,14 @@ Facts are positive: where a condition needs `(not (p a))`, the fact `(not-p a)` 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from operator import itemgetter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact
 from planning.plan import Plan, PlanStep, Timing
-from planning.quantities import Assignment, Bound, Numbers, from_json, to_json
+from planning.quantities import Assignment, Bound, Numbers
 from planning.timeline import FINEST, Act, Changes, Event, Flaw, carried_out
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class GroundAction:
         return Act(timing, start, partial(_missing, span.over_all), _event(span.end, span.adds, span.deletes))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Problem:
     """What an engine is asked; made by `planning.posing.problem.pose`.
 
@@ -126,7 +126,7 @@ class Problem:
         bounds: what shall hold of numbers.
         notes: what was asked for and cannot be had, e.g. a metric that no engine is told about; for people.
         one_at_a_time: whether durative actions are seen as ordinary ones, so that its having no plan proves nothing.
-        timed: then the same problem with durations, for an engine that can do them; like `whole` not in JSON.
+        timed: then the same problem with durations, for an engine that can do them.
     """
 
     domain: str
@@ -146,12 +146,11 @@ class Problem:
     def whole(self) -> Problem | None:
         """The problem without the slice of interchangeable objects, for when the slice has no plan.
 
-        Made when it is asked for, `None` if nothing was sliced off. In JSON only whether there is one: it is sent
-        when its turn comes.
+        Made when it is asked for, `None` if nothing was sliced off.
         """
         return None if self.unsliced is None else self.unsliced()
 
-    @property
+    @cached_property
     def features(self) -> frozenset[str]:
         """What an engine must be able to do beyond STRIPS: a subset of `FEATURES`.
 
@@ -225,90 +224,6 @@ class Problem:
             tuple(timing for step, timing in steps if step is not None),
         )
 
-    def to_json(self) -> dict[str, Any]:
-        """As JSON data, reversible except for `whole` and `timed`; facts are listed once and referred to by number."""
-        number: dict[Fact, int] = {}
-        known: dict[int, int] = {}  # by identity, which is looked up faster; all facts are ours, so they stay
-
-        def refer(facts: Collection[Fact]) -> list[int]:
-            for one in facts:
-                if id(one) not in known:
-                    known[id(one)] = number.setdefault(one, len(number))
-            return [known[id(one)] for one in facts]
-
-        rest = {
-            "domain": self.domain,
-            "objects": dict(self.objects),
-            "init": refer(self.init),
-            "goal": refer(self.goal),
-            "actions": [
-                [
-                    None if a.step is None else [a.step.action, *a.step.args],
-                    refer(a.precondition),
-                    refer(a.adds),
-                    refer(a.deletes),
-                    a.cost,
-                    [_bound_to_json(one) for one in a.bounds],
-                    [[to_json(one.fluent), to_json(one.amount), one.increase] for one in a.assignments],
-                    a.span and [a.span.least, a.span.most, *map(refer, _span_facts(a.span))],
-                ]
-                for a in self.actions
-            ],
-            "unreachable": list(self.unreachable),
-            "numbers": [[to_json(fluent), number] for fluent, number in self.numbers.items()],
-            "bounds": [_bound_to_json(one) for one in self.bounds],
-            "notes": list(self.notes),
-            "one_at_a_time": self.one_at_a_time,
-            "whole": self.unsliced is not None,
-        }
-        return {"facts": [[f.predicate, *f.args] for f in number], **rest}
-
-    @staticmethod
-    def from_json(data: Mapping[str, Any]) -> Problem:
-        """The problem that `to_json` wrote."""
-        facts = [Fact(predicate, tuple(args)) for predicate, *args in data["facts"]]
-
-        def read(numbers: Iterable[int]) -> tuple[Fact, ...]:
-            return tuple([facts[n] for n in numbers])
-
-        return Problem(
-            domain=data["domain"],
-            objects=dict(data["objects"]),
-            init=read(data["init"]),
-            goal=read(data["goal"]),
-            actions=tuple(
-                GroundAction(
-                    None if step is None else PlanStep(step[0], tuple(step[1:])),
-                    read(pre),
-                    read(add),
-                    read(gone),
-                    cost,
-                    tuple(map(_bound_from_json, bounds)),
-                    tuple(Assignment(_fluent(one), from_json(amount), more) for one, amount, more in assignments),
-                    None if span is None else Span(span[0], span[1], *map(read, span[2:])),
-                )
-                for step, pre, add, gone, cost, bounds, assignments, span in data["actions"]
-            ),
-            unreachable=tuple(data["unreachable"]),
-            numbers={_fluent(fluent): number for fluent, number in data["numbers"]},
-            bounds=tuple(map(_bound_from_json, data["bounds"])),
-            notes=tuple(data["notes"]),
-            one_at_a_time=data["one_at_a_time"],
-        )
-
-
-def _bound_to_json(bound: Bound) -> list[Any]:
-    return [bound.operator, to_json(bound.left), to_json(bound.right)]
-
-
-def _bound_from_json(data: Sequence[Any]) -> Bound:
-    return Bound(data[0], from_json(data[1]), from_json(data[2]))
-
-
-def _fluent(data: Any) -> Fact:
-    name, *args = data["fluent"]
-    return Fact(name, tuple(args))
-
 
 def _missing(needed: tuple[Fact, ...], state: frozenset[Fact]) -> str | None:
     return next((str(one) for one in needed if one not in state), None)
@@ -321,7 +236,3 @@ def _event(needed: tuple[Fact, ...], adds: tuple[Fact, ...], deletes: tuple[Fact
 
 def _changed(state: frozenset[Fact], changes: Changes) -> frozenset[Fact]:
     return (state - changes.keys()) | {fact for fact, holds in changes.items() if holds}
-
-
-def _span_facts(span: Span) -> tuple[tuple[Fact, ...], ...]:
-    return span.over_all, span.end, span.adds, span.deletes

@@ -104,20 +104,34 @@ def sas(request: Request) -> str:
     number, init, goal, actions = len(request["facts"]), set(request["init"]), request["goal"], request["actions"]
     prices = {cost: Fraction(cost).limit_denominator(_FINEST_COST) for cost in {action[4] for action in actions}}
     unit = lcm(*(price.denominator for price in prices.values()))
-    lines = ["begin_version", "3", "end_version", "begin_metric", "1", "end_metric", str(number)]
-    for n in range(number):
-        lines += ["begin_variable", f"var{n}", "-1", "2", f"NegatedAtom f{n}()", f"Atom f{n}()", "end_variable"]
+    variables = [
+        f"begin_variable\nvar{n}\n-1\n2\nNegatedAtom f{n}()\nAtom f{n}()\nend_variable" for n in range(number)
+    ]
+    lines = ["begin_version", "3", "end_version", "begin_metric", "1", "end_metric", str(number), *variables]
     lines += ["0", "begin_state", *("1" if n in init else "0" for n in range(number)), "end_state"]
-    lines += ["begin_goal", str(len(goal)), *(f"{n} 1" for n in goal), "end_goal"]
-    lines.append(str(len(actions)))
-    for n, (_, needs, adds, deletes, cost, *_) in enumerate(actions):
-        lines += _operator(f"a{n}", needs, adds, deletes, int(prices[cost] * unit))
+    lines += ["begin_goal", str(len(goal)), *(f"{n} 1" for n in goal), "end_goal", str(len(actions))]
+    words = _Words(number)
+    lines += [
+        words.operator(f"a{n}", needs, adds, deletes, int(prices[cost] * unit))
+        for n, (_, needs, adds, deletes, cost, *_) in enumerate(actions)
+    ]
     return "\n".join([*lines, "0", ""])
 
 
-def _operator(name: str, needs: list[int], adds: list[int], deletes: list[int], cost: int) -> list[str]:
-    prevail = [f"{n} 1" for n in needs if n not in adds and n not in deletes]
-    effects = [f"0 {n} {1 if n in needs else -1} {after}" for those, after in ((adds, 1), (deletes, 0)) for n in those]
-    return [
-        "begin_operator", name, str(len(prevail)), *prevail, str(len(effects)), *effects, str(cost), "end_operator",
-    ]  # fmt: skip
+class _Words:
+    """What is said of facts again and again."""
+
+    def __init__(self, number: int) -> None:
+        self._holds = [f"{n} 1" for n in range(number)]
+        self._added = [f"0 {n} -1 1" for n in range(number)]
+        self._deleted = [f"0 {n} -1 0" for n in range(number)]
+        self._moved = [(f"0 {n} 1 0", f"0 {n} 1 1") for n in range(number)]  # of what is needed
+
+    def operator(self, name: str, needs: list[int], adds: list[int], deletes: list[int], cost: int) -> str:
+        moved = self._moved
+        prevail = [self._holds[n] for n in needs if n not in adds and n not in deletes]
+        effects = [moved[n][1] if n in needs else self._added[n] for n in adds]
+        effects += [moved[n][0] if n in needs else self._deleted[n] for n in deletes]
+        return "\n".join([
+            "begin_operator", name, str(len(prevail)), *prevail, str(len(effects)), *effects, str(cost), "end_operator",
+        ])  # fmt: skip

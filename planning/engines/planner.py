@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import math
 import threading
 import time
@@ -16,10 +15,10 @@ from contextlib import AbstractContextManager, aclosing, nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
-from knowledge_base.language.memory import IdentityCache
 from planning.elimination import indispensable
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import can_time, cannot, in_concert, nobody
+from planning.engines.request import written
 from planning.patience import aside
 from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 
@@ -230,15 +229,6 @@ class PlannerProcess:
             plan, self.engine, seconds, problem.simulated_seconds, cost=cost,
             translated=translated if isinstance(translated, float) else 0.0,
         )  # fmt: skip
-
-
-_written: IdentityCache[Problem, bytes] = IdentityCache(size=2)
-
-
-def written(problem: Problem) -> bytes:
-    """The problem as a worker reads it; all engines of a race get the same."""
-    known = _written.find(problem, None)
-    return known or _written.keep(problem, None, json.dumps(problem.to_json()).encode() + b"\n")
 
 
 def _made(problem: Problem) -> Callable[[], Problem]:

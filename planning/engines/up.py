@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from unified_planning.engines import PlanGenerationResultStatus, pddl_planner
 from unified_planning.plans import TimeTriggeredPlan
 
+from planning.engines.request import read
 from planning.engines.translation import ticks, translated
 from planning.strips import Problem
 
@@ -37,7 +38,7 @@ def searching(engine: Engine) -> Search:
     make = getattr(import_module(module), name)
 
     def search(request: Request) -> Answers:
-        problem = Problem.from_json(request)
+        problem = read(request)
         return _found(make(), translated(problem, costs="costs" in engine.features & problem.features), problem)
 
     return search

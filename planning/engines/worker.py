@@ -4,7 +4,7 @@ It imports the engine once and then forks for each problem. So every search star
 process (the same problem gets the same plan), can be ended without ending the worker, gives back its memory,
 and may crash as it likes.
 
-One JSON object a line. The worker begins with `{"ready": true}`. For each problem (`Problem.to_json`) on
+One JSON object a line. The worker begins with `{"ready": true}`. For each problem (see `planning.engines.request`) on
 standard input it says `{"searching": G}`, G being the process group of the search and of all that it starts;
 then answers, `{"actions": [3, 0, ...]}` or, with the seconds at which each begins and that it takes, `{"timed":
 [[3, 0.0, 5.0], ...]}` (each plan better than the one before), `{"actions": null}` when there
@@ -39,7 +39,7 @@ Answers = Iterator[list[int] | Schedule | None]
 """What an engine finds, which it searches for when asked for the next one."""
 
 Request = Mapping[str, Any]
-"""A problem as `Problem.to_json` gives it: with numbers for facts, which is all that most engines want to know."""
+"""A problem as it is read, with numbers for facts, which is all that most engines want to know."""
 
 Search = Callable[[Request], Answers]
 """Puts a problem into the engine's words; the search begins when the first answer is asked for."""

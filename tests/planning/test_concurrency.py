@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import json
 
 import pytest
 from fake_engines import answering
@@ -19,9 +20,9 @@ from planning.engines import planner as planner_module
 from planning.engines.planner import PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.engines.registry import engine
+from planning.engines.request import read, written
 from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, Timing
 from planning.posing.problem import pose
-from planning.strips import Problem
 from planning.validation import validate
 
 CELLAR = """(define (domain cellar) (:types match fuse)
@@ -146,7 +147,7 @@ def test_the_posed_problem_has_a_form_with_durations_that_survives_json():
     assert problem.unreachable  # one action at a time: the light is out before anything can be mended
     assert problem.one_at_a_time
     assert (problem.features, problem.timed.features) == (frozenset(), {"durations"})
-    assert Problem.from_json(problem.timed.to_json()) == problem.timed
+    assert read(json.loads(written(problem.timed))) == problem.timed
     [strike, *_] = problem.timed.actions
     assert (strike.span.least, strike.span.most) == (5.0, 5.0)
 

@@ -15,9 +15,9 @@ from fake_engines import HANGING, PROBLEM, READY, answering, descendants, gone, 
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.parser import parse_condition
-from planning.engines.planner import written
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import DISTRIBUTION, ENGINES
+from planning.engines.request import written
 from planning.plan import PlanStep
 from planning.posing.problem import pose
 from planning.strips import GroundAction, Problem
@@ -152,7 +152,7 @@ def test_a_search_ends_with_its_worker_and_the_worker_with_its_owner(way):
     popen = subprocess.Popen(worker("pyperplan"), stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     with popen:
         assert json.loads(popen.stdout.readline()) == {"ready": True}
-        popen.stdin.write(json.dumps(HARD.to_json()).encode() + b"\n")
+        popen.stdin.write(written(HARD))
         popen.stdin.flush()
         search = json.loads(popen.stdout.readline())["searching"]
         if way == "it is killed":

@@ -13,12 +13,12 @@ from knowledge_base.facts import Delta, fact
 from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
+from planning.engines.request import read, written
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep
 from planning.posing.problem import pose
 from planning.posing.unsolvable import why_unsolvable
 from planning.quantities import Assignment, Bound, Operation, linear, text
-from planning.strips import Problem
 from planning.validation import validate
 
 JARS = """(define (domain jars)
@@ -94,7 +94,7 @@ def test_a_number_that_nobody_asks_about_is_left_out(jars):
 
 def test_a_numeric_problem_is_json_and_back(jars):
     problem = pose(jars, kitchen(jars), parse_condition("(and (sealed big) (> (poured) 3))"))
-    assert Problem.from_json(json.loads(json.dumps(problem.to_json()))) == problem
+    assert read(json.loads(written(problem))) == problem
 
 
 def test_a_number_that_no_possible_action_changes_is_proven_out_of_reach(jars):

@@ -17,13 +17,13 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.computation import computed
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
+from planning.engines.request import read, written
 from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep
 from planning.posing.conditions import Grounder
 from planning.posing.grounding import variants
 from planning.posing.problem import Poser, pose
 from planning.posing.unsolvable import why_unsolvable
-from planning.strips import Problem
 from planning.validation import validate
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
@@ -141,7 +141,7 @@ def test_the_same_world_gives_the_same_problem(clean_up, table):
 def test_a_problem_is_json_and_back(clean_up, table):
     problem = pose(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
     assert problem.whole is not None
-    assert Problem.from_json(json.loads(json.dumps(problem.to_json()))) == replace(problem, unsliced=None)
+    assert read(json.loads(written(problem))) == replace(problem, unsliced=None)
 
 
 def test_the_simulated_duration_grows_with_the_problem(clean_up, table):

@@ -10,9 +10,9 @@ from fake_engines import PROBLEM, descendants, gone, lights_out, session
 from knowledge_base.facts import Fact
 from knowledge_base.language.parser import parse_condition
 from planning.domain import PlanningDomain
-from planning.engines.planner import written
 from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, worker
 from planning.engines.registry import ENGINES
+from planning.engines.request import written
 from planning.plan import PlanStep
 from planning.posing.problem import pose
 from planning.strips import GroundAction, Problem

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 
 from knowledge_base.facts import Fact
+from planning.engines.request import read, written
 from planning.plan import PlanStep
 from planning.strips import GroundAction, Problem
 
@@ -23,4 +24,4 @@ def test_actions_of_different_costs_are_a_feature():
 
 
 def test_costs_survive_json():
-    assert Problem.from_json(json.loads(json.dumps(problem(1, 2.5).to_json()))) == problem(1, 2.5)
+    assert read(json.loads(written(problem(1, 2.5)))) == problem(1, 2.5)

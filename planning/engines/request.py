@@ -1,0 +1,128 @@
+"""A problem as a worker reads it: a line of JSON, in which facts are listed once and referred to by number.
+
+It is written in one go, since a robot may be waiting for it: of each ground action, most of which come again in the
+next problem, the text is kept with gaps for the numbers.
+
+It has `facts` (predicate and arguments of each), `init` and `goal` (their numbers), `actions` (of each the step or
+null; the numbers of what it needs, adds and deletes; its cost, bounds, assignments and, if it is durative, its span),
+`whole` (whether there is more of it, which is sent when its turn comes) and other attributes of
+`planning.strips.Problem`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from typing import Any
+
+from knowledge_base.facts import Fact
+from knowledge_base.language.memory import IdentityCache
+from planning.plan import PlanStep
+from planning.quantities import Assignment, Bound, from_json, to_json
+from planning.strips import GroundAction, Problem, Span
+
+_Row = tuple[str, tuple[Fact, ...]]
+"""The text of an action with gaps, and the facts that belong there."""
+
+
+def written(problem: Problem) -> bytes:
+    """The problem as a line; all engines of a race get the same."""
+    return _written.find(problem, None) or _written.keep(problem, None, _line(problem))
+
+
+def read(request: Mapping[str, Any]) -> Problem:
+    """The problem that was written."""
+    facts = [Fact(predicate, tuple(args)) for predicate, *args in request["facts"]]
+
+    def named(numbers: Iterable[int]) -> tuple[Fact, ...]:
+        return tuple([facts[n] for n in numbers])
+
+    return Problem(
+        domain=request["domain"],
+        objects=dict(request["objects"]),
+        init=named(request["init"]),
+        goal=named(request["goal"]),
+        actions=tuple(
+            GroundAction(
+                None if step is None else PlanStep.from_json(step),
+                named(pre),
+                named(add),
+                named(gone),
+                cost,
+                tuple(map(_bound_from_json, bounds)),
+                tuple(Assignment(_fluent(one), from_json(amount), more) for one, amount, more in assignments),
+                None if span is None else Span(span[0], span[1], *map(named, span[2:])),
+            )
+            for step, pre, add, gone, cost, bounds, assignments, span in request["actions"]
+        ),
+        unreachable=tuple(request["unreachable"]),
+        numbers={_fluent(fluent): number for fluent, number in request["numbers"]},
+        bounds=tuple(map(_bound_from_json, request["bounds"])),
+        notes=tuple(request["notes"]),
+        one_at_a_time=request["one_at_a_time"],
+    )
+
+
+def _line(problem: Problem) -> bytes:
+    rows = [_rows.find(action, None) or _rows.keep(action, None, _row(action)) for action in problem.actions]
+    before = len(problem.init) + len(problem.goal)
+    mentioned = [*problem.init, *problem.goal, *chain.from_iterable([facts for _, facts in rows])]
+    places = list(map(id, mentioned))  # looked up faster than facts; all of them stay meanwhile
+    number: dict[Fact, int] = {}
+    first = dict(zip(places, mentioned, strict=True))
+    known = {place: number.setdefault(fact, len(number)) for place, fact in first.items()}
+    numbers = [known[place] for place in places]
+    rest = {
+        "facts": [[fact.predicate, *fact.args] for fact in number],
+        "domain": problem.domain,
+        "objects": dict(problem.objects),
+        "init": numbers[: len(problem.init)],
+        "goal": numbers[len(problem.init) : before],
+        "unreachable": problem.unreachable,
+        "numbers": [[to_json(fluent), value] for fluent, value in problem.numbers.items()],
+        "bounds": list(map(_bound_to_json, problem.bounds)),
+        "notes": problem.notes,
+        "one_at_a_time": problem.one_at_a_time,
+        "whole": problem.unsliced is not None,
+    }
+    actions = ",".join([text for text, _ in rows]) % tuple(numbers[before:])
+    return f'{json.dumps(rest)[:-1]}, "actions": [{actions}]}}\n'.encode()
+
+
+def _row(action: GroundAction) -> _Row:
+    span = action.span
+    later = () if span is None else (span.over_all, span.end, span.adds, span.deletes)
+    groups = (action.precondition, action.adds, action.deletes, *later)
+    gaps = [f"[{','.join(['%d'] * len(facts))}]" for facts in groups]
+    parts = [
+        _text(action.step and action.step.to_json()),
+        *gaps[:3],
+        _text(action.cost),
+        _text(list(map(_bound_to_json, action.bounds))),
+        _text([[to_json(one.fluent), to_json(one.amount), one.increase] for one in action.assignments]),
+        "null" if span is None else f"[{','.join([_text(span.least), _text(span.most), *gaps[3:]])}]",
+    ]
+    return f"[{','.join(parts)}]", tuple(chain.from_iterable(groups))
+
+
+def _text(part: Any) -> str:
+    """As JSON, without gaps."""
+    return json.dumps(part).replace("%", "%%")
+
+
+def _bound_to_json(bound: Bound) -> list[Any]:
+    return [bound.operator, to_json(bound.left), to_json(bound.right)]
+
+
+def _bound_from_json(data: Sequence[Any]) -> Bound:
+    return Bound(data[0], from_json(data[1]), from_json(data[2]))
+
+
+def _fluent(data: Any) -> Fact:
+    name, *args = data["fluent"]
+    return Fact(name, tuple(args))
+
+
+_written: IdentityCache[Problem, bytes] = IdentityCache(size=2)
+_rows: IdentityCache[GroundAction, _Row] = IdentityCache(size=20_000)
