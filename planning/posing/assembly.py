@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from knowledge_base.language.memory import IdentityCache
 from planning.quantities import Bound, fluents, worth
 from planning.strips import GroundAction, Problem
 
@@ -25,7 +24,7 @@ class Assembly:
 
     def __init__(self, numbering: Numbering) -> None:
         self._numbering = numbering
-        self._made: IdentityCache[Way, GroundAction] = IdentityCache(_MOST_KEPT)
+        self._made: dict[int, tuple[Way, GroundAction]] = {}  # by identity
 
     def problem(
         self, domain: str, task: Task, things: Mapping[str, str], world: World | None, notes: tuple[str, ...]
@@ -42,7 +41,8 @@ class Assembly:
         init, _ = self._split(task.init)
         goal, bounds = self._split(task.goal)
         ways = task.ways.all if task.left is None else task.left.values()
-        actions = tuple(map(self._action, ways))
+        known = self._made.get
+        actions = tuple([found[1] if (found := known(id(way))) else self._action(way) for way in ways])
         mentioned = dict.fromkeys([arg for action in actions if action.step for arg in action.step.args])
         mentioned.update(dict.fromkeys(str(value) for fact in (*init, *goal) for value in fact.args))
         objects = {one: things[one] for one in mentioned if one in things}
@@ -51,7 +51,11 @@ class Assembly:
         return Problem(domain, objects, init, goal, actions, numbers=numbers, bounds=bounds, notes=notes)
 
     def _action(self, way: Way) -> GroundAction:
-        return self._made.find(way, None) or self._made.keep(way, None, self._make(way))
+        if len(self._made) >= _MOST_KEPT:
+            self._made.clear()
+        action = self._make(way)
+        self._made[id(way)] = way, action
+        return action
 
     def _make(self, way: Way) -> GroundAction:
         numbering = self._numbering

@@ -105,11 +105,13 @@ class _Exchange:
 
     def covers(self, positions: Iterable[int], left: Mapping[int, Way]) -> bool:
         """Whether for each of the ways, all that mention `name`, there is one about `other` that is as good."""
-        return all(self._proven(i, left) or self._covers(i, left) for i in positions)
-
-    def _proven(self, i: int, left: Mapping[int, Way]) -> bool:
-        proof = self._proofs.get(i)
-        return proof is not None and proof[0] is left[i] and left.get(proof[1]) is proof[2]
+        proofs = self._proofs
+        for i in positions:
+            proof = proofs.get(i)
+            proven = proof is not None and proof[0] is left[i] and left.get(proof[1]) is proof[2]
+            if not proven and not self._covers(i, left):
+                return False
+        return True
 
     def _covers(self, i: int, left: Mapping[int, Way]) -> bool:
         way, images = left[i], self._images

@@ -42,6 +42,8 @@ class Numbering:
     def __init__(self) -> None:
         self._numbers: dict[Fact | Bound, int] = {}
         self._named: list[Fact | Bound] = []
+        self._by_predicate: dict[str, list[tuple[int, tuple[Value, ...]]]] = {}
+        self._bounds: dict[int, Bound] = {}
         self._facts: dict[int, Fact] = {}
         self._images: dict[tuple[str, str], _Images] = {}
         self._wants: dict[int, dict[int, None]] = {}
@@ -88,12 +90,13 @@ class Numbering:
     def present(self, world: World) -> set[int]:
         """The numbers of all literals and bounds that hold in `world`; fluents have no truth."""
         values = {one: worth(world, one) for one in map(self.fact, sorted(self.fluents))}
-        held: set[int] = set()
-        for i, one in enumerate(self._named):
-            if isinstance(one, Bound):
-                held.update((2 * i,) if one.holds(values) else ())
-            else:
-                held.add(2 * i + (not is_so(one, world)))
+        held = {number for number, bound in self._bounds.items() if bound.holds(values)}
+        for predicate, listed in self._by_predicate.items():
+            if predicate in world.schema.computed:
+                held.update([number + (not is_so(Fact(predicate, args), world)) for number, args in listed])
+            else:  # all at once: most of what is asked about is named here
+                known = set(world.match(predicate, (None,) * len(listed[0][1])))
+                held.update([number + (args not in known) for number, args in listed])
         return held
 
     def images(self, name: str, other: str) -> Mapping[int, int]:
@@ -114,6 +117,10 @@ class Numbering:
         if number is None:
             number = self._numbers[one] = 2 * len(self._named)
             self._named.append(one)
+            if isinstance(one, Bound):
+                self._bounds[number] = one
+            else:
+                self._by_predicate.setdefault(one.predicate, []).append((number, one.args))
         return number
 
     def _bound(self, bound: Bound) -> int:

@@ -7,6 +7,7 @@ costs the same.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from planning.posing.ways import Way, Ways
@@ -109,7 +110,7 @@ def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
     left = kept.of(contribution.positions, asked, settled)
     goal = tuple([one for one in task.goal if one not in settled])
     present = set(task.init)
-    needed = dict.fromkeys([one for way in left.values() for one in way.needs])
+    needed = dict.fromkeys(chain.from_iterable([way.needs for way in left.values()]))
     init = tuple([one for one in (*needed, *(one for one in goal if one not in needed)) if one in present])
     return replace(task, init=init, goal=goal, left=left, settled=settled)
 
