@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations, islice
+from itertools import chain, combinations, islice
 from typing import Any
 
 from dsc.engine.tables import CompiledPlot, Default, Edge, Node, Timed
@@ -23,9 +23,7 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
     """
     layout = _Layout(plot)
     for node in layout.nodes:
-        if isinstance(node.state, State | Connector):
-            layout.add_edges(node, node.state)
-        node.settle()
+        layout.prepare(node)
     return CompiledPlot(
         plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml=plot.profile == "scxml"
     )
@@ -94,14 +92,34 @@ class _Layout:
             raise SchemaError(f"the history '{node.name}' does not lead to a state beside it", found=node.name)
         return Default(target, history.do)
 
-    def add_edges(self, node: Node, state: State | Connector) -> None:
+    def prepare(self, node: Node) -> None:
+        """Lay out now what can be wrong with the transitions of a node, and the others when they are reached."""
+        if isinstance(node.state, State | Connector):
+            node.lay_out = self._lay_out
+            if isinstance(node.state, Connector) or not self._is_plain(node.state):
+                self._lay_out(node)
+        node.settle()
+
+    def _is_plain(self, state: State) -> bool:
+        """Whether each transition has one target, which is there, or none."""
+        for one in chain(chain.from_iterable(state.on.values()), state.after, state.every, state.always):
+            if one.also or one.clear or (one.target is not None and one.target not in self.index):
+                return False
+        return True
+
+    def _lay_out(self, node: Node) -> None:
         """The transitions of one state, in all tables of its node."""
+        state = node.state
+        if not isinstance(state, State | Connector):
+            return
         # They come in the order of the tables, so none is looked up by its place: large plots have many.
         edges = (self._edge(node, place, trigger, one) for place, trigger, one in state.placed_transitions())
         if isinstance(state, State):
             node.edges = {event: tuple(islice(edges, len(many))) for event, many in state.on.items()}
-            node.timeouts = tuple(Timed(timed.seconds, next(edges)) for timed in state.after)
-            node.cycles = tuple(Timed(timed.seconds, next(edges)) for timed in state.every)
+            node.timeouts = tuple([Timed(timed.seconds, next(edges)) for timed in state.after])
+            node.cycles = tuple([Timed(timed.seconds, next(edges)) for timed in state.every])
+        else:
+            node.edges, node.timeouts, node.cycles = {}, (), ()
         node.always = tuple(edges)
 
     def _edge(self, node: Node, place: tuple[str | int, ...], trigger: str, transition: Transition) -> Edge:

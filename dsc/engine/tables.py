@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from dsc.events import DONE
 from dsc.model.actions import ExternalAction, Internal, Trigger
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot
-from dsc.model.states import AnyState, DynamicState, FinalState, OrthogonalState, SubmachineState
+from dsc.model.states import AnyState, DynamicState, FinalState, OrthogonalState, State, SubmachineState
 from knowledge_base.language.expression import Expression
 
 
@@ -55,9 +55,19 @@ class Timed:
     edge: Edge
 
 
+def _nothing(_node: Node) -> None:
+    """It has no transitions."""
+
+
+_TABLES = frozenset({"edges", "timeouts", "cycles", "always"})
+
+
 @dataclass(slots=True, eq=False)
 class Node:
     """A state, a region or (index 0) the plot itself.
+
+    The tables of its transitions are made when one of them is first asked for: of a long plot, as those that are made
+    from plans, a run may reach only the beginning.
 
     Attributes:
         index: position in document order.
@@ -71,6 +81,7 @@ class Node:
         edges: event name -> transitions in order.
         timeouts, cycles: transitions after a time, and each time it has passed again.
         at_least: how long its transitions have to wait.
+        lay_out: makes these tables.
         always: transitions without trigger.
         histories: indices of the history nodes that remember what is inside.
         transparent: a region that stands for its only state (profile `scxml`), no scope for transitions.
@@ -92,14 +103,15 @@ class Node:
     entry: tuple[ExternalAction | Internal, ...] = ()
     exit: tuple[ExternalAction | Internal, ...] = ()
     broken: tuple[ExternalAction | Internal, ...] = ()
-    edges: dict[str, tuple[Edge, ...]] = field(default_factory=dict)
-    timeouts: tuple[Timed, ...] = ()
-    cycles: tuple[Timed, ...] = ()
     at_least: TermField | None = None
-    always: tuple[Edge, ...] = ()
     histories: list[int] = field(default_factory=list)
     transparent: bool = False
 
+    lay_out: Callable[[Node], None] = field(default=_nothing, repr=False)
+    edges: dict[str, tuple[Edge, ...]] = field(init=False, repr=False)
+    timeouts: tuple[Timed, ...] = field(init=False, repr=False)
+    cycles: tuple[Timed, ...] = field(init=False, repr=False)
+    always: tuple[Edge, ...] = field(init=False, repr=False)
     parent: int = field(init=False)
     final: bool = field(init=False)
     orthogonal: bool = field(init=False)
@@ -116,11 +128,23 @@ class Node:
         self.holds_plot = kind is SubmachineState or kind is DynamicState
 
     def settle(self) -> None:
-        """Work out what follows from its transitions and actions, when all of them are there."""
-        self.timed = bool(self.timeouts or self.cycles) or self.at_least is not None
+        """Work out what follows from its transitions and actions."""
+        state = self.state if isinstance(self.state, State) else None
+        self.timed = state is not None and (bool(state.after or state.every) or self.at_least is not None)
         actions = (*self.entry, *self.exit, *self.broken)
         starts = bool(actions) and any(isinstance(action, Trigger) for action in actions)
-        self.addressed = starts or self.timed or self.holds_plot or DONE in self.edges
+        ends = state is not None and DONE in state.on
+        self.addressed = starts or self.timed or self.holds_plot or ends
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            """Called for a table that is not there yet; later ones are found like any attribute."""
+            if name not in _TABLES:
+                raise AttributeError(name)
+            self.edges, self.timeouts, self.cycles, self.always = {}, (), (), ()
+            self.lay_out(self)
+            return object.__getattribute__(self, name)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

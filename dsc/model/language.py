@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Annotated, Any, TypeVar
 
 from pydantic import ConfigDict, Discriminator, PlainSerializer, PlainValidator, WithJsonSchema
@@ -90,11 +91,16 @@ def _term(value: Any) -> Term:
     if not isinstance(value, str):
         raise ValueError(f"a value was expected: a constant, ?variable or (+ ?n 1); found {value!r}")
     if not value.startswith(("?", "(")):
-        return Constant(value, quoted=not _SYMBOL.fullmatch(value))
+        return _named(value)
     try:
         return parse_term(value)
     except InputError as error:
         raise ValueError(str(error)) from error
+
+
+@lru_cache(maxsize=4096)  # in plots one after the other, as those made from plans, most names come again
+def _named(text: str) -> Constant:
+    return Constant(text, quoted=not _SYMBOL.fullmatch(text))
 
 
 def _effect(value: Any) -> Effect:
