@@ -204,7 +204,8 @@ class PlannerProcess:
         return process
 
     async def _started(self, process: EngineProcess) -> None:
-        await aside(lambda: process.start(self._start_up_seconds))
+        if not process.idle:
+            await aside(lambda: process.start(self._start_up_seconds))
 
     def _judged(self, answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:
         """What the engine's answer is worth: a plan counts only if it solves the problem."""

@@ -98,6 +98,11 @@ class EngineProcess:
         """Whether it can still be asked."""
         return self._end.alive and _runs(self._pid)
 
+    @property
+    def idle(self) -> bool:
+        """Whether it is ready, and nobody asks it anything at the moment."""
+        return self._ready and not self._turn.locked()
+
     def kill(self) -> None:
         """End it and all that it started, now; calling it again does nothing."""
         self._end()

@@ -24,13 +24,14 @@ _MOST_AT_WORK = 3
 
 def leads_to(steps: Iterable[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> bool:
     """Whether the steps, taken in this order from `world`, reach the goal; `world` stays as it is."""
-    ahead = Overlay(world)
+    ahead: Overlay | None = None  # not sooner than it is needed: of a plan's ends, most fail at their first step
     try:
         for step in steps:
-            if not domain.applicable(step, ahead):
+            if not domain.applicable(step, ahead or world):
                 return False
+            ahead = ahead or Overlay(world)
             ahead.apply(domain.effects(step, ahead))
-        return holds(goal, ahead)
+        return holds(goal, ahead or world)
     except InputError:  # something is not there any more, or cannot be computed
         return False
 

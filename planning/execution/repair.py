@@ -15,6 +15,7 @@ from typing import Any
 
 from knowledge_base.language.effect import effect_conditions
 from knowledge_base.language.expression import Expression
+from knowledge_base.language.memory import IdentityCache
 from knowledge_base.view import View
 from planning.domain import PlanningDomain
 from planning.plan import PlanStep
@@ -105,14 +106,21 @@ class Attempt:
 
 def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:
     """A digest of everything in the world that the problem of reaching the goal depends on."""
-    actions = relevant(goal, None, domain.actions.values()).actions
-    asked = [goal, *(action.precondition for action in actions)]
-    asked += [condition for action in actions for condition in effect_conditions(action.effect)]
-    names = {name for condition in asked for name in names_of(condition)}
+    names = _asked.find(goal, domain) or _asked.keep(goal, domain, _asked_about(goal, domain))
     facts = sorted(str(fact) for fact in world.facts() if fact.predicate in names)
     numbers = sorted((str(number), value) for number, value in world.values().items() if number.predicate in names)
     told = repr((sorted(world.nodes().items()), facts, numbers))
     return hashlib.blake2b(told.encode(), digest_size=16).hexdigest()
+
+
+_asked: IdentityCache[Expression, frozenset[str]] = IdentityCache(size=8)
+
+
+def _asked_about(goal: Expression, domain: PlanningDomain) -> frozenset[str]:
+    actions = relevant(goal, None, domain.actions.values()).actions
+    asked = [goal, *(action.precondition for action in actions)]
+    asked += [condition for action in actions for condition in effect_conditions(action.effect)]
+    return frozenset(name for condition in asked for name in names_of(condition))
 
 
 def without(problem: Problem, steps: Collection[PlanStep]) -> Problem:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from knowledge_base.language.expression import Expression
+from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.printer import to_text
 from planning.ordering.order import PRESENT
 
@@ -45,7 +47,7 @@ class Telling:
         """
         goal = len(order.steps) + 1
         kept = [link for link in order.links if (link.provider, link.user) != (PRESENT, goal)]
-        links = sorted([link.user, link.provider, to_text(link.fact)] for link in kept)
+        links = sorted([link.user, link.provider, _text(link.fact)] for link in kept)
         self._trace.record(
             "plan.ordered",
             plot=name,
@@ -97,6 +99,14 @@ class Telling:
     def rejected(self, step: PlanStep | None, reason: str, engine: str) -> None:
         """The simulation foresees that a plan fails, at a step."""
         self._trace.record("plan.rejected", step=None if step is None else str(step), reason=reason, engine=engine)
+
+
+_texts: IdentityCache[Expression, str] = IdentityCache()
+
+
+def _text(fact: Expression) -> str:
+    """Kept by identity: plans one after the other have most of their steps in common, and these their conditions."""
+    return _texts.find(fact, None) or _texts.keep(fact, None, to_text(fact))
 
 
 def why_broken(broken: Mapping[str, Any]) -> str:
