@@ -160,10 +160,11 @@ class PlanningDomain:
     def applicable(self, step: PlanStep, world: World) -> bool:
         """Whether the arguments are of the parameters' types and the precondition holds."""
         action, bindings = self.action(step), self.bindings(step)
-        fits = all(
-            world.schema.fits(world.type_of(bindings[p.name]) or "", p.types) for p in action.parameters
-        )
-        return fits and holds(action.precondition, world, bindings)
+        fitting, type_of = world.schema.fitting, world.type_of
+        for parameter in action.parameters:
+            if type_of(bindings[parameter.name]) not in fitting(parameter.types):
+                return False
+        return holds(action.precondition, world, bindings)
 
     def effects(self, step: PlanStep, world: World) -> Delta:
         """What the step changes, whether it is applicable or not."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import nullcontext
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -30,6 +29,7 @@ from knowledge_base.journal.file import Durability
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.compatibility import require_extension
+from planning.collecting import settled
 from planning.domain import PlanningDomain
 from planning.engines.cache import CachingPlanner
 from planning.engines.planner import Planner, PlannerProcess
@@ -170,7 +170,7 @@ class Executive:
             sequencer = self._sequencer(clock, kept.last_record, store, open_ended=open_ended)
             if prepare is not None:
                 prepare(sequencer)
-            with nullcontext() if clock.simulated else _settled():
+            with nullcontext() if clock.simulated else settled():
                 return await sequencer.resume(kept)
 
         return run_simulated(go_on(), kept.time) if kept.run.header["simulated"] else run_real(go_on())
@@ -221,7 +221,7 @@ class Executive:
         sequencer = self._sequencer(clock, 0, store, open_ended=open_ended)
         if prepare is not None:
             prepare(sequencer)
-        with nullcontext() if clock.simulated else _settled():
+        with nullcontext() if clock.simulated else settled():
             return await sequencer.run(plot, arguments)
 
     def _sequencer(self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool) -> Sequencer:
@@ -269,16 +269,6 @@ class Executive:
     def __exit__(self, *_: object) -> None:
         """`close`."""
         self.close()
-
-
-@contextmanager
-def _settled() -> Iterator[None]:
-    """What is there now is left alone by the garbage collector, which would stop the robot to look at all of it."""
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
 
 
 @cache

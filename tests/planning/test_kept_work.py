@@ -114,20 +114,23 @@ def test_a_slice_of_a_problem_whose_metric_is_ignored_costs_the_same_everywhere(
 
 
 class Robot(Component):
-    """Says how much the collector leaves alone while it works."""
+    """Says how much the collector leaves alone while it works, and how often it looks."""
 
     name = "robot"
 
     @skill(outcomes={"finished": {}})
     async def act(self, call: SkillCall) -> Outcome:
-        self.left_alone = gc.get_freeze_count()
+        self.left_alone, self.patience = gc.get_freeze_count(), gc.get_threshold()
         return Outcome("finished")
 
 
 @pytest.mark.parametrize("simulated", [True, False])
 def test_in_real_time_the_collector_leaves_alone_what_was_there_before(simulated):
     world, robot, before = KnowledgeBase(DOMAIN.schema), Robot(), gc.get_freeze_count()
+    threshold = gc.get_threshold()
     world.apply(Delta(nodes=dict.fromkeys(SHELVES, "shelf"), added=(fact("at", "s1"),)), "test")
     Executive(DOMAIN, plots(), [robot], world).run("do-go", {"from": "s1", "to": "s2"}, simulated=simulated)
     assert (robot.left_alone > before) is not simulated
+    assert (robot.patience > threshold) is not simulated
+    assert gc.get_threshold() == threshold
     assert gc.get_freeze_count() == 0 if not simulated else gc.get_freeze_count() == before
