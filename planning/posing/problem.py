@@ -26,7 +26,8 @@ from planning.posing.derived import derivation
 from planning.posing.grounding import Variant
 from planning.posing.groundwork import Groundwork, numbered, things_of
 from planning.posing.interchange import spared
-from planning.posing.reduction import Task, pruned, reachable
+from planning.posing.reach import reachable
+from planning.posing.reduction import Task, pruned
 from planning.posing.relevance import Relevant, names_of, relevant
 from planning.posing.timed import durative, pose_timed
 from planning.posing.unforeseeable import refuse_unforeseeable

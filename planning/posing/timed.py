@@ -22,7 +22,8 @@ from planning.posing.conditions import Every, Grounder, Leaf, Literal, Residual,
 from planning.posing.grounding import Variant, variants
 from planning.posing.groundwork import Groundwork
 from planning.posing.numbering import NOT, as_fact
-from planning.posing.reduction import Task, reachable
+from planning.posing.reach import reachable
+from planning.posing.reduction import Task
 from planning.posing.relevance import changed, relevant
 from planning.posing.ways import Way, Ways
 from planning.strips import GroundAction, Problem, Span

@@ -19,7 +19,8 @@ from planning.posing.exclusion import excluding
 from planning.posing.grounding import Reached, Rule
 from planning.posing.numbering import NOT, as_fact
 from planning.posing.problem import Poser, check_goal
-from planning.posing.reduction import Task, reachable
+from planning.posing.reach import reachable
+from planning.posing.reduction import Task
 from planning.quantities import Assignment, Bound, helps, worth
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ class _Reach:
     @staticmethod
     def of(task: Task, world: World) -> _Reach:
         reach, numbering = reachable(task), task.numbering
-        named = [one for one in reach.facts - numbering.fluents if isinstance(numbering.named(one), Fact)]
+        named = [one for one in reach.facts.keys() - numbering.fluents if isinstance(numbering.named(one), Fact)]
         taken = itertools.compress(task.ways.all, reach.taken)
         changes = dict.fromkeys(change for way in taken for change in way.assignments)
         return _Reach(frozenset(map(numbering.fact, named)), tuple(changes), world)
