@@ -6,9 +6,11 @@ import contextlib
 import json
 import os
 import selectors
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import weakref
@@ -58,8 +60,9 @@ class EngineProcess:
     """One running worker (see `planning.engines.worker` for what is said); dies with its owner.
 
     It leads a session of its own, each search a process group of its own, so that nothing that an engine starts
-    is left behind. When the object is forgotten, or the interpreter exits, all of them are killed; should the
-    owner itself be killed, the worker sees the end of its input.
+    is left behind, and has a folder of its own for temporary files, which goes with it. When the object is forgotten,
+    or the interpreter exits, all of them are killed; should the owner itself be killed, the worker sees the end of its
+    input.
     """
 
     def __init__(self, command: Sequence[str]) -> None:
@@ -72,15 +75,19 @@ class EngineProcess:
         self._from, its_output = os.pipe()
         self._woken, self._wake = os.pipe()
         weakref.finalize(self, _close, (self._to, self._from, self._woken, self._wake))
+        folder = tempfile.mkdtemp(prefix="engine-")
         try:
             popen = subprocess.Popen(  # noqa: S603  the command is ours or a test's
                 command,
                 stdin=its_input,
                 stdout=its_output,
                 stderr=subprocess.DEVNULL,
-                env=_environment(),
+                env=_environment(folder),
                 start_new_session=True,
             )
+        except OSError:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
         finally:
             _close((its_input, its_output))
         for fd in (self._to, self._wake):
@@ -91,7 +98,7 @@ class EngineProcess:
         self._unsent = memoryview(b"")
         self._heard = bytearray()
         self._searches: set[int] = set()
-        self._end = weakref.finalize(self, _end, popen, self._searches)
+        self._end = weakref.finalize(self, _end, popen, self._searches, folder)
 
     @property
     def alive(self) -> bool:
@@ -231,9 +238,10 @@ def _ending(status: object) -> str:
     return "was killed" if status is None else f"ended with status {status}"
 
 
-def _environment() -> dict[str, str]:
-    """Our modules, wherever they were imported from, and fixed string hashes so that plans repeat."""
-    return {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+def _environment(folder: str) -> dict[str, str]:
+    """Our modules, wherever they were imported from, fixed string hashes so that plans repeat, a place for files."""
+    modules = os.pathsep.join(filter(None, sys.path))
+    return {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": modules, "TMPDIR": folder}
 
 
 def _runs(pid: int) -> bool:
@@ -244,9 +252,11 @@ def _runs(pid: int) -> bool:
         return False
 
 
-def _end(popen: subprocess.Popen[bytes], searches: set[int]) -> int:
+def _end(popen: subprocess.Popen[bytes], searches: set[int], folder: str) -> int:
     _kill_groups([*searches, popen.pid])
-    return popen.wait()
+    status = popen.wait()
+    shutil.rmtree(folder, ignore_errors=True)  # engines that are killed leave files
+    return status
 
 
 def _kill_groups(groups: Iterable[int]) -> None:

@@ -7,8 +7,10 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from importlib.metadata import requires
+from pathlib import Path
 
 import pytest
 from fake_engines import HANGING, PROBLEM, READY, answering, descendants, gone, lights_out
@@ -246,6 +248,18 @@ def test_a_forgotten_process_is_ended(scripted):
     pid = process._pid
     del process
     assert gone([pid])
+
+
+def test_what_an_engine_leaves_among_its_temporary_files_goes_with_its_process(scripted):
+    leaving = "import tempfile\nfor line in sys.stdin:\n    said = {'failed': tempfile.mkdtemp()}, {'ended': 0}\n"
+    process = scripted(READY + leaving + "    print(*map(json.dumps, said), sep='\\n', flush=True)\n")
+    process.start(60)
+    left = Path(asked(process, PROBLEM)["failed"])
+    assert left.is_dir()
+    process.kill()
+    assert not left.exists()
+    assert not left.parent.exists()
+    assert left.parent != Path(tempfile.gettempdir())
 
 
 def test_what_is_said_before_the_end_is_heard_in_order(scripted):
