@@ -22,6 +22,7 @@ from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.resuming import require_components, take_up
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
+from dsc.sequencer.standstill import Standstill
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -210,6 +211,7 @@ class Sequencer:
         reactor = self._reactor
         # Before anybody who is started by the run subscribes: what follows from a change is recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
+        standstill = Standstill(self.clock)
         try:
             await begin()
             while not self.machine.state.finished and reactor.problem is None:
@@ -220,7 +222,11 @@ class Sequencer:
                     await self._inbox.filled()
                 for wait in self._before_events:
                     await wait()
-                self._take(self._inbox.take())
+                message = self._inbox.take()
+                if problem := standstill.problem(message):
+                    reactor.problem = problem
+                    break
+                self._take(message)
         except asyncio.CancelledError:  # somebody wants it to end; a crash would not come here
             reactor.problem = reactor.problem or "it was cancelled"
             self._leave()

@@ -379,13 +379,14 @@ def test_an_executive_can_be_closed_inside_a_loop():
     assert asyncio.run(main()).library
 
 
-@pytest.mark.parametrize("rule", ["do: {then: help}", "of: [step_1], do: {then: give_up}"])
-def test_a_rule_about_the_states_of_its_plot_is_not_handed_to_a_plan(rule):
-    class Blown(Lamps):
-        @skill(outcomes={"lit": {}, "bulb_blown": {"lamp": "lamp"}, "nothing": {}}, types={"lamp": "lamp"})
-        async def light(self, call, lamp):
-            return Outcome("bulb_blown", {"lamp": lamp})
+class Blown(Lamps):
+    @skill(outcomes={"lit": {}, "bulb_blown": {"lamp": "lamp"}, "nothing": {}}, types={"lamp": "lamp"})
+    async def light(self, call, lamp):
+        return Outcome("bulb_blown", {"lamp": lamp})
 
+
+def lit_by_blown_bulbs(rule):
+    """The end of a run whose every bulb is blown, with that rule about it."""
     holder = parse_plot(f"""
 plot: light_up
 emits: {{ended: {{how: symbol}}}}
@@ -408,9 +409,21 @@ rules:
     light = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
     robot = Executive(DOMAIN, [holder, light], [lamps], planner=Answers(found("a")))
     robot.knowledge.apply(Delta(nodes={"a": "lamp"}, added=(fact("works", "a"),)), "test")
-    end = robot.run("light_up")
+    return robot.run("light_up")
+
+
+def test_a_rule_about_the_states_of_its_plot_is_not_handed_to_a_plan():
+    end = lit_by_blown_bulbs("of: [step_1], do: {then: give_up}")
     assert end.problem is None
     assert "(switch-on a) has failed before, in the same way and the same situation: bulb_blown" in how(end)
+
+
+def test_a_plot_that_goes_round_in_no_time_is_ended_with_the_reason():
+    end = lit_by_blown_bulbs("do: {then: help}")  # which tries again at once, with the same rule for what comes of it
+    assert not end.finished
+    assert end.problem == (
+        "no time has passed for 10000 macrosteps; the plot goes round: " + " -> ".join(["bulb_blown"] * 8)
+    )
 
 
 def test_the_plots_of_an_action_agree_on_who_reports_its_effects():
