@@ -202,7 +202,8 @@ class Search:
             async with self._clock.timeout_at(due):
                 return await finding
         except TimeoutError:
-            return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after")
+            planner = type(self._planner).__name__
+            return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after ({planner})")
 
     async def _found(
         self,
