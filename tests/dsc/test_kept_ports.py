@@ -185,7 +185,7 @@ def test_an_event_is_activated_again_and_what_holds_then_is_told(tmp_path):
     def at(seconds, level):
         def prepare(sequencer):
             robot = sequencer.dispatcher.component("robot")
-            sequencer._clock.call_at(seconds, lambda: robot.update("low", level))
+            sequencer.clock.call_at(seconds, lambda: robot.update("low", level))
             sequencer.listen(lambda _: copies.append(copied(alive, tmp_path / f"c{len(copies)}")))
 
         return prepare
