@@ -5,16 +5,13 @@ However a planner behaves, the answer comes within a bound of real time, and onl
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import math
-import threading
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import InputError
-from planning.engines.improving import Improving
 from planning.engines.registry import timing
+from planning.execution.asking import Answer, Asking
 from planning.execution.mending import mending
 from planning.execution.repair import EXCLUDED_SECONDS, without
 from planning.ordering.order import deordered
@@ -54,8 +51,6 @@ MAX_ATTEMPTS = 3
 """How often to plan anew because the world changed while the planner worked."""
 MAX_REJECTED = 5
 """How many plans the simulation may reject."""
-PATIENCE = 90.0
-"""Seconds of real time beyond its own for a planner that does not keep to it; starting an engine may take a minute."""
 _IN_CONCERT = "there is only a plan with several steps at a time that need each other, which is not carried out yet"
 MENDING_SECONDS = 2.0
 """Real time for finding out how to mend a plan, at most."""
@@ -98,9 +93,6 @@ class NotFound:
     reason: str
 
 
-_Answer = tuple[PlanningOutcome, "AsyncGenerator[PlanningOutcome, None] | None"]
-
-
 class Search:
     """Finds plans for goals, and remembers which steps to do without for a while.
 
@@ -121,7 +113,7 @@ class Search:
     ) -> None:
         self._domain = domain
         self._knowledge = knowledge
-        self._planner = planner
+        self._asking = Asking(planner, clock)
         self._clock = clock
         self._telling = telling
         self._foresight = foresight
@@ -158,7 +150,7 @@ class Search:
         changed = 0
         while True:
             version, snapshot = self._knowledge.version, self._knowledge.snapshot()
-            found = await self._bound(self._found(goal, seconds, before, rejected, snapshot), seconds)
+            found = await self._in_time(self._found(goal, seconds, before, rejected, snapshot), seconds)
             if isinstance(found, NotFound):
                 return found
             if self._clock.simulated:
@@ -195,15 +187,12 @@ class Search:
                 return Validation(valid=True), deordered(plan, self._domain, self._knowledge, goal)
         return validate(plan, self._domain, self._knowledge, goal), None
 
-    async def _bound(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
-        """Simulated time is held while anybody searches; one that is simulated may let it pass, not for ever."""
-        due = self._clock.now() + seconds + PATIENCE if self._clock.simulated else math.inf
+    async def _in_time(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
         try:
-            async with self._clock.timeout_at(due):
+            async with self._asking.give_up_at(seconds):
                 return await finding
         except TimeoutError:
-            planner = type(self._planner).__name__
-            return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after ({planner})")
+            return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after ({self._asking.name})")
 
     async def _found(
         self,
@@ -247,14 +236,14 @@ class Search:
             return await aside(lambda: why_unsolvable(self._domain, snapshot, goal, patience), patience)
         return ()
 
-    async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> _Answer:
+    async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> Answer:
         """The planner's answer, without the excluded steps if there is a plan without them."""
         excluded = self._excluded_now()
-        answer, better = await self._solve(without(problem, {*excluded, *rejected}), seconds)
+        answer, better = await self._asking.solve(without(problem, {*excluded, *rejected}), seconds)
         if isinstance(answer, ProvenUnsolvable) and excluded and not problem.unreachable:
             self._excluded.clear()
             self._telling.readmitted(excluded)
-            return await self._solve(without(problem, rejected), seconds)
+            return await self._asking.solve(without(problem, rejected), seconds)
         return answer, better
 
     async def _mended(
@@ -270,7 +259,7 @@ class Search:
         if how is None:
             return None
         seconds = min(patience.left / 4, MENDING_SECONDS)
-        answer, _ = await self._solve(without(how.problem, excluded), seconds, going_on=False)
+        answer, _ = await self._asking.solve(without(how.problem, excluded), seconds, going_on=False)
         if not isinstance(answer, PlanFound):
             return answer if isinstance(answer, TimedOut) else None
         plan = how.mended(answer.plan, before.left_steps, self._domain, snapshot, goal)
@@ -293,43 +282,6 @@ class Search:
             self._telling.rejected(step, verdict.why, found.answer.engine)
         return verdict
 
-    async def _solve(self, problem: Problem, seconds: float, *, going_on: bool = True) -> _Answer:
-        """The planner's answer, and what may follow if it goes on (not in simulated time, which is the same twice)."""
-        if going_on and not self._clock.simulated and isinstance(self._planner, Improving):
-            better = self._planner.plans(problem, seconds)
-            answer = await self._bounded(anext(better), seconds)
-            if isinstance(answer, PlanFound):
-                return answer, better
-            await better.aclose()
-            return answer, None
-        return await self._bounded(self._planner.solve(problem, seconds), seconds), None
-
-    async def _bounded(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
-        """The answer, or that there was none in time or none at all; in real time, whatever the clock says."""
-        loop, engine = asyncio.get_running_loop(), type(self._planner).__name__
-        asked = asyncio.ensure_future(answering)
-        expired = threading.Event()
-
-        def expire() -> None:
-            expired.set()
-            loop.call_soon_threadsafe(asked.cancel)
-
-        timer = threading.Timer(seconds + PATIENCE, expire)
-        timer.daemon = True
-        timer.start()
-        try:
-            with self._clock.hold():
-                answer = await asked
-            return answer if isinstance(answer, PlanningOutcome) else EngineFailed(engine, f"no answer: {answer!r:.80}")
-        except asyncio.CancelledError:
-            if not expired.is_set() or _cancelled_from_outside():
-                raise
-            return TimedOut(engine, seconds)
-        except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
-            return EngineFailed(engine, f"{type(error).__name__}: {error}")
-        finally:
-            timer.cancel()
-
 
 def _unknown(
     answer: NoneFound | TimedOut | EngineFailed | NobodyCan, domain: PlanningDomain, goal: Expression, seconds: float
@@ -344,8 +296,3 @@ def _unknown(
             return NotFound("failed", f"{engine}: {message}")
         case NobodyCan():
             return NotFound("failed", why_no_engine(domain, goal, answer))
-
-
-def _cancelled_from_outside() -> bool:
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0

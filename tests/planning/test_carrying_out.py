@@ -259,7 +259,7 @@ class Bad:
 )  # fmt: skip
 def test_a_planner_that_misbehaves_ends_in_no_plan_and_is_named(how, said, monkeypatch):
     if how == "hangs":
-        monkeypatch.setattr("planning.execution.search.PATIENCE", -4.9)  # its five seconds of real time are over soon
+        monkeypatch.setattr("planning.execution.asking.PATIENCE", -4.9)  # its five seconds of real time are over soon
     planner = Bad(how)
     run = Run("(at c)", planner=planner)
     assert run.end.finished

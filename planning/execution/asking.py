@@ -1,0 +1,86 @@
+"""Asking one planner, however it behaves: there is an answer within a bound of real time."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import threading
+from typing import TYPE_CHECKING
+
+from planning.engines.improving import Improving
+from planning.plan import EngineFailed, PlanFound, PlanningOutcome, TimedOut
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncGenerator, Awaitable
+
+    from dsc.sequencer.clock import LoopClock
+    from planning.engines.planner import Planner
+    from planning.strips import Problem
+
+PATIENCE = 90.0
+"""Seconds of real time beyond its own for a planner that does not keep to it; starting an engine may take a minute."""
+
+Answer = tuple[PlanningOutcome, "AsyncGenerator[PlanningOutcome, None] | None"]
+"""What it says, and what may follow if it goes on; to be closed."""
+
+
+class Asking:
+    """A planner, and the clock of the run that asks it.
+
+    Attributes:
+        name: of the planner's class, by which it is blamed.
+    """
+
+    def __init__(self, planner: Planner, clock: LoopClock) -> None:
+        self._planner = planner
+        self._clock = clock
+        self.name = type(planner).__name__
+
+    def give_up_at(self, seconds: float) -> asyncio.Timeout:
+        """A bound for all asking in a block, in simulated time.
+
+        That is held while anybody searches; a planner that is itself simulated may let it pass, but not for ever.
+        """
+        return self._clock.timeout_at(self._clock.now() + seconds + PATIENCE if self._clock.simulated else math.inf)
+
+    async def solve(self, problem: Problem, seconds: float, *, going_on: bool = True) -> Answer:
+        """The planner's answer, and what may follow if it goes on (not in simulated time, which is the same twice)."""
+        if going_on and not self._clock.simulated and isinstance(self._planner, Improving):
+            better = self._planner.plans(problem, seconds)
+            answer = await self._bounded(anext(better), seconds)
+            if isinstance(answer, PlanFound):
+                return answer, better
+            await better.aclose()
+            return answer, None
+        return await self._bounded(self._planner.solve(problem, seconds), seconds), None
+
+    async def _bounded(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
+        """The answer, or that there was none in time or none at all; in real time, whatever the clock says."""
+        loop, engine = asyncio.get_running_loop(), self.name
+        asked = asyncio.ensure_future(answering)
+        expired = threading.Event()
+
+        def expire() -> None:
+            expired.set()
+            loop.call_soon_threadsafe(asked.cancel)
+
+        timer = threading.Timer(seconds + PATIENCE, expire)
+        timer.daemon = True
+        timer.start()
+        try:
+            with self._clock.hold():
+                answer = await asked
+            return answer if isinstance(answer, PlanningOutcome) else EngineFailed(engine, f"no answer: {answer!r:.80}")
+        except asyncio.CancelledError:
+            if not expired.is_set() or _cancelled_from_outside():
+                raise
+            return TimedOut(engine, seconds)
+        except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
+            return EngineFailed(engine, f"{type(error).__name__}: {error}")
+        finally:
+            timer.cancel()
+
+
+def _cancelled_from_outside() -> bool:
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0
