@@ -12,8 +12,8 @@ import time
 import pytest
 from dsc_runs import Arm, Ran
 
+from dsc import blocking
 from dsc.calls import Outcome, SkillCall
-from dsc.components import blocking
 from dsc.components.component import Component
 from dsc.components.functions import component_of
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
