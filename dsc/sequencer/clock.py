@@ -12,7 +12,7 @@ import math
 import selectors
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from contextvars import Context
+from contextvars import Context, copy_context
 from functools import partial
 from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
 
@@ -110,6 +110,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         context: Context | None = None,
     ) -> asyncio.TimerHandle:  # fmt: skip
         """As every loop's."""
+        context = context or copy_context()
         timer = asyncio.TimerHandle(when, callback, args, self, context)
         call = partial(_unless_cancelled, timer, callback, *args)
         if when <= self._simulated_now:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from threading import Condition, Thread
@@ -51,8 +51,7 @@ class Checkpoints:
                 return
             self._waiting[path] = self._waiting.get(path, 0) + 1
             if self._thread is None or not self._thread.is_alive():
-                self._thread = Thread(target=self._run, name="checkpoints", daemon=True)
-                self._thread.start()
+                self._thread = _started(self._run)
 
     def is_behind(self, path: Path) -> bool:
         """Whether the writer had better tidy up himself."""
@@ -91,6 +90,15 @@ class Checkpoints:
             self._at_work = next(iter(self._waiting))
             del self._waiting[self._at_work]
             return self._at_work
+
+
+def _started(work: Callable[[], None]) -> Thread | None:
+    """`None` where no thread can be had: then the writer tidies up himself, after a while."""
+    thread = Thread(target=work, name="checkpoints", daemon=True)
+    with suppress(RuntimeError):
+        thread.start()
+        return thread
+    return None
 
 
 def _tidy_up(path: Path) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from knowledge_base.errors import ConflictError, InputError, Place, StoreError
@@ -272,7 +272,8 @@ class Journal(Archive):
         else:
             connection.execute("COMMIT")
             CHECKPOINTS.leave(self._path)
-            connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+            with suppress(sqlite3.Error):  # it is committed; what cannot be tidied up now is later
+                connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
 
 @contextmanager

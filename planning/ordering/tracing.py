@@ -83,6 +83,8 @@ class Tracing:
             if isinstance(now, int | float) and isinstance(before, int | float):
                 self._numbers[fluent].moves[number] = now - before
         world.apply(made)
+        for literal in doing.makes:  # what is added at the start may be deleted at the end
+            self._record(literal.fact).holds = world.holds(literal.fact.predicate, literal.fact.args)
 
     def reach(self, user: int, goal: Expression) -> None:
         """The goal is the last user.

@@ -130,3 +130,39 @@ def test_the_log_of_a_store_for_power_cuts_is_as_long_from_the_beginning_as_it_w
         commit(kb, 3)
     with opened(died) as kb:
         assert kb.version == 1503
+
+
+def test_a_change_is_not_called_failed_because_no_thread_can_tidy_up_after_it(path, monkeypatch):
+    class NoMore(threading.Thread):
+        def start(self):
+            raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(journal, "TIDY_UP_AFTER", 2)
+    monkeypatch.setattr(checkpoints, "Thread", NoMore)
+    with opened(path) as kb:
+        commit(kb, 50)
+        assert kb.version == 50
+        assert in_file(path) >= 15  # the writer has done it himself
+    with opened(path) as kb:
+        assert kb.version == 50
+
+
+def test_a_change_is_not_called_failed_because_its_writer_cannot_tidy_up(path, monkeypatch):
+    def no_checkpoints(action, what, *_):
+        refused = (action, what) == (sqlite3.SQLITE_PRAGMA, "wal_checkpoint")
+        return sqlite3.SQLITE_DENY if refused else sqlite3.SQLITE_OK
+
+    def writing(path, durability):
+        connection = really_writing(path, durability)
+        connection.set_authorizer(no_checkpoints)
+        return connection
+
+    really_writing = journal.writing
+    monkeypatch.setattr(journal, "writing", writing)
+    monkeypatch.setattr(journal, "TIDY_UP_AFTER", 2)
+    monkeypatch.setattr(CHECKPOINTS, "is_behind", lambda _: True)
+    with opened(path) as kb:
+        commit(kb, 9)
+        assert kb.version == 9
+    with opened(path) as kb:
+        assert kb.version == 9
