@@ -13,8 +13,8 @@ from domains.clean_up_table.skills import (
     Arm,
     Base,
     Camera,
+    again,
     drives,
-    outcome_of,
     picks_up,
     recognises,
     seconds,
@@ -46,8 +46,8 @@ class Tracks(Base):
         result = self.world.drive(call.action_id, to)
         if result.outcome == "no_path":
             await call.clock.sleep(self.parameters["patience"])
-            result = self.world.drive(_again(call), to)
-        return outcome_of(result)
+            result = self.world.drive(again(call.action_id), to)
+        return self.outcome_of(result)
 
 
 class SuctionArm(Arm):
@@ -82,8 +82,8 @@ class SuctionArm(Arm):
         result = grasp(call.action_id)
         if result.outcome == "grasp_failed":
             await call.clock.sleep(pumping)
-            result = grasp(_again(call))
-        return outcome_of(result)
+            result = grasp(again(call.action_id))
+        return self.outcome_of(result)
 
 
 class PatientCamera(Camera):
@@ -96,10 +96,5 @@ class PatientCamera(Camera):
         result = self.world.recognise(call.action_id, surface)
         if result.outcome == "nothing_found":
             await call.clock.sleep(self.parameters["recognising"])
-            result = self.world.recognise(_again(call), surface)
-        return outcome_of(result, self.believed)
-
-
-def _again(call: SkillCall) -> str:
-    """The id of a second attempt within one call: what happens to it is another draw."""
-    return f"{call.action_id}/again"
+            result = self.world.recognise(again(call.action_id), surface)
+        return self.outcome_of(result)

@@ -7,11 +7,11 @@ changes nothing. It hands over what the robot observes, never the world's truth.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from domains.clean_up_table.observations import initial_knowledge, learned
 from domains.clean_up_table.places import PLACES, distance
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import Ended, Outcome, SkillCall
 from dsc.components.component import Component
 from dsc.components.parameters import Parameter
 from dsc.skills import skill
@@ -88,7 +88,30 @@ recognises = skill(
 """What every camera says of recognising."""
 
 
-class Base(Component):
+class Part(Component):
+    """A part of the robot, which acts on the world.
+
+    Args:
+        world: remembers what was done in it.
+        name: how charts address the part.
+    """
+
+    def __init__(self, world: World, name: str | None = None) -> None:
+        super().__init__(name)
+        self.world = world
+
+    def outcome_of(self, result: Result) -> Outcome:
+        """What a skill of this part ends with when the world has answered."""
+        return outcome_of(result)
+
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
+        """Nothing goes on by itself here; what was done is done."""
+        self.world.catch_up()
+        results = [self.world.done.get(one) for one in (again(action_id), action_id)]
+        return next((Ended(self.outcome_of(result)) for result in results if result is not None), None)
+
+
+class Base(Part):
     """The mobile base."""
 
     name = "base"
@@ -98,10 +121,6 @@ class Base(Component):
         "starting": seconds(1.0),  # until it moves
     }
 
-    def __init__(self, world: World, name: str | None = None) -> None:
-        super().__init__(name)
-        self.world = world
-
     @drives
     async def drive(self, call: SkillCall, to: str) -> Outcome:
         """Drive to a place; a held item may slip, and then robot and item are at the floor."""
@@ -110,7 +129,7 @@ class Base(Component):
         return outcome_of(self.world.drive(call.action_id, to))
 
 
-class Arm(Component):
+class Arm(Part):
     """The arm with its one hand."""
 
     name = "arm"
@@ -121,10 +140,6 @@ class Arm(Component):
         "stacking": seconds(5.0),
         "throwing": seconds(3.0),
     }
-
-    def __init__(self, world: World, name: str | None = None) -> None:
-        super().__init__(name)
-        self.world = world
 
     @picks_up
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
@@ -173,7 +188,7 @@ class Arm(Component):
         return outcome_of(self.world.throw_away(call.action_id, item, destination))
 
 
-class Camera(Component):
+class Camera(Part):
     """The camera, which also reports what it misses.
 
     Args:
@@ -188,15 +203,18 @@ class Camera(Component):
     def __init__(
         self, world: World, believed: Callable[[str], Iterable[str]], name: str | None = None
     ) -> None:
-        super().__init__(name)
-        self.world = world
+        super().__init__(world, name)
         self.believed = believed
+
+    def outcome_of(self, result: Result) -> Outcome:
+        """What should have been seen is missing."""
+        return outcome_of(result, self.believed)
 
     @recognises
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
         """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
         await call.clock.sleep(self.parameters["recognising"])
-        return outcome_of(self.world.recognise(call.action_id, surface), self.believed)
+        return self.outcome_of(self.world.recognise(call.action_id, surface))
 
     @skill(
         outcomes={"looked": CARRIER_AT, "gone": ITEM_AT, "not_possible": NOT_POSSIBLE},
@@ -209,7 +227,7 @@ class Camera(Component):
         return outcome_of(self.world.look_into(call.action_id, carrier, surface))
 
 
-class Voice(Component):
+class Voice(Part):
     """The loudspeaker."""
 
     name = "voice"
@@ -217,15 +235,16 @@ class Voice(Component):
         "pace": Parameter("number", default=15.0, least=1.0, most=100.0),  # characters a second
     }
 
-    def __init__(self, world: World, name: str | None = None) -> None:
-        super().__init__(name)
-        self.world = world
-
     @skill(outcomes={"said": {"text": None}}, after_crash=ONCE)
     async def say(self, call: SkillCall, text: str) -> Outcome:
         """Tell the operator something."""
         await call.clock.sleep(1.0 + len(text) / self.parameters["pace"])
         return outcome_of(self.world.say(call.action_id, text))
+
+
+def again(action_id: str) -> str:
+    """The id of a second attempt within one call: what happens to it is another draw."""
+    return f"{action_id}/again"
 
 
 def outcome_of(result: Result, believed: Callable[[str], Iterable[str]] = lambda _surface: ()) -> Outcome:

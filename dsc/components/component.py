@@ -197,12 +197,16 @@ class Component:
         """
         return Status.UNKNOWN
 
-    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
         """Stop an action, if it still goes on, that was cancelled just before the run was broken off.
 
         Whether the cancellation has reached the robot is not known. Override it where actions go on when this
         process dies; those that are part of it have ended with it.
+
+        Returns:
+            How it ended, if it had before it could be stopped: what it observed then is so.
         """
+        return None
 
     async def forget(self, action_id: str) -> None:
         """Nobody will ask for the action's end any more: it has been taken and, with a store, is kept.

@@ -234,9 +234,11 @@ class RemoteComponent(Component):
         said = await self._ask("how", {**self._key(action_id), "heard": 0})
         return Status.UNKNOWN if said is None else Status.RUNNING
 
-    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> None:  # noqa: ARG002
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
         """Stop it there; raises `NoAnswerError`."""
+        said = await self._ask("how", {**self._key(action_id), "heard": 0})
         await self._ask("stop", self._key(action_id))
+        return next((Ended(outcome_of(form["ended"])) for form in said or () if "ended" in form), None)
 
     async def forget(self, action_id: str) -> None:
         """Let it be forgotten there."""

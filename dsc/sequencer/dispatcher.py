@@ -177,14 +177,19 @@ class Dispatcher:
         self._start(start, earlier)
 
     async def abandon(self, start: Start) -> None:
-        """Let a component stop what was cancelled just before a restart; raises `InputError` if it cannot."""
-        component = self.component(start.component)
+        """Let a component stop what was cancelled just before a restart; raises `InputError` if it cannot.
+
+        If it had ended all the same, its answer was under way, and what it observed is so.
+        """
+        component, action_id = self.component(start.component), self._id(start)
         try:
             async with asyncio.timeout(CLOSING):
-                await component.abandon(self._id(start), start.skill, encoded(start.arguments))
+                ended = await component.abandon(action_id, start.skill, encoded(start.arguments))
         except Exception as error:  # whatever a component does wrong must not end the program
             why = f"{type(error).__name__}: {error}"
             raise InputError(f"{start.component}.{start.skill} may still go on: {why}") from error
+        if ended is not None:
+            self._post(SkillMessage(start, declared(component, start, ended.outcome), final=True))
 
     async def close(self) -> list[str]:
         """Cancel skills and timers, and wait until they have stopped and components are told what they were sent.

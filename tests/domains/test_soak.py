@@ -45,6 +45,11 @@ def test_every_promise_holds_in_every_run(first, planners):
     assert sum(one.lives for one in outcomes) > CHUNK
 
 
+@pytest.mark.parametrize("seed", [1193, 3193, 4208])
+def test_what_was_done_just_before_an_operator_stopped_it_is_known_after_a_crash(seed, planners):
+    assert lived(seed, planners).wrong == []
+
+
 def test_the_same_seed_is_the_same_run(planners):
     once, again = (lived(7, planners) for _ in range(2))
     assert once == again

@@ -20,6 +20,7 @@ from dsc.sequencer.run_tables import archive, has_run, records_of
 from dsc.sequencer.sequencer import RunEnd
 from dsc.skills import skill
 from knowledge_base.errors import StoreError, UnknownNameError
+from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
 
 
@@ -453,6 +454,15 @@ def test_an_action_that_was_cancelled_at_the_last_moment_is_stopped_and_not_done
         stopped.append(robot.abandoned)
     assert [(end.finished, at) for end, _, at in ends] == [(True, 7)] * 3
     assert stopped == [[], [("a2.0", "fetch", {})], []]
+
+
+def test_what_an_action_observed_that_had_ended_when_it_was_cancelled_is_known_after_a_restart(tmp_path):
+    class Quick(Stubborn):
+        async def abandon(self, action_id, skill_name, arguments):
+            return Ended(Outcome("fetched", observed=Delta(added=(fact("q"),))))
+
+    known = [run_with(copy, CANCELLING, Quick(), resume=True)[1:] for copy in cancelled(tmp_path)]
+    assert [("(q)" in facts, at) for facts, at in known] == [(False, 7), (True, 7), (False, 7)]
 
 
 def test_a_component_that_cannot_stop_it_ends_the_run_with_that(tmp_path):

@@ -218,3 +218,19 @@ def test_who_uses_up_a_number_does_not_provide_what_is_left_of_it(world_of):
         "1 -(not (< (warmth) 1))-> 4", "3 -(>= (- (fuel) 2) 1)-> 4", "2 -(at b)-> 4", "4 -(at c)-> 5",
     }  # fmt: skip
     assert order.before == {(1, 2), (2, 3), (3, 4)}
+
+
+def test_what_is_so_only_while_a_step_lasts_is_not_so_afterwards(world_of):
+    domain = PlanningDomain.parse("""
+(define (domain paint) (:requirements :durative-actions :negative-preconditions) (:types thing)
+  (:predicates (painted ?t - thing) (busy))
+  (:durative-action paint :parameters (?t - thing) :duration (= ?duration 2) :condition (at start (not (busy)))
+    :effect (and (at start (busy)) (at end (not (busy))) (at end (painted ?t)))))
+""")
+    world = world_of(domain.schema, {"pot": "thing", "lid": "thing"}, ())
+    both = Plan(steps("paint pot", "paint lid"))
+    goal = parse_condition("(and (painted pot) (painted lid) (not (busy)))")
+    assert validate(both, domain, world, goal).valid
+    assert deordered(both, domain, world, goal).before == {(1, 2)}
+    with pytest.raises(InputError, match=r"needs \(busy\)"):
+        deordered(both, domain, world, parse_condition("(busy)"))
