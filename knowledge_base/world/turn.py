@@ -12,17 +12,22 @@ Three rules make the order:
   who asks without pause would hold Python's own lock (GIL), and a change would wait for that, 5 ms each time that it
   touches a file or gets the lock from another thread.
 
+An interrupt (`KeyboardInterrupt`) may come at any moment. So the lock *is* Python's own, which whoever asks gives back
+without a line of Python in between. A change gives back what it got when it is interrupted as it begins; only at the
+very moment at which it ends an interrupt may leave the lock taken, and then the world has to be opened anew.
+
 Re-entrance: a thread that holds the lock may take it again at once, and one that has the turn may take both. A thread
 that holds the lock only to ask cannot change anything; waiting for the turn it would keep out who has it.
 """
 
 from __future__ import annotations
 
+from _thread import RLock  # the type: `threading.RLock` is a function
 from collections import deque
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from threading import Condition, Lock, RLock, get_ident
+from threading import Condition, Lock, get_ident
 from time import monotonic
 from types import TracebackType
 from typing import NamedTuple
@@ -67,7 +72,7 @@ def _place() -> _Place:
     return _Place(get_ident(), gate)
 
 
-class Turn:
+class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its stub says
     """The lock of a world; used as a context manager by who asks.
 
     Args:
@@ -78,8 +83,7 @@ class Turn:
     def __init__(self, stamp: Stamp, patience_s: float = PATIENCE_S) -> None:
         self._stamp = stamp
         self._patience_s = patience_s
-        self._lock = RLock()
-        self._owned = Condition(self._lock)  # nobody waits for it; it knows whose the lock is
+        self._owned = Condition(self)  # nobody waits for it; it knows whose the lock is
         self._guard = Lock()  # for what follows; held for a moment only
         self._line: deque[_Place] = deque()
         self._due = 0.0  # when the patience of the first in line is over
@@ -95,16 +99,20 @@ class Turn:
         with self._guard:
             return len(self._line), len(self._changers)
 
-    def __enter__(self) -> None:
-        may_go = not self._line or monotonic() < self._due or self._held()
-        if not (may_go and self._lock.acquire(blocking=False)):
-            place = _place()
-            with self._guard:
-                self._join(place)
-            self._enter(place)
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._lock.release()
+    def __enter__(self) -> bool:  # type: ignore[override]  # as `with` calls it
+        mine = self._held()
+        try:
+            may_go = mine or not self._line or monotonic() < self._due
+            if not (may_go and self.acquire(blocking=False)):
+                place = _place()
+                with self._guard:
+                    self._join(place)
+                self._enter(place)
+        except BaseException:  # interrupted, perhaps with the lock already
+            if self._held() and not mine:
+                self.release()
+            raise
+        return True
 
     def changing(self) -> AbstractContextManager[None]:
         """Nobody else changes anything or asks.
@@ -124,7 +132,7 @@ class Turn:
         self.take()
         with self._guard:
             self._open()
-        self._lock.release()
+        self.release()
         try:
             yield
         finally:
@@ -147,25 +155,32 @@ class Turn:
         me = get_ident()
         if self._changer != me and self._held():
             raise ConflictError("a question is being answered in this thread; nothing can be changed meanwhile")
+        again, entered = self._changer == me, False
         with self._guard:
             self._shut()
         try:
-            self.__enter__()
+            entered = self.__enter__()
+            if again:
+                self._depth += 1
+            else:
+                self._get_turn(me)
         except BaseException:
             with self._guard:
+                if self._changer == me and not again:
+                    self._leave()
                 self._open()
+            if entered if again else self._held():
+                self.release()
             raise
-        if self._changer == me:
-            self._depth += 1
-        else:
-            self._get_turn(me)
 
     def give_back(self) -> None:
         """End to be `changing`."""
-        with self._guard:
-            self._leave()
-            self._open()
-        self._lock.release()
+        try:
+            with self._guard:
+                self._leave()
+                self._open()
+        finally:
+            self.release()
 
     def _get_turn(self, me: int) -> None:
         """Have the turn; if somebody is alone, leave the line and stand in it again when the turn has come."""
@@ -176,23 +191,21 @@ class Turn:
             place = _place()
             self._changers.append(place)
             self._open()
-        self._lock.release()
+        self.release()
         try:
             self._enter(place)
         except BaseException:
             with self._guard:
                 if place in self._changers:
                     self._changers.remove(place)
-                else:  # the turn has come
-                    self._leave()
-                    self._open()
+                    self._shut()  # `take` opens it
             raise
 
     def _enter(self, place: _Place) -> None:
         """Wait in line; who is first waits for the lock, and opens the gate of the next when it has it."""
         try:
             place.gate.acquire()
-            self._lock.acquire()
+            self.acquire()
         finally:  # also when it is interrupted
             with self._guard:
                 if place in self._line:

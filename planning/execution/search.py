@@ -238,12 +238,12 @@ class Search:
 
     async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> Answer:
         """The planner's answer, without the excluded steps if there is a plan without them."""
-        excluded = self._excluded_now()
+        excluded, patience = self._excluded_now(), Patience(seconds)
         answer, better = await self._asking.solve(without(problem, {*excluded, *rejected}), seconds)
         if isinstance(answer, ProvenUnsolvable) and excluded and not problem.unreachable:
             self._excluded.clear()
             self._telling.readmitted(excluded)
-            return await self._asking.solve(without(problem, rejected), seconds)
+            return await self._asking.solve(without(problem, rejected), patience.left)
         return answer, better
 
     async def _mended(

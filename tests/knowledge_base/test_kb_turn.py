@@ -191,3 +191,27 @@ def test_writers_get_on_among_readers_that_ask_without_pause(tmp_path, kept: str
             reader.join(10)
         assert kb.version == 200
         assert all(during)
+
+
+@pytest.mark.parametrize("done_before", [False, True])
+@pytest.mark.parametrize("part", ["acquire", "_get_turn"])
+def test_whoever_is_interrupted_on_the_way_in_gives_back_what_there_is(part, done_before, monkeypatch):
+    really, changed = getattr(Turn, part), threading.Event()
+
+    def interrupted(self, *args, **named):
+        if done_before:
+            really(self, *args, **named)
+        raise KeyboardInterrupt
+
+    def change():
+        with turn.changing():
+            changed.set()
+
+    turn = Turn(Stamp())
+    monkeypatch.setattr(Turn, part, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        turn.take()
+    monkeypatch.undo()
+    threading.Thread(target=change, daemon=True).start()
+    assert changed.wait(5)
+    assert turn.waiting == (0, 0)
