@@ -17,6 +17,8 @@ from knowledge_base.facts import Delta
 from knowledge_base.language.inputs import require_delta, require_text, shown
 from knowledge_base.store import KnowledgeBase
 
+_NUMBER = int | float
+
 
 def event(said: object) -> Event:
     """The event with attributes of its own.
@@ -24,12 +26,15 @@ def event(said: object) -> Event:
     Raises:
         InputError: it is none, only the executive fires it, or an attribute is no plain data.
     """
-    if not isinstance(said, Event) or not isinstance(said.attributes, Mapping):
+    plain = isinstance(said, Event) and said.attributes is NO_ATTRIBUTES  # as most are
+    if not isinstance(said, Event) or not (plain or isinstance(said.attributes, Mapping)):
         raise InputError(f'an event is an Event with its attributes, as Event("stop", {{}}), not {shown(said)}')
     if said.name in RESERVED:
         raise InputError(f"the event '{said.name}' is fired by the executive itself", found=said.name)
+    if plain:
+        return said
     if not said.attributes:
-        return said if said.attributes is NO_ATTRIBUTES else said._replace(attributes=NO_ATTRIBUTES)
+        return said._replace(attributes=NO_ATTRIBUTES)
     return said._replace(attributes=_plain(dict(said.attributes), f"the attributes of '{said.name}' are"))
 
 
@@ -81,7 +86,7 @@ def arguments(plot: ActionPlot, given: object) -> Mapping[str, Any]:
 
 def require_seconds(after: object) -> None:
     """Raise `InputError` unless it is a time that passes."""
-    if isinstance(after, bool) or not isinstance(after, int | float) or not math.isfinite(after):
+    if isinstance(after, bool) or not isinstance(after, _NUMBER) or not math.isfinite(after):
         raise InputError(f"something comes after a finite number of seconds, not {shown(after)}")
 
 

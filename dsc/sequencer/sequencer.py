@@ -211,7 +211,7 @@ class Sequencer:
         reactor = self._reactor
         # Before anybody who is started by the run subscribes: what follows from a change is recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
-        standstill = Standstill(self.clock)
+        standstill = Standstill(self.clock) if self.clock.simulated else None
         try:
             await begin()
             while not self.machine.state.finished and reactor.problem is None:
@@ -223,7 +223,7 @@ class Sequencer:
                 for wait in self._before_events:
                     await wait()
                 message = self._inbox.take()
-                if problem := standstill.problem(message):
+                if standstill is not None and (problem := standstill.problem(message)):
                     reactor.problem = problem
                     break
                 self._take(message)

@@ -15,22 +15,19 @@ _SHOWN = 8
 
 
 class Standstill:
-    """Counts what a run brings about itself while its time stands still.
+    """Counts what a run brings about itself while its simulated time stands still.
 
-    Args:
-        clock: of the run. Real time passes anyhow; whoever watches a robot go round can stop it.
+    Real time passes anyhow; whoever watches a robot go round can stop it.
     """
 
     def __init__(self, clock: LoopClock) -> None:
-        self._clock = clock if clock.simulated else None
+        self._clock = clock
         self._moment = clock.now()
         self._count = 0
         self._latest: deque[str] = deque(maxlen=_SHOWN)
 
     def problem(self, message: Message) -> str | None:
         """Why the run cannot go on with this message; `None` as long as it can."""
-        if self._clock is None:
-            return None
         if (now := self._clock.now()) != self._moment:
             self._moment, self._count = now, 0
         match message:

@@ -27,7 +27,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from threading import Condition, Lock, get_ident
+from threading import Lock, get_ident
 from time import monotonic
 from types import TracebackType
 from typing import NamedTuple
@@ -80,10 +80,11 @@ class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its s
         patience_s: how long the first in line lets others go first, in seconds.
     """
 
+    _held = RLock._is_owned  # type: ignore[attr-defined]  # noqa: SLF001  by this thread; `threading.Condition` asks so, too
+
     def __init__(self, stamp: Stamp, patience_s: float = PATIENCE_S) -> None:
         self._stamp = stamp
         self._patience_s = patience_s
-        self._owned = Condition(self)  # nobody waits for it; it knows whose the lock is
         self._guard = Lock()  # for what follows; held for a moment only
         self._line: deque[_Place] = deque()
         self._due = 0.0  # when the patience of the first in line is over
@@ -213,14 +214,6 @@ class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its s
                     self._line.remove(place)
                     if was_first and self._line:
                         self._call_first()
-
-    def _held(self) -> bool:
-        """Whether this thread holds the lock."""
-        try:
-            self._owned.notify(0)
-        except RuntimeError:
-            return False
-        return True
 
     # --- under the guard
 
