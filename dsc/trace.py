@@ -11,11 +11,10 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import IO, Any, NamedTuple
 
-from dsc.json_text import text_by
+from dsc.json_text import text_of
 
 FORMAT = "dsc-trace"
 VERSION = 1
-_encode = text_by(json.JSONEncoder(ensure_ascii=False))  # `json.dumps` would make an encoder for each record
 
 
 class Record(NamedTuple):
@@ -38,9 +37,9 @@ class Record(NamedTuple):
 
     def to_line(self) -> str:
         """One line of JSON, keys in a fixed order."""
-        cause = "null" if self.cause is None else self.cause
-        head = f'{{"seq": {self.seq}, "t": {round(self.t, 6)}, "type": "{self.type}", "cause": {cause}'
-        return f"{head}, {_encode(self.data)[1:]}" if self.data else f"{head}}}"
+        seq, t, type_, cause, data = self
+        head = f'{{"seq": {seq}, "t": {round(t, 6)}, "type": "{type_}", "cause": {"null" if cause is None else cause}'
+        return f"{head}, {text_of(data)[1:]}" if data else f"{head}}}"
 
     @staticmethod
     def from_line(line: str) -> Record:

@@ -16,7 +16,6 @@ from dsc.calls import Outcome
 from dsc.engine.state import NOTHING, FrameState, MachineState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import NO_ATTRIBUTES, Event
-from dsc.json_text import text_by
 from dsc.sequencer.messages import (
     FromOutside,
     KnowledgeMessage,
@@ -37,8 +36,8 @@ message is awaited until the component has taken it."""
 
 _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
-_USUAL = (None, *Event._field_defaults.values())
-_encode = text_by(json.JSONEncoder(separators=(",", ":")))  # `json.dumps` would make one each time
+_VISIBILITY = Event._fields[2:]
+_EVERYBODY = [Event._field_defaults[name] for name in _VISIBILITY]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,17 +135,14 @@ def _full(value: Any, form: Callable[[str], Any]) -> Any:
     return form(value[_BY_HASH]) if isinstance(value, dict) and _BY_HASH in value else value
 
 
-def text_of(form: Any) -> str:
-    """JSON without spaces; numbers that JSON lacks (`Infinity`) are written as Python reads them."""
-    return _encode(form)
-
-
 # -- messages ------------------------------------------------------------------------------------------------
 
 
 def message_form(message: Message, short: Shortener) -> Form:
     """A message; a skill's refers to the action by its id."""
     match message:
+        case Event():
+            return {"event": _event_form(message, short)}
         case SkillMessage():
             outcome = message.outcome
             form = {"action": message.start.action_id, "outcome": outcome.event, "final": message.final}
@@ -177,11 +173,11 @@ def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Ca
 
 def _outside_form(message: FromOutside, short: Shortener) -> Form:
     match message:
+        case Event():
+            return {"event": _event_form(message, short)}
         case KnowledgeMessage():
             return {"change": delta_form(message.delta), "author": message.author}
-        case ParameterMessage():
-            return {"set": _plain(message)}
-    return {"event": _event_form(message, short)}
+    return {"set": _plain(message)}
 
 
 def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOutside:
@@ -238,14 +234,12 @@ def _later_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> SendLater:
 
 def _event_form(event: Event, short: Shortener) -> Form:
     """Only what is said of it: most events have nothing but a name."""
-    form: Form = {"name": event.name}
-    for name, value, usual in zip(Event._fields, event, _USUAL, strict=True):
-        if value is not usual:
-            form[name] = value
-    if event.attributes:
-        form["attributes"] = short(event.attributes)
-    else:
-        form.pop("attributes", None)
+    name, attributes, *visibility = event
+    form: Form = {"name": name}
+    if attributes:
+        form["attributes"] = short(attributes)
+    if visibility != _EVERYBODY:
+        form.update(zip(_VISIBILITY, visibility, strict=True))
     return form
 
 

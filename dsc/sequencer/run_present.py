@@ -21,6 +21,8 @@ from dsc.engine.steps import (
     StartTimer,
     SwitchMode,
 )
+from dsc.events import Event
+from dsc.json_text import text_of
 from dsc.sequencer.messages import LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import (
@@ -35,7 +37,6 @@ from dsc.sequencer.run_forms import (
     events_of,
     frame_form,
     frame_news,
-    text_of,
 )
 from dsc.sequencer.run_standing import Row
 from dsc.sequencer.run_tables import RunArchive, RunRow
@@ -101,6 +102,8 @@ class Present:
     def taken(self, message: Message) -> None:
         """What came is awaited no longer."""
         match message:
+            case Event():  # which nobody waits for in particular
+                pass
             case SkillMessage(start=start, final=False):
                 for place in self._places.get(_key(start), ()):
                     row = self._rows[place]
@@ -149,15 +152,16 @@ class Present:
         self._put_row(place, Row(type(what).__name__, step, at, awaited_form(what, self._short), 0, cause))
 
     def _reached(self, root: FrameState | None) -> None:
-        before = self._frames
-        self._root, self._frames = root, _by_serial(root)
-        news = self._news.setdefault("frames", {})
-        for serial, frame in self._frames.items():
+        before, now = self._frames, _by_serial(root)
+        self._root, self._frames = root, now
+        news: dict[int, Form | None] = {}
+        for serial, frame in now.items():
             known = before.get(serial)
             if known is not frame:
                 news[serial] = frame_news(known, frame, self._short)
-        if before.keys() != self._frames.keys():
-            news.update(dict.fromkeys(before.keys() - self._frames.keys()))
+        if before.keys() != now.keys():
+            news.update(dict.fromkeys(before.keys() - now.keys()))
+        self._news["frames"] = news
 
     def _put_row(self, place: int, row: Row) -> None:
         self._rows[place] = row

@@ -21,7 +21,7 @@ from knowledge_base.world.schema import Schema
 
 def test_a_record_is_one_line_with_the_head_first():
     line = Record(3, 1.23456789, "event", 2, {"name": "käse", "attributes": {"a": 1}}).to_line()
-    assert line == '{"seq": 3, "t": 1.234568, "type": "event", "cause": 2, "name": "käse", "attributes": {"a": 1}}'
+    assert line == '{"seq": 3, "t": 1.234568, "type": "event", "cause": 2, "name":"käse","attributes":{"a":1}}'
 
 
 def test_records_are_numbered_timed_and_caused():
