@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 import time as wall
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from threading import get_ident
 from types import TracebackType
@@ -22,6 +22,7 @@ from knowledge_base.journal.memory import MemoryHistory
 from knowledge_base.language.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.observable import Observable
 from knowledge_base.sources import Source, Sources
+from knowledge_base.together import Together
 from knowledge_base.transaction import Transaction
 from knowledge_base.view import View
 from knowledge_base.world.overlay import Overlay
@@ -55,6 +56,7 @@ class KnowledgeBase(Observable):
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
+        self._together = Together(self._lock, self._require_free, self._history)
 
     @classmethod
     def open(
@@ -220,24 +222,22 @@ class KnowledgeBase(Observable):
         self._announcer.deliver()
         return change
 
-    @contextmanager
-    def together(self) -> Iterator[sqlite3.Connection]:
+    def together(self) -> AbstractContextManager[sqlite3.Connection]:
         """What is committed inside the block is written to the file as one, together with what the block itself writes.
 
         Each change is a version of its own, and is seen and announced at once, as always; nobody may count on
         it before the block is left. Other threads that change something, or ask for the past, wait until then.
 
-        Yields the connection; whoever writes with it neither commits nor rolls back.
+        Returns:
+            What gives the block the connection; whoever writes with it neither commits nor rolls back. Entering or
+            leaving it raises the errors.
 
         Raises:
             StoreError: there is no file, or it cannot be written. What is in memory is then ahead of it: every
                 further change is refused, and the file, opened anew, has what was before the block.
             ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
         """
-        with self._lock.alone():
-            self._require_free()
-            with self._history.together() as connection:
-                yield connection
+        return self._together
 
     def bind_source(self, function: str, *args: Value, reference: str) -> Source:
         """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.

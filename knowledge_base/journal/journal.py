@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 from knowledge_base.errors import ConflictError, InputError, Place, StoreError
@@ -23,6 +23,7 @@ from knowledge_base.journal.file import (
 )
 from knowledge_base.journal.history import Version, Writer
 from knowledge_base.journal.lock import WriterLock
+from knowledge_base.journal.transaction import Group, Transaction
 from knowledge_base.world.compatibility import missing_constants, require_extension, require_functional
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
@@ -33,9 +34,6 @@ SNAPSHOT_AFTER = 2_000_000
 They are read back in a fraction of a second. A world that is longer than this is written only after as many
 characters of changes as it has itself: so snapshots at most double the file and the work.
 """
-
-TIDY_UP_AFTER = 500
-"""Commits after which the file is tidied up; SQLite itself would after a thousand pages, and they take one or two."""
 
 _INSERT_CHANGE = "INSERT INTO changes VALUES (?, ?, ?, ?)"
 _INSERT_KEY = "INSERT INTO keys VALUES (?, ?, ?, ?, ?)"
@@ -72,13 +70,12 @@ class Journal(Archive):
             raise _no_schema(path)
         self._place = Place(str(path))
         self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
-        self._grouped = self._appended = False  # whether appends are parts of an open transaction; whether any was made
-        self._behind: StoreError | None = None  # why the file lacks what the world in memory has
-        self._commits = 0
         self._durability = durability
         self._writers = WriterLock(path)
         try:
             self._connection = writing(path, durability)
+            self._transaction = Transaction(self._connection, path, durability)
+            self._group = Group(self._transaction, self._place)
             try:
                 self._prepare(schema, clock)
                 self._lay_out_log()
@@ -113,22 +110,9 @@ class Journal(Archive):
             self._tail, self._snapshot_size = 0, len(snapshot)
         self._tail += len(delta)
 
-    @contextmanager
-    def together(self) -> Iterator[sqlite3.Connection]:
+    def together(self) -> AbstractContextManager[sqlite3.Connection]:
         """Write what is appended in the block, and what else the block writes, in one transaction."""
-        self._require_abreast()
-        try:
-            with self._transaction() as connection:
-                self._grouped, self._appended = True, False
-                try:
-                    yield connection
-                finally:
-                    self._grouped = False
-                self._require_abreast()  # a part that failed takes all others with it
-        except BaseException as error:
-            if self._appended and self._behind is None:
-                self._behind = error if isinstance(error, StoreError) else StoreError(str(error))
-            raise
+        return self._group
 
     def first(self, key: str) -> Change | None:
         """The change that was kept under that key; asked by the one who writes."""
@@ -148,7 +132,7 @@ class Journal(Archive):
         """Make version `keep_since` the oldest: a snapshot of it takes the place of all before."""
         with self._reading() as connection:
             world = compact(world_form(self._world(connection, keep_since).state))
-        with self._transaction() as connection:
+        with self._transaction as connection:
             self._put_snapshot(world, keep_since)
             for statement in _FORGET:
                 connection.execute(statement, {"oldest": keep_since})
@@ -184,7 +168,7 @@ class Journal(Archive):
         if schema is None:
             raise _no_schema(self._path)
         self._schema = schema
-        with self._transaction() as connection:
+        with self._transaction as connection:
             create_tables(connection)
             self._put_schema(0)
             world = compact(world_form(WorldState(schema)))
@@ -196,7 +180,7 @@ class Journal(Archive):
         last = self.newest()
         require_functional(last.state, self._place)
         constants = missing_constants(last.state, self._place)
-        with self._transaction() as connection:
+        with self._transaction as connection:
             self._put_schema(last.version + bool(constants))
             if constants:
                 row = (last.version + 1, max(last.time, clock()), "schema", compact(delta_form(constants)))
@@ -217,7 +201,7 @@ class Journal(Archive):
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
         """What is committed; inside `together`, whose caller alone asks then, what it has appended as well."""
-        if self._grouped:
+        if self._group.open:
             with reported(self._path, "read"):
                 yield self._connection
             return
@@ -227,53 +211,18 @@ class Journal(Archive):
     @contextmanager
     def _part(self) -> Iterator[sqlite3.Connection]:
         """One change: a transaction of its own, or a part of the one that is open."""
-        self._require_abreast()
-        if not self._grouped:
-            with self._transaction() as connection:
+        self._group.require_abreast()
+        if not self._group.open:
+            with self._transaction as connection:
                 yield connection
             return
-        self._appended = True
+        self._group.appended = True
         try:
             with reported(self._path, "write"):
                 yield self._connection
         except StoreError as error:
-            self._behind = error
+            self._group.behind = error
             raise
-
-    def _require_abreast(self) -> None:
-        if self._behind is not None:
-            message = f"the store lacks the last changes, open it anew: {self._behind.message}"
-            raise StoreError(message, place=self._place)
-
-    @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        """All that is written in the block, or nothing."""
-        connection = self._connection
-        try:
-            changes = connection.total_changes
-            connection.execute("BEGIN IMMEDIATE")
-            yield connection
-            self._commit(connection, changed=connection.total_changes != changes)
-        except BaseException as error:
-            with reported(self._path, "write"):
-                if connection.in_transaction:  # SQLite ends it by itself when the disk is full
-                    connection.execute("ROLLBACK")
-                if isinstance(error, sqlite3.Error):
-                    raise
-            raise
-
-    def _commit(self, connection: sqlite3.Connection, *, changed: bool) -> None:
-        self._commits += changed
-        if self._durability == "power" or not changed or self._commits % TIDY_UP_AFTER:
-            connection.execute("COMMIT")
-        elif not CHECKPOINTS.is_behind(self._path):
-            with CHECKPOINTS.asking(self._path):
-                connection.execute("COMMIT")
-        else:
-            connection.execute("COMMIT")
-            CHECKPOINTS.leave(self._path)
-            with suppress(sqlite3.Error):  # it is committed; what cannot be tidied up now is later
-                connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
 
 @contextmanager

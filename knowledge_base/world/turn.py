@@ -92,7 +92,7 @@ class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its s
         self._changer: int | None = None  # who has the turn
         self._depth = 0  # how often it was taken again
         self._changes = 0  # how many keep the door shut
-        self._as_changing = _Changing(self)
+        self._as_changing, self._as_alone = _Changing(self), _Alone(self)
 
     @property
     def waiting(self) -> tuple[int, int]:
@@ -123,22 +123,13 @@ class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its s
         """
         return self._as_changing
 
-    @contextmanager
-    def alone(self) -> Iterator[None]:
+    def alone(self) -> AbstractContextManager[None]:
         """Nobody else changes anything; who asks may go on.
 
         Raises:
-            ConflictError: this thread is inside a question.
+            ConflictError: on entering, this thread is inside a question.
         """
-        self.take()
-        with self._guard:
-            self._open()
-        self.release()
-        try:
-            yield
-        finally:
-            with self._guard:
-                self._leave()
+        return self._as_alone
 
     @contextmanager
     def ajar(self) -> Iterator[None]:
@@ -173,6 +164,23 @@ class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its s
             if entered if again else self._held():
                 self.release()
             raise
+
+    def take_turn(self) -> None:
+        """Begin to be `alone`: get the turn, and with it nothing else."""
+        with self._guard:
+            free = self._changer is None and not self._held()
+            if free:
+                self._changer = get_ident()
+        if not free:
+            self.take()
+            with self._guard:
+                self._open()
+            self.release()
+
+    def give_turn_back(self) -> None:
+        """End to be `alone`."""
+        with self._guard:
+            self._leave()
 
     def give_back(self) -> None:
         """End to be `changing`."""
@@ -261,3 +269,18 @@ class _Changing:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self._turn.give_back()
+
+
+class _Alone:
+    """Entering it takes the turn without the lock, leaving it gives it back."""
+
+    __slots__ = ("_turn",)
+
+    def __init__(self, turn: Turn) -> None:
+        self._turn = turn
+
+    def __enter__(self) -> None:
+        self._turn.take_turn()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._turn.give_turn_back()
