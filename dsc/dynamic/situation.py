@@ -13,6 +13,7 @@ from knowledge_base.language.effect import Effect
 from knowledge_base.language.evaluation import apply_effect, evaluate_term, holds
 from knowledge_base.language.expression import Expression, Term
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.overlay import Overlay
 
 
 class KnowledgeSituation:
@@ -20,8 +21,16 @@ class KnowledgeSituation:
 
     def __init__(self, knowledge: KnowledgeBase, library: Library) -> None:
         self._version = knowledge.version
-        self._world = knowledge.overlay()
+        self._knowledge = knowledge
         self._library = library
+        self._pending: Overlay | None = None
+
+    @property
+    def _world(self) -> Overlay:
+        """What is known and what was told; most steps ask nothing and tell nothing."""
+        if self._pending is None:
+            self._pending = self._knowledge.overlay()
+        return self._pending
 
     def holds(self, expression: Expression, bindings: Bindings) -> bool:
         """See `Situation`."""

@@ -128,7 +128,9 @@ class MachineState(NamedTuple):
 
     def configuration(self) -> tuple[str, ...]:
         """Paths of all active states, outermost first."""
-        return tuple(_paths(self.root, "")) if self.root else ()
+        if self.root is None or not self.root.children:
+            return () if self.root is None else self.root.configuration.names
+        return tuple(_paths(self.root, ""))
 
     def has_activation(self, serial: int) -> bool:
         """Whether the state that was entered with this serial number is still active."""

@@ -30,11 +30,12 @@ class LoopClock:
     """
 
     def __init__(self, at: float = 0.0) -> None:
-        self._start = asyncio.get_running_loop().time() - at
+        self._time = asyncio.get_running_loop().time
+        self._start = self._time() - at
 
     def now(self) -> float:
         """Seconds of run time."""
-        return asyncio.get_running_loop().time() - self._start
+        return self._time() - self._start
 
     async def sleep(self, seconds: float) -> None:
         """Let `seconds` of run time pass."""

@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output
+from dsc.json_text import text_of
 from dsc.sequencer.changed import require_unchanged
 from dsc.sequencer.messages import LateMessage, Message
 from dsc.sequencer.reactor import Reactor
-from dsc.sequencer.run_forms import Kept, Shortener, message_form, text_of
+from dsc.sequencer.run_forms import Kept, Shortener, message_form
 from dsc.sequencer.run_present import Present, read
-from dsc.sequencer.run_tables import FORMAT, TABLES, archive, require_format, serials_before, unfinished
+from dsc.sequencer.run_tables import archive, serials_before, unfinished
+from dsc.sequencer.run_writing import Writing
 from dsc.sequencer.telling import Told
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
 
-_STEP = "INSERT INTO steps VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
 _BEGIN = "INSERT INTO runs (plot, arguments, version, header, plots, domain) VALUES (?, ?, ?, ?, ?, ?)"
 _MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE place = (SELECT max(place) FROM steps)"
 _MORE_CHANGE = "UPDATE steps SET change = change || ? WHERE place = (SELECT max(place) FROM steps)"
 WHOLE_EVERY = 256
 """After so many macrosteps one writes all that a restart needs: a restart reads at most as many."""
 
-Boundary = Literal["before commit", "after commit"]
-"""Where a process that dies makes a difference: either nothing of the macrostep was, or nothing has left yet."""
-
 
 class RunStore:
-    """Keeps one run of one sequencer; methods that write are called inside `writing`.
+    """Keeps one run of one sequencer; methods that write are called inside `with store.writing`.
 
     Args:
         knowledge: the knowledge base of the run, opened at `path`.
@@ -42,9 +39,10 @@ class RunStore:
         domain: what the plots rely on that is no plot, as text by what it is called ("planning action 'go'").
 
     Attributes:
-        begun: whether a run is kept here.
+        writing: one transaction, `with store.writing`: what is committed to the knowledge inside, and what is written
+            with the methods below.
+        hear: takes a record of the trace, to be kept with the next macrostep.
         last_late: the highest number of a `LateMessage` that is still to come.
-        lost: whether something could not be kept: what is in memory is ahead of the file.
 
     Raises:
         StoreError: the file cannot be written.
@@ -58,53 +56,27 @@ class RunStore:
         domain: Mapping[str, str] | None = None,
     ) -> None:
         self.path = path
-        self.begun = self.lost = False
+        self.writing = Writing(knowledge, path)
         self.last_late = 0
         self._knowledge = knowledge
         self._header = header or {}
         self._domain = domain or {}
-        self._run = self._number = self._before = 0
-        self._records: list[str] = []
+        self._run = self._number = 0
+        self._records: list[Record] = []
+        self.hear: Callable[[Record], None] = self._records.append
         self._memory: dict[str, str] = {}
-        self._listeners: list[Callable[[Boundary], None]] = []
         self._short = Shortener(self._put_form)
         self._present = Present(self._short)
-        with knowledge.together() as connection:
-            self._connection = connection
-            require_format(connection, path)
-            for statement in TABLES:
-                connection.execute(statement)
-            (epoch,) = connection.execute("SELECT max(epoch) FROM fence").fetchone()
-            connection.execute("DELETE FROM fence")
-            self._epoch = (epoch or 0) + 1
-            connection.execute("INSERT INTO fence VALUES (?, ?)", (self._epoch, FORMAT))
 
-    def hear(self, record: Record) -> None:
-        """A record of the trace, to be kept with the next macrostep."""
-        self._records.append(f"{record.to_line()}\n")
+    @property
+    def begun(self) -> bool:
+        """Whether a run is kept here."""
+        return self.writing.begun
 
-    def listen(self, listener: Callable[[Boundary], None]) -> None:
-        """Tell `listener` from now on when something is about to be committed, and when it has been."""
-        self._listeners.append(listener)
-
-    @contextmanager
-    def writing(self) -> Iterator[None]:
-        """One transaction: what is committed to the knowledge inside, and what is written with the methods below.
-
-        Raises:
-            StoreError: it could not be written, or another sequencer has taken the run over.
-        """
-        try:
-            with self._knowledge.together() as self._connection:
-                self._require_right()
-                self._before = self._knowledge.version
-                yield
-                self._tell("before commit")
-        except BaseException:
-            self.lost = True
-            raise
-        self.begun = True
-        self._tell("after commit")
+    @property
+    def lost(self) -> bool:
+        """Whether something could not be kept: what is in memory is ahead of the file."""
+        return self.writing.lost
 
     def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> int:
         """Make a new run; the knowledge is what is known at its start.
@@ -115,24 +87,26 @@ class RunStore:
         Raises:
             StoreError: another run is unfinished.
         """
-        (open_runs,) = self._connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
+        self.writing.require_right()
+        (open_runs,) = self.writing.connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
         if open_runs:
             raise StoreError("the store has an unfinished run, which can be resumed", place=Place(str(self.path)))
-        self._connection.execute("DELETE FROM memory")
+        self.writing.connection.execute("DELETE FROM memory")
         self._number, self._present = 0, Present(self._short)
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
         row = (
             plot, text_of(self._short(arguments)), self._knowledge.version, text_of(self._header), text_of(plots),
             text_of(self._domain),
         )  # fmt: skip
-        self._run = self._connection.execute(_BEGIN, row).lastrowid or 0
-        return serials_before(self._connection, self._run)
+        self._run = self.writing.connection.execute(_BEGIN, row).lastrowid or 0
+        return serials_before(self.writing.connection, self._run)
 
     def late(self, late: LateMessage, due: float) -> None:
         """Something was handed in that comes later, at second `due` of run time."""
         self._present.put(late, self._number, due)
         if self._number:  # else it goes with the first macrostep
-            self._connection.execute(_MORE_CHANGE, (self._present.change(),))
+            self.writing.require_right()
+            self.writing.connection.execute(_MORE_CHANGE, (self._present.change(),))
 
     def step(
         self,
@@ -160,24 +134,25 @@ class RunStore:
         self._present.asked(output, self._number, now, reactor)
         self._present.reached(reactor)
         change = self._present.change(whole=self._number % WHOLE_EVERY == 1)
-        self._connection.execute(_STEP, (
-            self._run, self._number, now, self._before, version, state.serials, text_of(form),
+        self.writing.step(
+            self._run, self._number, now, self.writing.before, version, state.serials, text_of(form),
             _paths_text(state.configuration()), change, self._new_records(),
-        ))  # fmt: skip
-        self._before = version  # the next macrostep may be part of the same transaction
+        )  # fmt: skip
+        self.writing.before = version  # the next macrostep may be part of the same transaction
 
     def memory(self, component: str, memory: Any) -> None:
         """What a component has to remember; it is written if it is not what it was."""
         text = text_of(memory)
         if self._memory.get(component) != text:
-            self._connection.execute("INSERT OR REPLACE INTO memory VALUES (?, ?)", (component, text))
+            self.writing.connection.execute("INSERT OR REPLACE INTO memory VALUES (?, ?)", (component, text))
             self._memory[component] = text
 
     def end(self, *, finished: bool, problem: str | None) -> None:
         """The run is over."""
+        self.writing.require_right()
         ended = text_of({"finished": finished, "problem": problem})
-        self._connection.execute(_MORE_RECORDS, (self._new_records(),))
-        self._connection.execute("UPDATE runs SET ended = ? WHERE run = ?", (ended, self._run))
+        self.writing.connection.execute(_MORE_RECORDS, (self._new_records(),))
+        self.writing.connection.execute("UPDATE runs SET ended = ? WHERE run = ?", (ended, self._run))
 
     def take_up(self, library: Library) -> Kept:
         """The unfinished run as it is now, to be gone on with; to be called outside `writing`.
@@ -190,30 +165,21 @@ class RunStore:
             run = unfinished(runs)
             require_unchanged(runs, run, library, self._domain)
             kept = read(runs, run, library)
-        self.begun = True
+        self.writing.begun = True
         self._run, self._number = run.number, kept.number
         self._present.restored(kept)
         late = [one.what.number for one in kept.pending if isinstance(one.what, LateMessage)]
         self.last_late = max(late, default=0)
         return kept
 
-    def _tell(self, boundary: Boundary) -> None:
-        for listener in self._listeners:
-            listener(boundary)
-
     def _new_records(self) -> str:
         """What was heard since the last time, one record a line."""
-        text = "".join(self._records)
+        lines = [record.to_line() for record in self._records]
         self._records.clear()
-        return text
+        return "\n".join(lines) + "\n" if lines else ""
 
     def _put_form(self, digest: str, text: str) -> None:
-        self._connection.execute("INSERT OR IGNORE INTO forms VALUES (?, ?)", (digest, text))
-
-    def _require_right(self) -> None:
-        (epoch,) = self._connection.execute("SELECT epoch FROM fence").fetchone()
-        if epoch != self._epoch:
-            raise StoreError("another sequencer has taken this run over", place=Place(str(self.path)))
+        self.writing.connection.execute("INSERT OR IGNORE INTO forms VALUES (?, ?)", (digest, text))
 
 
 @lru_cache(maxsize=256)

@@ -248,7 +248,7 @@ class Sequencer:
 
     def _keep_end(self) -> None:
         if self.store is not None and self.store.begun and not self.store.lost:
-            with self.store.writing():
+            with self.store.writing:
                 self.store.end(finished=self.machine.state.finished, problem=self._reactor.problem)
 
     async def _take_up(self, kept: Kept) -> None:
@@ -266,7 +266,7 @@ class Sequencer:
             reactor.tracer.world(self.knowledge)
             self._carry_out(reactor.start(plot, arguments))
             return
-        with store.writing():
+        with store.writing:
             serials = store.begin(plot, arguments, self.library)
             reactor.tracer.world(self.knowledge)
             for late, due in self._coming:
@@ -280,7 +280,7 @@ class Sequencer:
         if self.store is None:
             output = self._reactor.react(message)
         else:
-            with self.store.writing():
+            with self.store.writing:
                 output = self._react_and_keep(message)
                 for _ in range(together.MOST - 1):
                     if self._before_events or not together.may_wait(message, output, self._reactor, self._inbox):
@@ -303,7 +303,7 @@ class Sequencer:
         elif self.store.lost or not self.store.begun or self.machine.state.root is None:
             return
         else:
-            with self.store.writing():
+            with self.store.writing:
                 output = self._reactor.leave()
                 self._keep_step(None, output)
         self._carry_out(output)
@@ -332,7 +332,7 @@ class Sequencer:
         self._last_late += 1
         late, due = LateMessage(message, self._last_late), self.clock.now() + after
         if self.store is not None and self.store.begun:
-            with self.store.writing():
+            with self.store.writing:
                 self.store.late(late, due)
         self._coming.wait_for(late, due)
 

@@ -69,13 +69,14 @@ class StepTracer:
 
     def step(self, step: Step) -> int | None:
         """A macrostep in which something happened: new plots before it, the rules that answered after it."""
-        if not step.moved:
+        if not step.microsteps:
             return None
+        said: dict[str, Any] = {}
         if self._trace.heard:  # else nobody wants to know what plots look like, or what happened, which takes a while
             self._plots(step)
-            said = {"microsteps": list(map(_micro, step.microsteps)), **self._changed_variables(step)}
-        else:
-            said = {}
+            said["microsteps"] = [_micro(micro) for micro in step.microsteps]
+            if variables := self._changed_variables(step):
+                said["variables"] = variables
         seq = self._trace.record("step", **said)
         self._trace.cause = seq
         for micro in step.microsteps:
@@ -136,13 +137,13 @@ class StepTracer:
 
     def _changed_variables(self, step: Step) -> dict[str, Any]:
         """Parameters and variables that are new or have another value than before, by path of the plot's holder."""
-        before, self._frames = self._frames, dict(_frames(step.state.root, ""))
+        before, self._frames = self._frames, _frames(step.state.root)
         said = {}
         for path, frame in self._frames.items():
             known = before.get(path)
             if (known is None or known.variables is not frame.variables) and (news := _news(known, frame)):
                 said[path] = news
-        return {"variables": said} if said else {}
+        return said
 
     def _plots(self, step: Step) -> None:
         for micro in step.microsteps:
@@ -154,27 +155,29 @@ class StepTracer:
 
 
 def _micro(micro: Microstep) -> dict[str, Any]:
-    return {
-        "event": micro.event.name if micro.event else None,
-        "taken": [{"from": taken.source, "on": taken.trigger, "to": taken.target} for taken in micro.taken],
-        "exited": list(micro.exited),
-        "entered": list(micro.entered),
-        **_bound(micro),
+    event, taken, exited, entered, bound = micro
+    said: dict[str, Any] = {
+        "event": None if event is None else event.name,
+        "taken": [{"from": one.source, "on": one.trigger, "to": one.target} for one in taken],
+        "exited": list(exited),
+        "entered": list(entered),
     }
+    if bound:  # the texts of the plots are records of their own
+        said["bound"] = [{"state": one.state, "plot": one.plot.name, "hash": one.plot.digest} for one in bound]
+    return said
 
 
-def _bound(micro: Microstep) -> dict[str, Any]:
-    """Which plots became the content of which states; the texts of the plots are records of their own."""
-    bound = [{"state": b.state, "plot": b.plot.name, "hash": b.plot.digest} for b in micro.bound]
-    return {"bound": bound} if bound else {}
+def _frames(root: FrameState | None) -> dict[str, FrameState]:
+    """The plots that run, by the path of the state that holds each."""
+    if root is None or not root.children:
+        return {} if root is None else {"": root}
+    return dict(_inside(root, ""))
 
 
-def _frames(frame: FrameState | None, path: str) -> Iterator[tuple[str, FrameState]]:
-    """The plots that run, each with the path of the state that holds it."""
-    if frame is not None:
-        yield path, frame
-        for name, child in frame.children.items():
-            yield from _frames(child, f"{path}/{name}" if path else name)
+def _inside(frame: FrameState, path: str) -> Iterator[tuple[str, FrameState]]:
+    yield path, frame
+    for name, child in frame.children.items():
+        yield from _inside(child, f"{path}/{name}" if path else name)
 
 
 def _news(before: FrameState | None, frame: FrameState) -> dict[str, Any]:

@@ -17,8 +17,8 @@ from typing import Any, Generic, TypeVar
 from dsc.calls import Outcome, SkillCall
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
-from dsc.sequencer.run_store import Boundary
 from dsc.sequencer.run_tables import archive
+from dsc.sequencer.run_writing import Boundary
 from dsc.sequencer.sequencer import Sequencer
 from knowledge_base.errors import StoreError
 
@@ -124,7 +124,7 @@ class Crashes(Generic[_Result]):
             if happens == OVERTAKEN:
                 self._overtake()
 
-        store.listen(boundary)
+        store.writing.listen(boundary)
 
     def inject(self, component: _Component) -> _Component:
         """Let crashes happen when this component has done something, before its answer is kept; returns it."""

@@ -328,7 +328,7 @@ def test_a_restart_reads_no_more_macrosteps_than_since_all_was_written(tmp_path,
 def test_a_changed_domain_is_refused_with_the_difference(tmp_path):
     with KnowledgeBase.open(SCHEMA, tmp_path / "run.kb") as kb:
         store = RunStore(kb, tmp_path / "run.kb", domain={action("go"): "(go)", action("come"): "(come)", action("stay"): "(stay)"})
-        with store.writing():
+        with store.writing:
             store.begin("p", {}, Library())
         now = {action("go"): "(went)", action("come"): "(come)", action("eat"): "(eat)"}
         with pytest.raises(ChangedError) as found:
