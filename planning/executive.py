@@ -18,6 +18,7 @@ from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
+from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.skills import SkillSignature, signatures
@@ -142,9 +143,28 @@ class Executive:
             StoreError: the store cannot be written, or has an unfinished run.
         """
         runner = run_simulated if simulated else run_real
-        how = {"simulated": simulated, "open_ended": open_ended}
-        store = self._run_store({**(header or {}), **how})
-        return runner(self.execute(plot, arguments or {}, prepare, open_ended=open_ended, store=store))
+        return runner(self.execute(plot, arguments, open_ended=open_ended, prepare=prepare, header=header))
+
+    async def execute(
+        self,
+        plot: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        open_ended: bool = False,
+        prepare: Prepare | None = None,
+        header: Mapping[str, Any] | None = None,
+    ) -> RunEnd:
+        """As `run`, inside an asyncio loop that is there already, e.g. with components that are elsewhere.
+
+        Time is that of the loop: real, or simulated by `run_simulated`.
+        """
+        clock = LoopClock()
+        store = self._run_store({**(header or {}), "simulated": clock.simulated, "open_ended": open_ended})
+        sequencer = self._sequencer(clock, 0, store, open_ended=open_ended)
+        if prepare is not None:
+            prepare(sequencer)
+        with nullcontext() if clock.simulated else settled():
+            return await sequencer.run(plot, arguments)
 
     def resume(self, *, prepare: Prepare | None = None) -> RunEnd:
         """Go on with the store's unfinished run where it was broken off, and run it to its end.
@@ -156,24 +176,22 @@ class Executive:
             StoreError: there is no store, no unfinished run in it, or it cannot be read or written.
             ChangedError: plots or domain are not those with which it was begun; the error says what is different.
         """
-        store = self._run_store({})
-        if store is None:
-            raise StoreError("only a run with a store can be resumed")
-        kept = store.take_up(self.library)
-        for record in kept.records:
-            for listener in self._listeners:
-                listener(record)
+        store, kept = self._taken_up()
+        going_on = self._go_on(store, kept, prepare)
+        return run_simulated(going_on, kept.time) if kept.run.header["simulated"] else run_real(going_on)
 
-        async def go_on() -> RunEnd:
-            open_ended = bool(kept.run.header["open_ended"])
-            clock = LoopClock(kept.time)
-            sequencer = self._sequencer(clock, kept.last_record, store, open_ended=open_ended)
-            if prepare is not None:
-                prepare(sequencer)
-            with nullcontext() if clock.simulated else settled():
-                return await sequencer.resume(kept)
+    async def go_on(self, *, prepare: Prepare | None = None) -> RunEnd:
+        """As `resume`, inside an asyncio loop that is there already, of the same kind of time as when it was begun.
 
-        return run_simulated(go_on(), kept.time) if kept.run.header["simulated"] else run_real(go_on())
+        Raises:
+            InputError: the run was begun in real time and this loop's is simulated, or the other way round.
+        """
+        store, kept = self._taken_up()
+        simulated = LoopClock().simulated
+        if simulated != kept.run.header["simulated"]:
+            was, now = ("real", "simulated") if simulated else ("simulated", "real")
+            raise InputError(f"the run was begun in {was} time and cannot go on in {now} time")
+        return await self._go_on(store, kept, prepare)
 
     def achieve(
         self,
@@ -207,22 +225,23 @@ class Executive:
         arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
         return self.run(ACHIEVE, arguments, simulated=simulated, open_ended=open_ended, prepare=prepare)
 
-    async def execute(
-        self,
-        plot: str,
-        arguments: Mapping[str, Any],
-        prepare: Prepare | None = None,
-        *,
-        open_ended: bool = False,
-        store: RunStore | None = None,
-    ) -> RunEnd:
-        """As `run`, inside a loop that is there already; `store` keeps the run."""
-        clock = LoopClock()
-        sequencer = self._sequencer(clock, 0, store, open_ended=open_ended)
+    def _taken_up(self) -> tuple[RunStore, Kept]:
+        store = self._run_store({})
+        if store is None:
+            raise StoreError("only a run with a store can be resumed")
+        return store, store.take_up(self.library)
+
+    async def _go_on(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> RunEnd:
+        for record in kept.records:
+            for listener in self._listeners:
+                listener(record)
+        clock = LoopClock(kept.time)
+        open_ended = bool(kept.run.header["open_ended"])
+        sequencer = self._sequencer(clock, kept.last_record, store, open_ended=open_ended)
         if prepare is not None:
             prepare(sequencer)
         with nullcontext() if clock.simulated else settled():
-            return await sequencer.run(plot, arguments)
+            return await sequencer.resume(kept)
 
     def _sequencer(self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool) -> Sequencer:
         trace = Trace(clock.now, last)

@@ -10,6 +10,7 @@ import pytest
 
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from dsc.errors import ChangedError
+from dsc.sequencer.clock import run_real, run_simulated
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_tables import archive
 from knowledge_base import Delta, InputError, KnowledgeBase, fact
@@ -155,6 +156,31 @@ def test_only_what_was_begun_in_a_store_can_be_resumed(planner, tmp_path):
         executive(planner).resume()
     with executive(planner, tmp_path / "run.kb") as robot, pytest.raises(StoreError, match="no unfinished run"):
         robot.resume()
+
+
+def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, planner, tmp_path):
+    path, _, copies = whole
+
+    async def begun(robot, copy):
+        robot.knowledge.apply(Delta(nodes={"a": "lamp"}, added=(fact("works", "a"),)), "me")
+        seen = []
+
+        def prepare(sequencer):
+            sequencer.listen(lambda _: seen.append(copied(copy.parent, tmp_path / f"inside{len(seen)}")))
+
+        arguments = {"goal": "(on a)", "holder": "", "replans": 3, "seconds": 5}
+        assert (await robot.execute("achieve", arguments, prepare=prepare)).reached
+        return seen
+
+    (tmp_path / "in").mkdir()
+    with executive(planner, tmp_path / "in" / "run.kb") as robot:
+        seen = run_simulated(begun(robot, tmp_path / "in" / "run.kb"))
+        assert told(tmp_path / "in" / "run.kb")[1] == {"finished": True, "problem": None}
+    for copy in (seen[-2], copies[-2]):
+        with executive(planner, copy) as robot:
+            with pytest.raises(InputError, match="begun in simulated time and cannot go on in real time"):
+                run_real(robot.go_on())
+            assert run_simulated(robot.go_on()).reached
 
 
 def test_a_store_brings_its_own_knowledge(planner, tmp_path):
