@@ -20,7 +20,7 @@ from dsc.engine.steps import Start
 from dsc.sequencer.run_standing import Row, Standing, standing
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
-from knowledge_base.journal.file import reading
+from knowledge_base.journal.file import is_there, reading
 
 TABLES = (
     """CREATE TABLE IF NOT EXISTS runs (run INTEGER PRIMARY KEY, plot TEXT NOT NULL, arguments TEXT NOT NULL,
@@ -189,7 +189,7 @@ def records_of(
 
 def has_run(path: Path) -> bool:
     """Whether a run was begun in that file; raises `StoreError` if it is there and no store."""
-    if not path.exists():
+    if not is_there(path):
         return False
     with reading(path) as connection:
         if not _has_tables(connection):

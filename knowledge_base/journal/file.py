@@ -1,9 +1,4 @@
-"""The SQLite file of a store: its tables, how it is opened, and what its errors mean to people.
-
-`changes` is the journal, one row a version. `snapshots` are whole worlds, the oldest of which is where the
-journal begins. `keys` leads from idempotency keys to changes; its own `delta` is null while the change is in
-the journal. `schemas` are the declarations used, each since a version. JSON as in `exchange.forms`.
-"""
+"""The SQLite file of a store: how it is opened, and what its errors mean to people."""
 
 from __future__ import annotations
 
@@ -30,16 +25,6 @@ _PAGES_IN_LOG = {"process": 0, "power": 1000}
 _LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its head; commits are not cut
 _SYNCHRONOUS = {"process": "NORMAL", "power": "FULL"}  # in WAL mode only FULL waits for the disk in each commit
 
-_TABLES = (
-    "CREATE TABLE schemas (version INTEGER NOT NULL, hash TEXT NOT NULL, declarations TEXT NOT NULL)",
-    "CREATE TABLE changes (version INTEGER PRIMARY KEY, time REAL NOT NULL, author TEXT NOT NULL, delta TEXT NOT NULL)",
-    "CREATE TABLE snapshots (version INTEGER PRIMARY KEY, time REAL NOT NULL, world TEXT NOT NULL)",
-    """CREATE TABLE keys (key TEXT PRIMARY KEY, version INTEGER NOT NULL, time REAL NOT NULL, author TEXT NOT NULL,
-        delta TEXT) WITHOUT ROWID""",
-    f"PRAGMA application_id = {APPLICATION_ID}",
-    f"PRAGMA user_version = {FORMAT}",
-)
-
 
 @contextmanager
 def reported(path: Path, doing: str) -> Iterator[None]:
@@ -58,17 +43,22 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
         StoreError: the file is not there, not a store, or cannot be read.
     """
     require_place(path)
-    if not path.exists():
+    if not is_there(path):
         beside = files_beside(path)
         raise StoreError(f"there is no store '{path.name}'", place=Place(str(path)), found=path.name, valid=beside)
     with reported(path, "read"):
-        connection = _connect(path, "ro")
+        connection = connect(path, "ro")
         try:
             connection.execute("BEGIN")
             require_store(connection, path)
             yield connection
         finally:
             connection.close()
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is a file that has any content."""
+    return path.exists() and path.stat().st_size > 0
 
 
 def require_place(path: Path) -> None:
@@ -80,18 +70,15 @@ def require_place(path: Path) -> None:
 
 
 def writing(path: Path, durability: Durability) -> sqlite3.Connection:
-    """A connection to write with; the file is made when it is not there, still without tables.
+    """A connection to write with.
 
     Raises:
-        StoreError: it cannot be opened or made, or is something else than a store.
+        StoreError: it cannot be opened, or is something else than a store.
     """
     with reported(path, "open"):
-        connection = _connect(path, "rwc")
+        connection = connect(path, "rw")
         try:
-            if is_new(connection):
-                connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
-            else:
-                require_store(connection, path)
+            require_store(connection, path)
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute(f"PRAGMA synchronous = {_SYNCHRONOUS[durability]}")
             connection.execute(f"PRAGMA wal_autocheckpoint = {_PAGES_IN_LOG[durability]}")
@@ -103,7 +90,7 @@ def writing(path: Path, durability: Durability) -> sqlite3.Connection:
 
 def to_tidy_up(path: Path) -> sqlite3.Connection:
     """A connection besides that of the one who writes; raises `sqlite3.Error` if it cannot be had."""
-    connection = _connect(path, "rw")
+    connection = connect(path, "rw")
     connection.execute("PRAGMA synchronous = NORMAL")  # or the log would be gone before the file is on the disk
     return connection
 
@@ -127,19 +114,6 @@ def lay_out_log(path: Path) -> None:
         raise StoreError(f"cannot lay out the store's log: {error.strerror}", place=Place(str(path))) from error
 
 
-def is_new(connection: sqlite3.Connection) -> bool:
-    """Whether nothing was ever written, or the first writer died before it had begun."""
-    return not _number(connection, "SELECT count(*) FROM sqlite_master") and not _number(
-        connection, "PRAGMA application_id"
-    )
-
-
-def create_tables(connection: sqlite3.Connection) -> None:
-    """Make a new file a store; to be done inside a transaction."""
-    for statement in _TABLES:
-        connection.execute(statement)
-
-
 def require_store(connection: sqlite3.Connection, path: Path) -> None:
     """Raise `StoreError` unless the file is a store of a format known here."""
     if _number(connection, "PRAGMA application_id") != APPLICATION_ID:
@@ -153,6 +127,7 @@ def _number(connection: sqlite3.Connection, statement: str) -> int:
     return int(connection.execute(statement).fetchone()[0])
 
 
-def _connect(path: Path, mode: str) -> sqlite3.Connection:
+def connect(path: Path, mode: str) -> sqlite3.Connection:
+    """A connection without transactions of its own; `mode` as SQLite has it in the names of files."""
     uri = f"{path.absolute().as_uri()}?mode={mode}"
     return sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False, timeout=PATIENCE_S)

@@ -14,8 +14,7 @@ from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.checkpoints import CHECKPOINTS
 from knowledge_base.journal.file import (
     Durability,
-    create_tables,
-    is_new,
+    is_there,
     lay_out_log,
     reported,
     require_place,
@@ -23,6 +22,7 @@ from knowledge_base.journal.file import (
 )
 from knowledge_base.journal.history import Version, Writer
 from knowledge_base.journal.lock import WriterLock
+from knowledge_base.journal.making import making
 from knowledge_base.journal.transaction import Group, Transaction
 from knowledge_base.world.compatibility import missing_constants, require_extension, require_functional
 from knowledge_base.world.schema import Schema
@@ -66,13 +66,15 @@ class Journal(Archive):
     def __init__(self, path: Path, schema: Schema | None, durability: Durability, clock: Callable[[], float]) -> None:
         self._path = path
         require_place(path)
-        if schema is None and not path.exists():
+        if schema is None and not is_there(path):
             raise _no_schema(path)
         self._place = Place(str(path))
         self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
         self._durability = durability
         self._writers = WriterLock(path)
         try:
+            if not is_there(path):
+                _make(path, schema, durability, clock())
             self._connection = writing(path, durability)
             self._transaction = Transaction(self._connection, path, durability)
             self._group = Group(self._transaction, self._place)
@@ -155,24 +157,11 @@ class Journal(Archive):
 
     def _prepare(self, schema: Schema | None, clock: Callable[[], float]) -> None:
         with reported(self._path, "read"):
-            if is_new(self._connection):
-                self._create(schema, clock())
-            else:
-                written = self.written_schema(self._connection)
-                self._schema = schema or written
-                if schema_hash(self._schema) != schema_hash(written):
-                    self._extend(written, clock)
+            written = self.written_schema(self._connection)
+            self._schema = schema or written
+            if schema_hash(self._schema) != schema_hash(written):
+                self._extend(written, clock)
             self._measure()
-
-    def _create(self, schema: Schema | None, time: float) -> None:
-        if schema is None:
-            raise _no_schema(self._path)
-        self._schema = schema
-        with self._transaction as connection:
-            create_tables(connection)
-            self._put_schema(0)
-            world = compact(world_form(WorldState(schema)))
-            connection.execute("INSERT INTO snapshots VALUES (0, ?, ?)", (time, world))
 
     def _extend(self, written: Schema, clock: Callable[[], float]) -> None:
         """Go on with more declarations; new constants come into the world by a change of their own."""
@@ -181,14 +170,10 @@ class Journal(Archive):
         require_functional(last.state, self._place)
         constants = missing_constants(last.state, self._place)
         with self._transaction as connection:
-            self._put_schema(last.version + bool(constants))
+            _put_schema(connection, self._schema, last.version + bool(constants))
             if constants:
                 row = (last.version + 1, max(last.time, clock()), "schema", compact(delta_form(constants)))
                 connection.execute(_INSERT_CHANGE, row)
-
-    def _put_schema(self, version: int) -> None:
-        row = (version, schema_hash(self._schema), compact(schema_form(self._schema)))
-        self._connection.execute("INSERT INTO schemas VALUES (?, ?, ?)", row)
 
     def _put_snapshot(self, world: str, version: int) -> None:
         """Keep the world of a version that is in the journal, or in a snapshot already."""
@@ -250,6 +235,20 @@ def _guarded(connection: sqlite3.Connection) -> Iterator[None]:
 
 def _no_schema(path: Path) -> InputError:
     return InputError(f"there is no store '{path}' yet; a new one needs a schema")
+
+
+def _make(path: Path, schema: Schema | None, durability: Durability, time: float) -> None:
+    if schema is None:  # somebody has just taken it away
+        raise _no_schema(path)
+    with making(path, durability) as connection:
+        _put_schema(connection, schema, 0)
+        world = compact(world_form(WorldState(schema)))
+        connection.execute("INSERT INTO snapshots VALUES (0, ?, ?)", (time, world))
+
+
+def _put_schema(connection: sqlite3.Connection, schema: Schema, version: int) -> None:
+    row = (version, schema_hash(schema), compact(schema_form(schema)))
+    connection.execute("INSERT INTO schemas VALUES (?, ?, ?)", row)
 
 
 def _require_text(*words: str) -> None:
