@@ -20,7 +20,7 @@ from dsc.sequencer.cli import app as runs_app
 from dsc.viewer.cli import NoOpen, Port, view_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import readers
-from planning.cli import doctor_command, plan_command
+from planning.cli import bundles_command, doctor_command, plan_command
 
 if TYPE_CHECKING:
     from domains.clean_up_table.deployment import CleanUpTable
@@ -60,6 +60,7 @@ app.add_typer(kb_app, name="kb")
 app.add_typer(runs_app, name="runs")
 app.command("plan")(plan_command)
 app.command("doctor")(doctor_command)
+app.command("bundles")(bundles_command)
 app.command("view")(view_command)
 
 WORLDS = ("clean-up-table",)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from planning.bundles import Bundle as Bundle
     from planning.domain import PlanningAction as PlanningAction
     from planning.domain import PlanningDomain as PlanningDomain
     from planning.engines.cache import CachingPlanner as CachingPlanner
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
     {
+        "Bundle": "bundles",
         "CachingPlanner": "engines.cache",
         "Executive": "executive",
         "Plan": "plan",

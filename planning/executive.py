@@ -30,6 +30,7 @@ from knowledge_base.journal.file import Durability
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.compatibility import require_extension
+from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of
 from planning.collecting import settled
 from planning.domain import PlanningDomain
 from planning.engines.cache import CachingPlanner
@@ -112,6 +113,29 @@ class Executive:
         else:  # at last, since what is opened has to be closed
             kept = None if store is None else durability
             self.knowledge = KnowledgeBase.open(self.domain.schema, self._store, kept)
+
+    @classmethod
+    def of_bundles(
+        cls,
+        bundles: Iterable[Bundle | str],
+        plots: Iterable[ActionPlot] = (),
+        components: Iterable[Component] = (),
+        **how: Any,
+    ) -> Self:
+        """A robot program put together of bundles, with all that these need, and plots and components of its own.
+
+        Args:
+            bundles: each a `Bundle`, or the name of an installed one.
+            plots: what the bundles lack.
+            components: what the bundles lack.
+            how: the other arguments of an `Executive`, by name (`knowledge`, `planner`, `store`, ...).
+
+        Raises:
+            UnknownNameError: a bundle is not there.
+            InputError: two bundles contradict each other; and as for an `Executive`.
+        """
+        found = gathered(bundles)
+        return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
 
     def listen(self, listener: Listener) -> None:
         """Tell `listener` every record of every run from now on."""

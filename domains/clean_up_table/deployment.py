@@ -30,6 +30,7 @@ from dsc.text.plots import load_library
 from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.journal.file import Durability
+from planning.bundles import Bundle
 from planning.domain import PlanningDomain
 from planning.engines.planner import Planner
 from planning.executive import Executive, achieve_plot
@@ -251,6 +252,11 @@ def library() -> Library:
 def domain() -> PlanningDomain:
     """The planning domain; read once, too."""
     return PlanningDomain.from_pddl(HOME / "domain.pddl")
+
+
+def bundle() -> Bundle:
+    """The task for others to build upon: plots and planning domain, for a base, an arm, a camera and a voice."""
+    return Bundle("clean-up-table", plots(), domain=domain(), about="clear a table: cups to the sink, cans to the bin")
 
 
 class _SceneWriter:

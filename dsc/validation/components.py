@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 
 from dsc.components.parameters import Parameter, known
 from dsc.errors import Finding
-from dsc.model.actions import Configure, ExternalAction, Internal, Send, Switch
+from dsc.model.actions import Configure, ExternalAction, Internal, Send, Switch, Trigger
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.ranges import Who, refuse_change
 from dsc.model.states import State
@@ -27,6 +27,16 @@ def check_components(plot: ActionPlot, components: Components) -> Iterator[Findi
             yield Finding(error, "known component")
         elif isinstance(action, Configure) and isinstance(components, Mapping):
             yield from _setting(plot, action, path, who, components)
+
+
+def addressed_by(plot: ActionPlot) -> frozenset[str]:
+    """Names of the components that a plot itself uses; a plot that uses none is abstract, else primitive (S0.9)."""
+    used = set()
+    for action, _, _ in _actions(plot):
+        name = action.trigger.partition(".")[0] if isinstance(action, Trigger) else _addressed(action)
+        if name is not None:
+            used.add(name)
+    return frozenset(used)
 
 
 def _setting(

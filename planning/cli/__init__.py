@@ -1,9 +1,10 @@
-"""`dsc plan` and `dsc doctor`: ask for a plan on the command line, and see what there is to plan with.
+"""`dsc plan`, `dsc doctor` and `dsc bundles`: ask for a plan, and see what there is to plan and to build with.
 
 The commands import what they run, so that `dsc --help` stays light.
 """
 
 from __future__ import annotations
 
+from planning.cli.bundles import bundles_command as bundles_command
 from planning.cli.doctor import doctor_command as doctor_command
 from planning.cli.plan import plan_command as plan_command

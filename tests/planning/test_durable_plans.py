@@ -159,7 +159,7 @@ def test_only_what_was_begun_in_a_store_can_be_resumed(planner, tmp_path):
 
 
 def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, planner, tmp_path):
-    path, _, copies = whole
+    copies = whole[2]
 
     async def begun(robot, copy):
         robot.knowledge.apply(Delta(nodes={"a": "lamp"}, added=(fact("works", "a"),)), "me")
