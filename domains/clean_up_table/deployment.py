@@ -28,7 +28,7 @@ from dsc.sequencer.run_tables import archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.text.plots import load_library
 from dsc.trace import Listener, Record
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, Place, StoreError, UnknownNameError
 from knowledge_base.journal.file import Durability
 from planning.bundles import Bundle
 from planning.domain import PlanningDomain
@@ -36,6 +36,7 @@ from planning.engines.planner import Planner
 from planning.executive import Executive, achieve_plot
 
 HOME = Path(str(files("domains.clean_up_table")))
+NAME = "clean-up-table"
 MAIN_PLOT = "clean_up_table"
 
 
@@ -110,7 +111,7 @@ class CleanUpTable:
         """What determines a run, for the first line of its trace."""
         plots = "".join(sorted(plot.digest for plot in self.executive.library))
         return {
-            "run": "clean-up-table",
+            "run": NAME,
             "seed": self.world.faults.seed,
             "faults": self.world.faults.chance,
             **({} if self.profile is None else {"profile": self.profile.digest}),
@@ -169,10 +170,14 @@ def resumed(
     """Wire everything to go on with the run in a store; arguments as for `deploy`.
 
     Raises:
-        StoreError: the store or its world is not there, or cannot be read.
+        StoreError: the store or its world is not there, or cannot be read; or the run in it is another program's.
     """
     with archive(store) as runs:
-        said = unfinished(runs).header.get("settings")
+        run = unfinished(runs)
+    if run.header.get("run") != NAME:
+        whose = f"the run of '{run.plot}' in this store is another program's, which goes on with it: Executive.resume()"
+        raise StoreError(whose, place=Place(str(store)))
+    said = run.header.get("settings")
     profile = None if said is None else Profile.model_validate(said)
     deployed = _wired(LastingWorld.open(beside(store)), planner, listener, profile, store, durability)
     deployed.resumes = True
@@ -256,7 +261,7 @@ def domain() -> PlanningDomain:
 
 def bundle() -> Bundle:
     """The task for others to build upon: plots and planning domain, for a base, an arm, a camera and a voice."""
-    return Bundle("clean-up-table", plots(), domain=domain(), about="clear a table: cups to the sink, cans to the bin")
+    return Bundle(NAME, plots(), domain=domain(), about="clear a table: cups to the sink, cans to the bin")
 
 
 class _SceneWriter:

@@ -15,8 +15,11 @@ from kept_lives import SCENARIO, told
 from domains.clean_up_table.deployment import PROFILES, deploy, resumed
 from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.world_file import LastingWorld
+from dsc.dynamic.library import Library
 from dsc.sequencer.replay import replay
+from dsc.sequencer.run_store import RunStore
 from dsc.text.profiles import find_profile
+from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.errors import InputError, StoreError
 
 DSC = Path(sys.executable).with_name("dsc")
@@ -111,6 +114,15 @@ def test_a_store_that_has_a_run_is_not_begun_anew(whole, planner):
 def dsc(*words):
     done = subprocess.run([DSC, *map(str, words)], check=False, capture_output=True, text=True, timeout=120)
     return done.returncode, done.stdout, done.stderr
+
+
+def test_the_run_of_another_program_is_left_to_that(tmp_path):
+    with KnowledgeBase.open(Schema.parse("(define (domain d))"), tmp_path / "run.kb") as kb:
+        store = RunStore(kb, tmp_path / "run.kb", header={"simulated": True})
+        with store.writing:
+            store.begin("patrol", {}, Library())
+    with pytest.raises(StoreError, match="the run of 'patrol' in this store is another program's"):
+        resumed(tmp_path / "run.kb")
 
 
 def test_the_command_keeps_a_run_resumes_it_and_tells_what_happened(whole, tmp_path):
