@@ -337,6 +337,7 @@ class KnowledgeBase(Observable):
         self._history.append(change, key, self._state, along)
         if effective:
             self._take_in(change)
+        self._lock.made()
         return change
 
     def _take_in(self, change: Change) -> None:

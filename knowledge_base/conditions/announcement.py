@@ -25,7 +25,7 @@ class Announcer:
         self._listeners: dict[int, Listener] = {}
         self._next_key = 0
         self._waiting: deque[Callable[[], None]] = deque()
-        self._delivering = False
+        self._deliverer: object | None = None
         self._quiet = False
 
     @contextmanager
@@ -69,20 +69,20 @@ class Announcer:
         """
         if not self._waiting:  # what another thread is about to queue it delivers itself
             return
-        with self._lock:
-            if self._delivering or self._quiet:
-                return
-            self._delivering = True
-        errors: list[Exception] = []
+        me, errors = object(), list[Exception]()
         try:
+            with self._lock:
+                if self._deliverer is not None or self._quiet:
+                    return
+                self._deliverer = me
             while (call := self._take()) is not None:
                 try:
                     call()
                 except Exception as error:  # noqa: BLE001  one listener must not silence the others
                     errors.append(error)
         except BaseException:  # an interrupt must not leave the queue without anyone to empty it
-            with self._lock:
-                self._delivering = False
+            if self._deliverer is me:
+                self._deliverer = None
             raise
         if errors:
             raise ExceptionGroup("listeners to the knowledge base failed", errors)
@@ -91,5 +91,5 @@ class Announcer:
         with self._lock:
             if self._waiting:
                 return self._waiting.popleft()
-            self._delivering = False
+            self._deliverer = None
             return None

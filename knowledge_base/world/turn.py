@@ -2,40 +2,33 @@
 
 Three rules make the order:
 
-- Who waits for the lock stands in line, first come, first served, whether to ask or to change something. Whoever comes
-  and finds the lock free may go first as long as the first in line has been that for less than `PATIENCE_S`; then all
-  join the line at its end. (To hand the lock from thread to thread each time costs more than most questions do.)
-- Of those who change something only one has the *turn*. It may keep that without the lock (`alone`); others who want to
-  change something wait apart meanwhile, and get the turn in order of arrival.
+- Who waits for the lock stands in line (`world.line`), first come, first served, whether to ask or to change something.
+- Who changes something may want to be *alone* with that, without the lock: others who want to change something leave
+  the lock's line then and wait apart, in order of arrival, and go before whoever comes later to change something.
 - Most questions are answered without the lock as long as the *door* is open (`Stamp.version` is not `None`). A change
   shuts it from when it stands in line until it is made, so that those questions take their place there, too. Otherwise
   who asks without pause would hold Python's own lock (GIL), and a change would wait for that, 5 ms each time that it
-  touches a file or gets the lock from another thread.
+  touches a file or gets the lock from another thread. Who asks with the lock, and sees nobody coming to change
+  anything, opens the door again.
 
-An interrupt (`KeyboardInterrupt`) may come at any moment. So the lock *is* Python's own, which whoever asks gives back
-without a line of Python in between. A change gives back what it got when it is interrupted as it begins; only at the
-very moment at which it ends an interrupt may leave the lock taken, and then the world has to be opened anew.
+So a change has nothing to do when it ends but to give back a lock of Python's own. No line of Python is run for that,
+and no interrupt can come before it. (A block that is a generator, like a transaction, can be interrupted as it is
+left; it ends when the interrupt and its traceback are forgotten.)
 
-Re-entrance: a thread that holds the lock may take it again at once, and one that has the turn may take both. A thread
-that holds the lock only to ask cannot change anything; waiting for the turn it would keep out who has it.
+Re-entrance: a thread that holds the lock may take it again at once, and one that changes something or is alone may
+take both. A thread that holds the lock only to ask cannot change anything; waiting to be let it would keep out who is
+alone.
 """
 
 from __future__ import annotations
 
-from _thread import RLock  # the type: `threading.RLock` is a function
-from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from threading import Lock, get_ident
-from time import monotonic
 from types import TracebackType
-from typing import NamedTuple
 
 from knowledge_base.errors import ConflictError
-
-PATIENCE_S = 0.0005
-"""How long the first in line lets others go first: a few changes' time, some times what handing the lock over takes."""
+from knowledge_base.world.line import PATIENCE_S, Line
 
 
 @dataclass(slots=True)
@@ -43,36 +36,15 @@ class Stamp:
     """The version of a world, by which who reads a few facts without a lock knows that they are of one version.
 
     Attributes:
-        version: `None` while a change is being made, or waits to be made.
+        version: `None` while a change is being made, or waits to be made, and after it until somebody asks.
         newest: the version that was made last.
     """
 
     version: int | None = 0
     newest: int = 0
 
-    def open(self) -> None:
-        """Who reads without the lock may go on."""
-        self.version = self.newest
 
-    def shut(self) -> None:
-        """Who reads has to take the lock."""
-        self.version = None
-
-
-class _Place(NamedTuple):
-    """Where a thread waits; its gate is opened when it is first in line."""
-
-    thread: int
-    gate: Lock
-
-
-def _place() -> _Place:
-    gate = Lock()
-    gate.acquire()
-    return _Place(get_ident(), gate)
-
-
-class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its stub says
+class Turn(Line):
     """The lock of a world; used as a context manager by who asks.
 
     Args:
@@ -80,40 +52,29 @@ class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its s
         patience_s: how long the first in line lets others go first, in seconds.
     """
 
-    _held = RLock._is_owned  # type: ignore[attr-defined]  # noqa: SLF001  by this thread; `threading.Condition` asks so, too
-
     def __init__(self, stamp: Stamp, patience_s: float = PATIENCE_S) -> None:
+        super().__init__(patience_s)
         self._stamp = stamp
-        self._patience_s = patience_s
-        self._guard = Lock()  # for what follows; held for a moment only
-        self._line: deque[_Place] = deque()
-        self._due = 0.0  # when the patience of the first in line is over
-        self._changers: deque[_Place] = deque()
-        self._changer: int | None = None  # who has the turn
-        self._depth = 0  # how often it was taken again
-        self._changes = 0  # how many keep the door shut
-        self._as_changing, self._as_alone = _Changing(self), _Alone(self)
+        self._alone = Line(patience_s)
+        self._apart: set[object] = set()  # who waits until somebody is alone no longer, and then for the lock
+        self._first_apart = Line(patience_s)  # had by one of these
+        self._coming: set[object] = set()  # who stands in line to change something
+        self._changing = False  # who has the lock has it to change something
+        self._as_changing = _Passage(self._begin_changing, self.__exit__)
+        self._as_alone = _Passage(self._begin_alone, self._alone.__exit__)
 
     @property
     def waiting(self) -> tuple[int, int]:
-        """How many threads stand in line, and how many wait for the turn to change something."""
-        with self._guard:
-            return len(self._line), len(self._changers)
+        """How many threads stand in line, and how many wait until somebody is alone no longer."""
+        return self.length, self._alone.length + self._first_apart.length
 
-    def __enter__(self) -> bool:  # type: ignore[override]  # as `with` calls it
-        mine = self._held()
-        try:
-            may_go = mine or not self._line or monotonic() < self._due
-            if not (may_go and self.acquire(blocking=False)):
-                place = _place()
-                with self._guard:
-                    self._join(place)
-                self._enter(place)
-        except BaseException:  # interrupted, perhaps with the lock already
-            if self._held() and not mine:
-                self.release()
-            raise
-        return True
+    def __enter__(self) -> bool:
+        again = self.get()
+        if not again:  # no calls from here on: they could be interrupted
+            self._changing = False
+            if not self._coming:
+                self._stamp.version = self._stamp.newest
+        return again
 
     def changing(self) -> AbstractContextManager[None]:
         """Nobody else changes anything or asks.
@@ -131,156 +92,102 @@ class Turn(RLock):  # type: ignore[misc]  # it may be subclassed, whatever its s
         """
         return self._as_alone
 
+    def made(self) -> None:
+        """Who reads without the lock may go on; said by who changes something, when nothing is changed any more."""
+        if not self._coming:
+            self._stamp.version = self._stamp.newest
+
     @contextmanager
     def ajar(self) -> Iterator[None]:
         """Who reads without the lock may go on; used while changing, as long as nothing is changed."""
-        with self._guard:
-            self._open()
+        self.made()
         try:
             yield
         finally:
-            with self._guard:
-                self._shut()
+            self._stamp.version = None
 
-    def take(self) -> None:
-        """Begin to be `changing`: get the turn and the lock, and shut the door."""
-        me = get_ident()
-        if self._changer != me and self._held():
-            raise ConflictError("a question is being answered in this thread; nothing can be changed meanwhile")
-        again, entered = self._changer == me, False
-        with self._guard:
-            self._shut()
+    def _begin_changing(self) -> None:
+        self._get_to_change()
+        # No calls from here on: they could be interrupted.
+        self._stamp.version = None  # for good: now nobody can open it
+        self._changing = True
+
+    def _begin_alone(self) -> None:
+        again = self._get_to_change()
+        if not (again or self._coming):
+            self._stamp.version = self._stamp.newest
         try:
-            entered = self.__enter__()
-            if again:
-                self._depth += 1
-            else:
-                self._get_turn(me)
-        except BaseException:
-            with self._guard:
-                if self._changer == me and not again:
-                    self._leave()
-                self._open()
-            if entered if again else self._held():
+            try:
+                self._alone.acquire()  # it is free, or will be at once
+            finally:
                 self.release()
-            raise
-
-    def take_turn(self) -> None:
-        """Begin to be `alone`: get the turn, and with it nothing else."""
-        with self._guard:
-            free = self._changer is None and not self._held()
-            if free:
-                self._changer = get_ident()
-        if not free:
-            self.take()
-            with self._guard:
-                self._open()
-            self.release()
-
-    def give_turn_back(self) -> None:
-        """End to be `alone`."""
-        with self._guard:
-            self._leave()
-
-    def give_back(self) -> None:
-        """End to be `changing`."""
-        try:
-            with self._guard:
-                self._leave()
-                self._open()
-        finally:
-            self.release()
-
-    def _get_turn(self, me: int) -> None:
-        """Have the turn; if somebody is alone, leave the line and stand in it again when the turn has come."""
-        with self._guard:
-            if self._changer is None:
-                self._changer = me
-                return
-            place = _place()
-            self._changers.append(place)
-            self._open()
-        self.release()
-        try:
-            self._enter(place)
         except BaseException:
-            with self._guard:
-                if place in self._changers:
-                    self._changers.remove(place)
-                    self._shut()  # `take` opens it
+            self._alone.let_go()
             raise
 
-    def _enter(self, place: _Place) -> None:
-        """Wait in line; who is first waits for the lock, and opens the gate of the next when it has it."""
+    def _get_to_change(self) -> bool:
+        """Get the lock while nobody else is alone, with the door shut; whether this thread had it already."""
+        again = self.held()
+        if again and not self._changing and not self._alone.held():
+            raise ConflictError("a question is being answered in this thread; nothing can be changed meanwhile")
+        entered, me = False, object()
         try:
-            place.gate.acquire()
-            self.acquire()
-        finally:  # also when it is interrupted
-            with self._guard:
-                if place in self._line:
-                    was_first = self._line[0] is place
-                    self._line.remove(place)
-                    if was_first and self._line:
-                        self._call_first()
+            try:
+                self._coming.add(me)
+                self._stamp.version = None
+                self.get()
+                entered = True
+                if not again and self._has_to_wait():
+                    self.release()
+                    self._wait_apart(me)
+            finally:
+                self._coming.discard(me)
+        except BaseException:
+            if entered:
+                self.let_go()
+            raise
+        return again
 
-    # --- under the guard
+    def _has_to_wait(self) -> bool:
+        """Whether another thread is alone, or has waited longer for that to end."""
+        if self._alone.held():
+            return False
+        another = bool(self._apart)
+        try:
+            self._alone.acquire(blocking=False)
+        finally:
+            try:
+                self._alone.release()
+            except RuntimeError:  # it was not to be had
+                another = True
+        return another
 
-    def _leave(self) -> None:
-        """Give the turn to who has waited longest, and put that one in line."""
-        if self._depth:
-            self._depth -= 1
-        elif self._changers:
-            place = self._changers.popleft()
-            self._changer = place.thread
-            self._shut()
-            self._join(place)
-        else:
-            self._changer = None
-
-    def _shut(self) -> None:
-        self._changes += 1
-        self._stamp.shut()
-
-    def _open(self) -> None:
-        self._changes -= 1
-        if not self._changes:
-            self._stamp.open()
-
-    def _join(self, place: _Place) -> None:
-        self._line.append(place)
-        if len(self._line) == 1:
-            self._call_first()
-
-    def _call_first(self) -> None:
-        self._due = monotonic() + self._patience_s
-        self._line[0].gate.release()
-
-
-class _Changing:
-    """Entering it takes the turn, leaving it gives it back; as a class, since every change passes here."""
-
-    __slots__ = ("_turn",)
-
-    def __init__(self, turn: Turn) -> None:
-        self._turn = turn
-
-    def __enter__(self) -> None:
-        self._turn.take()
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._turn.give_back()
+    def _wait_apart(self, me: object) -> None:
+        """Wait until nobody is alone, and then for the lock, in order of arrival."""
+        try:
+            self._apart.add(me)
+            self._coming.discard(me)
+            with self._first_apart:
+                with self._alone:
+                    pass
+                self._coming.add(me)
+                self._stamp.version = None
+                self.get()
+        finally:
+            self._apart.discard(me)
 
 
-class _Alone:
-    """Entering it takes the turn without the lock, leaving it gives it back."""
+class _Passage:
+    """A context manager that is made of two functions; the second may be one of C's."""
 
-    __slots__ = ("_turn",)
+    __slots__ = ("__enter__", "__exit__")
 
-    def __init__(self, turn: Turn) -> None:
-        self._turn = turn
+    __enter__: Callable[[], None]
+    __exit__: Callable[[type[BaseException] | None, BaseException | None, TracebackType | None], None]
 
-    def __enter__(self) -> None:
-        self._turn.take_turn()
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._turn.give_turn_back()
+    def __init__(
+        self,
+        enter: Callable[[], None],
+        leave: Callable[[type[BaseException] | None, BaseException | None, TracebackType | None], None],
+    ) -> None:
+        self.__enter__, self.__exit__ = enter, leave

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import threading
+from functools import partial
 
 import networkx as nx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kb_interrupts import interrupted
 from kb_strategies import SCHEMA, THINGS, deltas, removals
 from kb_worlds import graph_content
 
@@ -304,3 +306,15 @@ def test_overlays_stack(kb) -> None:
     assert high.match("on", (None, "shelf")) == [("cup3", "shelf")]
     assert low.match("on", (None, None)) == []
     assert kb.match("on", (None, None)) == [("cup1", "shelf")]
+
+
+def test_an_interrupt_at_any_moment_of_a_change_silences_nobody() -> None:
+    was_interrupted, moment = True, 0
+    while was_interrupted:
+        kb, heard = KnowledgeBase(SCHEMA), []
+        kb.subscribe(heard.append)
+        was_interrupted = interrupted(moment, partial(kb.apply, Delta(nodes={"cup1": "cup"}), "test"))
+        kb.apply(Delta(nodes={"cup2": "cup"}), "test")
+        assert heard[-1].version == kb.version, f"interrupted at moment {moment}"
+        moment += 1
+    assert moment > 1

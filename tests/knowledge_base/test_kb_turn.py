@@ -6,8 +6,10 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import partial
 
 import pytest
+from kb_interrupts import interrupted
 
 from knowledge_base import ConflictError, Delta, KnowledgeBase, Schema, fact
 from knowledge_base.world.turn import Stamp, Turn
@@ -90,6 +92,17 @@ def test_who_waits_for_the_end_of_a_long_turn_is_next(crowd: Crowd) -> None:
     assert crowd.goes() == ["question", "change 1", "change 2", "change 3"]
 
 
+def test_who_changes_something_may_be_alone_with_it_while_others_wait_for_that(crowd: Crowd) -> None:
+    def is_alone() -> None:
+        with crowd.turn.alone(), crowd.turn.alone(), crowd.turn.changing():
+            crowd.asks("question")
+
+    with crowd.turn.alone():
+        crowd.changes("change 1", is_alone)
+        crowd.changes("change 2", is_alone)
+    assert [one for one in crowd.goes() if one != "question"] == ["change 1", "change 2"]
+
+
 def test_alone_means_that_others_ask_and_do_not_change(crowd: Crowd) -> None:
     asked = threading.Event()
     with crowd.turn.alone():
@@ -114,6 +127,8 @@ def test_who_reads_without_the_lock_stops_when_a_change_waits(crowd: Crowd) -> N
         crowd.changes("change")
         assert crowd.stamp.version is None
     crowd.goes()
+    with crowd.turn:  # whoever asks next opens the door
+        pass
     assert crowd.stamp.version == 0
 
 
@@ -141,15 +156,10 @@ def test_who_is_interrupted_while_waiting_keeps_nobody_waiting(crowd: Crowd, mon
     """An interrupt ends the wait at a gate with an exception."""
 
     class Interrupted:
-        def __init__(self) -> None:
-            self.taken = False
+        def put(self, item: None) -> None: ...
 
-        def acquire(self) -> None:
-            if self.taken:
-                raise KeyboardInterrupt
-            self.taken = True
-
-        def release(self) -> None: ...
+        def get(self) -> None:
+            raise KeyboardInterrupt
 
     def waits(enter: Callable[[], AbstractContextManager[None]]) -> None:
         with pytest.raises(KeyboardInterrupt), enter():
@@ -157,7 +167,7 @@ def test_who_is_interrupted_while_waiting_keeps_nobody_waiting(crowd: Crowd, mon
 
     with crowd.turn.changing():
         with monkeypatch.context() as patch:
-            patch.setattr("knowledge_base.world.turn.Lock", Interrupted)
+            patch.setattr("knowledge_base.world.line.SimpleQueue", Interrupted)
             for enter in (lambda: crowd.turn, crowd.turn.changing):
                 thread = threading.Thread(target=waits, args=(enter,))
                 thread.start()
@@ -193,25 +203,61 @@ def test_writers_get_on_among_readers_that_ask_without_pause(tmp_path, kept: str
         assert all(during)
 
 
-@pytest.mark.parametrize("done_before", [False, True])
-@pytest.mark.parametrize("part", ["acquire", "_get_turn"])
-def test_whoever_is_interrupted_on_the_way_in_gives_back_what_there_is(part, done_before, monkeypatch):
-    really, changed = getattr(Turn, part), threading.Event()
+def changes(turn: Turn) -> None:
+    with turn.changing():
+        pass
 
-    def interrupted(self, *args, **named):
-        if done_before:
-            really(self, *args, **named)
-        raise KeyboardInterrupt
 
-    def change():
-        with turn.changing():
-            changed.set()
+def changes_within_a_change(turn: Turn) -> None:
+    with turn.changing(), turn.changing():
+        turn.made()
 
-    turn = Turn(Stamp())
-    monkeypatch.setattr(Turn, part, interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        turn.take()
-    monkeypatch.undo()
-    threading.Thread(target=change, daemon=True).start()
-    assert changed.wait(5)
-    assert turn.waiting == (0, 0)
+
+def is_alone(turn: Turn) -> None:
+    with turn.alone():
+        pass
+
+
+def changes_and_asks_alone(turn: Turn) -> None:
+    with turn.alone(), turn.alone(), turn.changing():
+        asks(turn)
+
+
+def asks(turn: Turn) -> None:
+    with turn:
+        pass
+
+
+@pytest.mark.parametrize("other", [None, changes, is_alone, asks])
+@pytest.mark.parametrize("work", [changes, changes_within_a_change, is_alone, changes_and_asks_alone, asks])
+def test_whoever_is_interrupted_at_any_moment_leaves_nothing_taken(
+    work: Callable[[Turn], None], other: Callable[[Turn], None] | None
+) -> None:
+    was_interrupted, moment = True, 0
+    while was_interrupted:
+        stamp = Stamp()
+        turn, begun, over = Turn(stamp), threading.Event(), threading.Event()
+        others = [threading.Thread(target=keeps, args=(turn, other, begun, over), daemon=True)] if other else []
+        for thread in others:
+            thread.start()
+            begun.wait(5)
+        was_interrupted = interrupted(moment, partial(work, turn))
+        over.set()
+        after = threading.Thread(target=lambda: [each(turn) for each in (changes, is_alone, asks)], daemon=True)  # noqa: B023
+        after.start()
+        for thread in (*others, after):
+            thread.join(5)
+            assert not thread.is_alive(), f"interrupted at moment {moment}"
+        assert turn.waiting == (0, 0)
+        assert stamp.version == stamp.newest
+        moment += 1
+    assert moment > 1
+
+
+def keeps(turn: Turn, how: Callable[[Turn], None], begun: threading.Event, over: threading.Event) -> None:
+    """Keep others waiting until one waits, or has given up."""
+    how_long = {changes: turn.changing, is_alone: turn.alone, asks: lambda: turn}[how]
+    with how_long():
+        begun.set()
+        while not (over.is_set() or any(turn.waiting)):
+            time.sleep(0)
