@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
-import threading
 from typing import TYPE_CHECKING
 
 from planning.engines.improving import Improving
+from planning.execution.bounds import LateError, bounded
+from planning.execution.improvements import Improvements
 from planning.plan import EngineFailed, PlanFound, PlanningOutcome, TimedOut
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Awaitable
+    import asyncio
+    from collections.abc import Awaitable
 
     from dsc.sequencer.clock import LoopClock
     from planning.engines.planner import Planner
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 PATIENCE = 90.0
 """Seconds of real time beyond its own for a planner that does not keep to it; starting an engine may take a minute."""
 
-Answer = tuple[PlanningOutcome, "AsyncGenerator[PlanningOutcome, None] | None"]
+Answer = tuple[PlanningOutcome, Improvements | None]
 """What it says, and what may follow if it goes on; to be closed."""
 
 
@@ -46,8 +47,9 @@ class Asking:
     async def solve(self, problem: Problem, seconds: float, *, going_on: bool = True) -> Answer:
         """The planner's answer, and what may follow if it goes on (not in simulated time, which is the same twice)."""
         if going_on and not self._clock.simulated and isinstance(self._planner, Improving):
-            better = self._planner.plans(problem, seconds)
-            answer = await self._bounded(anext(better), seconds)
+            plans = self._planner.plans(problem, seconds)
+            better = Improvements(plans, self.name)
+            answer = await self._bounded(anext(plans), seconds)
             if isinstance(answer, PlanFound):
                 return answer, better
             await better.aclose()
@@ -56,31 +58,14 @@ class Asking:
 
     async def _bounded(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
         """The answer, or that there was none in time or none at all; in real time, whatever the clock says."""
-        loop, engine = asyncio.get_running_loop(), self.name
-        asked = asyncio.ensure_future(answering)
-        expired = threading.Event()
-
-        def expire() -> None:
-            expired.set()
-            loop.call_soon_threadsafe(asked.cancel)
-
-        timer = threading.Timer(seconds + PATIENCE, expire)
-        timer.daemon = True
-        timer.start()
+        engine = self.name
         try:
             with self._clock.hold():
-                answer = await asked
-            return answer if isinstance(answer, PlanningOutcome) else EngineFailed(engine, f"no answer: {answer!r:.80}")
-        except asyncio.CancelledError:
-            if not expired.is_set() or _cancelled_from_outside():
-                raise
-            return TimedOut(engine, seconds)
+                answer = await bounded(answering, seconds + PATIENCE, engine)
+        except LateError as late:
+            if late.obeyed:
+                return TimedOut(engine, seconds)
+            return EngineFailed(engine, "no answer in time, and it goes on although it was told to stop")
         except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
             return EngineFailed(engine, f"{type(error).__name__}: {error}")
-        finally:
-            timer.cancel()
-
-
-def _cancelled_from_outside() -> bool:
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0
+        return answer if isinstance(answer, PlanningOutcome) else EngineFailed(engine, f"no answer: {answer!r:.80}")

@@ -14,10 +14,10 @@ from planning.execution.watched import Watched
 from planning.plan import PlanStep
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Mapping
+    from collections.abc import Mapping
 
     from knowledge_base.language.expression import Expression
-    from planning.plan import PlanningOutcome
+    from planning.execution.improvements import Improvements
     from planning.posing.derived import Settled
 
 _PLAIN = (
@@ -52,7 +52,7 @@ class Carried:
     holder: str
     seconds: float
     replans: int
-    better: AsyncGenerator[PlanningOutcome, None] | None = None
+    better: Improvements | None = None
     following: tuple[PlanStep, ...] | None = None
     following_name: str | None = None
     following_kept: int = 0

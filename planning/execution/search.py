@@ -16,24 +16,14 @@ from planning.execution.mending import mending
 from planning.execution.repair import EXCLUDED_SECONDS, without
 from planning.ordering.order import deordered
 from planning.patience import OutOfPatienceError, Patience, aside
-from planning.plan import (
-    EngineFailed,
-    NobodyCan,
-    NoneFound,
-    Plan,
-    PlanFound,
-    PlanningOutcome,
-    PlanStep,
-    ProvenUnsolvable,
-    TimedOut,
-)
+from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.posing.constructs import why_no_engine
 from planning.posing.problem import pose
 from planning.posing.unsolvable import why_unsolvable
 from planning.validation import Validation, validate
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Awaitable, Callable, Collection, Iterable
+    from collections.abc import Awaitable, Callable, Collection, Iterable
 
     from dsc.sequencer.clock import LoopClock
     from knowledge_base.language.expression import Expression
@@ -43,6 +33,7 @@ if TYPE_CHECKING:
     from planning.engines.planner import Planner
     from planning.execution.course import Course
     from planning.execution.foresight import Foresight
+    from planning.execution.improvements import Improvements
     from planning.execution.telling import Telling
     from planning.ordering.order import PartialOrder
     from planning.strips import Problem
@@ -70,7 +61,7 @@ class Found:
 
     answer: PlanFound
     kept: int = 0
-    better: AsyncGenerator[PlanningOutcome, None] | None = None
+    better: Improvements | None = None
     order: PartialOrder | None = None
     version: int = -1
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import Callable
 from contextlib import aclosing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Change
     from knowledge_base.store import KnowledgeBase
     from planning.execution.carried import Carried
+    from planning.execution.improvements import Improvements
     from planning.execution.telling import Telling
-    from planning.plan import Plan, PlanningOutcome, PlanStep
+    from planning.plan import Plan, PlanStep
     from planning.posing.derived import Derivation, Settled
 
 
@@ -204,7 +205,7 @@ class _Watch:
             found = NotFound("failed", f"{type(error).__name__}: {error}")
         self._put(found)
 
-    async def _improve(self, better: AsyncGenerator[PlanningOutcome, None]) -> None:
+    async def _improve(self, better: Improvements) -> None:
         async with aclosing(better):
             async for answer in better:
                 if isinstance(answer, PlanFound):

@@ -1,0 +1,121 @@
+"""Planners that go on although they are told to stop: nobody waits for them for ever, and they are named."""
+
+import asyncio
+import logging
+
+import pytest
+from errands import DOMAIN, HOLDER, ROOMS, ROUND
+from obedient_robot import ObedientRobot, plots
+
+from dsc import Event, parse_plot
+from knowledge_base import Delta, fact
+from planning import Executive, Plan, PlanStep
+from planning.plan import EngineFailed, PlanFound
+
+FOUND = PlanFound(Plan((PlanStep("go", ("a", "b")),)), "fake", 0.0, 0.1)
+
+
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch):
+    monkeypatch.setattr("planning.execution.asking.PATIENCE", -4.9)  # of the five seconds that the goal has
+    monkeypatch.setattr("planning.execution.bounds.STOPPING", 0.1)
+
+
+async def goes_on():
+    """It cannot be cancelled."""
+    while True:
+        try:
+            await asyncio.get_running_loop().create_future()
+        except asyncio.CancelledError:
+            continue
+
+
+class Stubborn:
+    def __init__(self):
+        self.asked = 0
+
+    async def solve(self, problem, seconds):
+        self.asked += 1
+        await goes_on()
+
+
+class StubbornLater:
+    """Answers, and then goes on: in looking for more, or in ending."""
+
+    def __init__(self, answer, where):
+        self.answer, self.where = answer, where
+
+    async def solve(self, problem, seconds):
+        return self.answer
+
+    async def plans(self, problem, seconds):
+        try:
+            yield self.answer
+            if self.where == "looking":
+                await goes_on()
+            elif self.where == "failing":
+                raise OSError("no room left")
+        finally:
+            if self.where == "ending":
+                await goes_on()
+
+
+def run(planner, *, simulated=False, prepare=None):
+    """The attributes of how it ended."""
+    robot = ObedientRobot(DOMAIN, seconds=1.0 if simulated else 0.02)
+    holder = parse_plot(HOLDER.replace("GOAL", "(at b)").replace("REPLANS", "4"))
+    program = Executive(DOMAIN, [holder, *plots(DOMAIN)], [robot], planner=planner)
+    robot.knowledge = program.knowledge
+    told = (fact("at", "a"), *(fact("way", *one.split()) for one in ROUND))
+    program.knowledge.apply(Delta(nodes=dict.fromkeys(ROOMS, "room"), added=told), "test")
+    end = program.run("errand", prepare=prepare, simulated=simulated)
+    assert end.finished
+    return end.emitted[-1].attributes["how"]
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_a_planner_that_cannot_be_cancelled_ends_in_no_plan(simulated):
+    how = run(Stubborn(), simulated=simulated)
+    assert how == "Stubborn: no answer in time, and it goes on although it was told to stop"
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_a_stop_does_not_wait_for_a_planner_that_cannot_be_cancelled(simulated, monkeypatch, caplog):
+    monkeypatch.setattr("planning.execution.asking.PATIENCE", 3600)
+    planner = Stubborn()
+
+    def prepare(sequencer):
+        def look(record):
+            if record.type == "plan.asked":
+                asyncio.get_running_loop().create_task(stop_when_it_works(sequencer))
+
+        sequencer.trace.listen(look)
+
+    async def stop_when_it_works(sequencer):
+        while not planner.asked:  # noqa: ASYNC110  it tells nobody
+            await asyncio.sleep(0)
+        sequencer.post(Event("stop"))
+
+    assert run(planner, simulated=simulated, prepare=prepare) == "stopped"
+    assert "planner Stubborn: it goes on although it was told to stop" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("where", "said"),
+    [
+        ("looking", "planner StubbornLater: it goes on although it was told to stop"),
+        ("ending", "planner StubbornLater: it goes on although it was told to stop"),
+        ("failing", ""),
+        ("", ""),
+    ],
+)
+def test_a_planner_that_cannot_be_closed_keeps_no_run_from_ending(where, said, caplog):
+    with caplog.at_level(logging.ERROR, "asyncio"):
+        assert run(StubbornLater(FOUND, where)) == "reached"
+    assert said in caplog.text
+
+
+def test_a_planner_without_an_answer_that_cannot_be_closed_is_named(caplog):
+    with caplog.at_level(logging.ERROR, "asyncio"):
+        assert run(StubbornLater(EngineFailed("fake", "killed"), "ending")) == "fake: killed"
+    assert "planner StubbornLater: it goes on although it was told to stop" in caplog.text
