@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dsc.dynamic.added import Added
 from dsc.dynamic.detours import Detours
 from dsc.dynamic.handlers import with_handlers
-from dsc.dynamic.leading import led_away
+from dsc.dynamic.leading import answered, led_away
 from dsc.dynamic.outcomes import Plots, answerable
 from dsc.dynamic.responses import Responses, States, reason_of
 from dsc.dynamic.steps import Step, about_step, answers_in_plans, concerns
@@ -47,6 +47,7 @@ class _Expansion:
         self.added = Added(plot)
         self._responses = Responses(plot, plots, self.added)
         self._in_plans = [rule for rule in plot.rules if rule.leads_away and answers_in_plans(rule, plots)]
+        self._given_up: dict[str, str] = {}  # by what states say so inside, and why
         self.detours = Detours(plot, plots, self.added, self._responses)
 
     def scope(self, scope: Scope) -> dict[str, object]:
@@ -59,16 +60,24 @@ class _Expansion:
         """The states of one scope, each followed by the recoveries its rules need."""
         result: States = {}
         for name, state in states.items():
-            if isinstance(state, CompositeState):
-                result[name] = state.model_copy(update=self.scope(state))
-            elif isinstance(state, OrthogonalState):
-                regions = {key: one.model_copy(update=self.scope(one)) for key, one in state.regions.items()}
-                result[name] = state.model_copy(update={"regions": regions})
+            if isinstance(state, CompositeState | OrthogonalState):
+                result[name] = self._around(state)
             elif isinstance(state, SubmachineState | DynamicState):
                 result.update(self._with_rules(name, state, states))
             else:
                 result[name] = state
         return result
+
+    def _around(self, state: CompositeState | OrthogonalState) -> AnyState:
+        """A state that contains others."""
+        before, self._given_up = self._given_up, {}
+        if isinstance(state, CompositeState):
+            inside = self.scope(state)
+        else:
+            inside = {"regions": {key: one.model_copy(update=self.scope(one)) for key, one in state.regions.items()}}
+        on = answered(state.on, self._given_up)
+        self._given_up = {**before, **self._given_up}
+        return state.model_copy(update={**inside, "on": on})
 
     def _with_rules(self, name: str, state: Step, beside: Mapping[str, AnyState]) -> States:
         on = dict(state.on)
@@ -88,5 +97,5 @@ class _Expansion:
             if own:
                 on[event] = tuple(own)
         if isinstance(state, DynamicState) and state.goal is not None:
-            on = dict(led_away(name, state, on, beside, self._in_plans, self.added))
+            on = dict(led_away(name, state, on, beside, self._in_plans, self.added, self._given_up))
         return {name: state.model_copy(update={"on": on}), **recoveries}

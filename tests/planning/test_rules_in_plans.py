@@ -202,6 +202,37 @@ def test_a_rule_that_leads_away_again_and_again_ends_with_giving_up():
     assert sum(record.type == "rule" for record in records) == 5
 
 
+AROUND = """
+plot: photograph
+emits: {failed: {reason: text}}
+states:
+  outer:
+    states:
+      all:
+        goal: (forall (?t - thing) (shown ?t))
+        budget: {replans: 3}
+        on: {done: over, no_plan: {to: over, when: (noticed)}OWN}
+      over: {final: true}
+      aside: {on: {done: all}}
+    on:
+      done: end
+      no_plan: {to: end, emit: failed, with: {reason: ?event.reason}}
+      gave_up: {to: end, emit: failed, with: {reason: ?event.reason}}
+  end: {final: true}
+"""
+
+
+@pytest.mark.parametrize("own", ["", ", gave_up: {to: over, when: (noticed)}"])
+@pytest.mark.parametrize("parallel", [True, False])
+def test_giving_up_for_being_led_away_too_often_reaches_whoever_wires_it(own, parallel):
+    rule = "rules: [{before: light, do: {then: aside}}]"
+    end, studio, _ = away(rule, holder=AROUND.replace("OWN", own), parallel=parallel)
+    assert end.finished
+    (failed,) = end.emitted
+    assert failed.attributes["reason"] == "the budget of 3 new plans is used up: rules have led to 'aside' once more"
+    assert studio.done == []
+
+
 def test_leading_away_is_bounded_anew_when_the_goal_has_been_reached():
     """A plot that goes on for ever may be led away each time once; only what never gets anywhere is given up."""
     holder = HOLDER.replace("goal: (forall", "budget: {replans: 0}\n    goal: (forall").replace("done: over\n", "done: again\n", 1)
