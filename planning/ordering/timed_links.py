@@ -11,15 +11,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from knowledge_base.errors import InputError
+from knowledge_base.facts import Fact
 from knowledge_base.language.effect import AllOf, Effect, substitute_effect
 from knowledge_base.language.evaluation import World, apply_effect, holds
 from knowledge_base.language.expression import And, Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.ordering.dependencies import Changes, Ground, Support, changes, conjuncts, support
+from planning.ordering.dependencies import Changes, Ground, Support, changes, conjuncts, favours, support
 from planning.ordering.order import PRESENT, CausalLink, PartialOrder, scheduled
 from planning.plan import Plan, PlanStep, Timing
+from planning.posing.conditions import Literal
 from planning.posing.derived import derivation
 from planning.timeline import moment
 
@@ -79,11 +81,15 @@ class _Tracing:
         world: the state reached.
         links: what was found so far.
         makers: the steps that made a fact, or a number, what it is; without any, it was so from the beginning.
+        moves: by how much a step made a number greater.
+        assigned: numbers that were not only added to.
     """
 
     world: Overlay
     links: list[CausalLink] = field(default_factory=list)
     makers: dict[Ground, list[int]] = field(default_factory=lambda: defaultdict(list))
+    moves: dict[tuple[Fact, int], float] = field(default_factory=lambda: defaultdict(float))
+    assigned: set[Fact] = field(default_factory=set)
 
     def happen(self, ends: list[_End]) -> None:
         """What happens at one moment: all of it finds the world before."""
@@ -96,7 +102,7 @@ class _Tracing:
                     self.need(end.number, condition, str(end.step))
         delta = apply_effect(AllOf(tuple(end.effect for end in ends)), self.world)
         for end, doing in made:
-            self._make(end.number, doing)
+            self._make(end, doing)
         self.world.apply(delta)
         for end in ends:
             self.need(end.number, end.lasting, str(end.step))
@@ -107,17 +113,31 @@ class _Tracing:
             found = support(part, self.world, self._latest)
             if found is None:
                 raise InputError(f"the plan does not lead to the goal: {whose} needs {to_text(part)}")
-            providers = {one for ground in found for one in self.makers.get(ground, [PRESENT])}
+            providers = {one for ground in found for one in self._providers(ground, part)}
             if found and user not in providers:
                 self.links += [CausalLink(one, part, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
 
-    def _make(self, number: int, doing: Changes) -> None:
+    def _providers(self, ground: Ground, condition: Expression) -> list[int]:
+        """To whom the condition owes that; who uses up fuel does not provide what is left."""
+        makers = self.makers.get(ground, [PRESENT])
+        if isinstance(ground, Literal) or ground in self.assigned or makers == [PRESENT]:
+            return makers
+        good = favours(condition, ground, self.world)
+        return [one for one in makers if good is None or good * self.moves[ground, one] > 0]
+
+    def _make(self, end: _End, doing: Changes) -> None:
         for literal in doing.makes:
             fact = literal.fact
             if self.world.holds(fact.predicate, fact.args) is not literal.positive:
-                self.makers[literal] = [number]
-        for fluent in doing.numbers:
-            self.makers[fluent].append(number)
+                self.makers[literal] = [end.number]
+        made = apply_effect(end.effect, self.world).values if doing.numbers else {}
+        for fluent, adds in doing.numbers.items():
+            self.makers[fluent].append(end.number)
+            if not adds:
+                self.assigned.add(fluent)
+            before, now = self.world.value(fluent.predicate, fluent.args), made.get(fluent)
+            if isinstance(now, int | float) and isinstance(before, int | float):
+                self.moves[fluent, end.number] += now - before
 
     def _latest(self, found: Support) -> int:
         return max((one for ground in found for one in self.makers.get(ground, [PRESENT])), default=PRESENT)

@@ -67,3 +67,45 @@ def test_a_schedule_that_does_not_lead_to_the_goal_has_no_links(cellar):
         linked(late, CELLAR, cellar, parse_condition("(mended f)"))
     with pytest.raises(InputError, match=r"the goal needs \(aired\)"):
         linked(MENDING, CELLAR, cellar, parse_condition("(and (mended g) (aired))"))
+
+
+ROAD = PlanningDomain.parse("""
+(define (domain road) (:types place)
+  (:predicates (at ?p - place)) (:functions (fuel) (level))
+  (:durative-action drive :parameters (?a ?b - place) :duration (= ?duration 2)
+    :condition (and (at start (at ?a)) (at start (>= (fuel) 3)) (over all (>= (fuel) 0)))
+    :effect (and (at start (not (at ?a))) (at start (decrease (fuel) 3)) (at end (at ?b))))
+  (:durative-action fill :parameters () :duration (= ?duration 1) :effect (at end (increase (fuel) 5)))
+  (:action drain :parameters () :effect (assign (fuel) 0)))
+""")
+
+
+@pytest.fixture
+def road(world_of):
+    return world_of(ROAD.schema, dict.fromkeys("abc", "place"), (fact("at", "a"),), {fact("fuel"): 4})
+
+
+def fuel_links(plan, world):
+    links = linked(plan, ROAD, world, parse_condition("(at c)")).links
+    return [str(link) for link in links if "fuel" in str(link)]
+
+
+def test_who_uses_up_a_number_does_not_provide_what_is_left(road):
+    plan = timed(("drive a b", 0, 2), ("fill", 2.5, 1), ("drive b c", 4, 2))
+    assert fuel_links(plan, road) == [
+        "0 -(>= (fuel) 3)-> 1", "0 -(>= (fuel) 0)-> 1", "2 -(>= (fuel) 3)-> 3", "2 -(>= (fuel) 0)-> 3",
+    ]  # fmt: skip
+
+
+def test_who_uses_up_a_number_at_the_moment_at_which_another_adds_to_it_does_not_provide_it(road):
+    plan = timed(("fill", 0, 1), ("drive a b", 1, 2), ("fill", 3, 1), ("drive b c", 4.5, 2))
+    assert [link for link in fuel_links(plan, road) if link.endswith("-> 4")] == [
+        "1 -(>= (fuel) 3)-> 4", "1 -(>= (fuel) 0)-> 4", "3 -(>= (fuel) 3)-> 4", "3 -(>= (fuel) 0)-> 4",
+    ]  # fmt: skip
+
+
+def test_once_a_number_was_set_all_who_changed_it_provide_it(road):
+    plan = timed(("drain", 0, 0), ("fill", 1, 1), ("drive a b", 3, 2), ("fill", 5.5, 1), ("drive b c", 7, 2))
+    assert [link for link in fuel_links(plan, road) if link.endswith("-> 5")] == [
+        "1 -(>= (fuel) 3)-> 5", "2 -(>= (fuel) 3)-> 5", "3 -(>= (fuel) 3)-> 5", "4 -(>= (fuel) 3)-> 5",
+    ]  # fmt: skip
