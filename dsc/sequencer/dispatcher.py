@@ -156,6 +156,11 @@ class Dispatcher:
             self._ending.add(task)
             task.add_done_callback(self._ending.discard)
 
+    def dismiss(self, start: Start) -> None:
+        """Stop a skill that has failed by what it reported: that was its answer, and whatever it says now is none."""
+        self._answered_for.add(start.action_id)
+        self.stop(start)
+
     def stop(self, start: Start) -> None:
         """Cancel a skill; nobody waits for its answer any more."""
         if start.action_id not in self._running:

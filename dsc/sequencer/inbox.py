@@ -6,7 +6,8 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from dsc.sequencer.messages import Message
+from dsc.engine.steps import Start
+from dsc.sequencer.messages import Message, SkillMessage
 
 
 class Inbox:
@@ -41,6 +42,10 @@ class Inbox:
     def rearrange(self, order: Callable[[Iterable[Message]], Iterable[Message]]) -> None:
         """Put what waits in another order."""
         self._messages = deque(order(tuple(self._messages)))
+
+    def drop_answers(self, start: Start) -> None:
+        """Forget what else a skill has said that counts as ended."""
+        self._messages = deque(m for m in self._messages if not (isinstance(m, SkillMessage) and m.start == start))
 
     async def filled(self) -> None:
         """Wait until there is one."""

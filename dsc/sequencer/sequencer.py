@@ -288,7 +288,11 @@ class Sequencer:
                     message = self._inbox.take()
                     output = self._react_and_keep(message)
         if isinstance(message, SkillMessage) and message.final:
-            (self.dispatcher.stop if message.goes_on else self.dispatcher.settle)(message.start)
+            if message.goes_on:
+                self._inbox.drop_answers(message.start)
+                self.dispatcher.dismiss(message.start)
+            else:
+                self.dispatcher.settle(message.start)
         self._carry_out(output)
 
     def _react_and_keep(self, message: Message) -> tuple[Output, ...]:

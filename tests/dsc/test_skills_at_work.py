@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 from dsc_runs import SLOW, Arm, Ran
 
@@ -214,6 +216,48 @@ def test_a_skill_that_reports_what_is_no_outcome_of_its_own_is_stopped():
     (event,) = ran.end.emitted
     assert event.attributes["why"] == "arm.chats: it ended with 'hello', which it does not declare"
     assert ran.at == 0
+
+
+@pytest.mark.parametrize("what", [Outcome("hello"), Outcome("so_far", observed=Delta(added=(fact("nonsense", "x"),)))], ids=["undeclared", "untrue"])
+@pytest.mark.parametrize("and_then", ["ends", "reports", "sleeps", "goes on"])
+def test_a_skill_that_has_failed_by_what_it_reported_answers_no_more(what, and_then):
+    class Chatty(Component):
+        name = "arm"
+
+        @skill(outcomes={"ok": {}, "so_far": {}})
+        async def chats(self, call):
+            call.report(what)
+            if and_then == "reports":
+                call.report(Outcome("so_far"))
+                call.report(Outcome("hello"))
+            if and_then in ("sleeps", "goes on"):
+                try:
+                    await call.clock.sleep(5)
+                except asyncio.CancelledError:
+                    if and_then == "sleeps":
+                        raise
+            return Outcome("ok", observed=Delta(added=(fact("p"),)))
+
+    ran = Ran(
+        """
+        plot: p
+        variables: {failed: {type: number, initial: 0}, others: {type: number, initial: 0}}
+        emits: {counted: {failed: number, others: number}}
+        states:
+          a:
+            entry: {trigger: arm.chats, within: 100}
+            on:
+              skill_error: {assign: {failed: (+ ?failed 1)}}
+              ok: {assign: {others: (+ ?others 1)}}
+              so_far: {assign: {others: (+ ?others 1)}}
+            after: {seconds: 1, to: e}
+          e: {final: true, emit: counted, with: {failed: ?failed, others: ?others}}
+        """,
+        arm=Chatty(),
+    )
+    (event,) = ran.end.emitted
+    assert event.attributes == {"failed": 1, "others": 0}
+    assert not ran.kb.ask("(p)")
 
 
 def test_what_goes_wrong_in_a_plot_inside_comes_to_the_state_that_holds_it():
