@@ -20,6 +20,8 @@ _Result = TypeVar("_Result")
 _Args = TypeVarTuple("_Args")
 _DIGITS = 9
 """Of a second: what is due closer together is due at one moment, as for every asyncio loop."""
+_FEW = 100
+"""So many cancelled calls may wait until they would be due, however few others there are."""
 
 
 class LoopClock:
@@ -98,6 +100,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         self._simulated_now = at
         self._due: list[_Due] = []
         self._asked = 0
+        self._cancelled = 0  # at most so many of those that are due
         self._holds = 0
         self._settling: list[asyncio.Future[None]] = []
         super().__init__(_IdleSelector(self._go_on))
@@ -120,6 +123,14 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
             self._asked += 1
             heapq.heappush(self._due, _Due(round(when, _DIGITS), self._asked, timer, call, context))
         return timer
+
+    def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
+        """Asyncio's loops are told so; when most of what waits was cancelled, that is forgotten."""
+        self._cancelled += handle.when() > self._simulated_now  # else it has left the queue
+        if self._cancelled > max(_FEW, len(self._due) // 2):
+            self._due = [due for due in self._due if not due.timer.cancelled()]
+            heapq.heapify(self._due)
+            self._cancelled = 0
 
     async def settled(self) -> None:
         """Wait until nothing more happens at this moment, without letting it pass."""

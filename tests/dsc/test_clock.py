@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+import weakref
 
 import pytest
 
@@ -197,3 +198,28 @@ def test_real_time_is_always_released():
         return True
 
     assert run_real(main())
+
+
+def test_what_was_cancelled_is_not_kept_until_it_would_have_been_due():
+    class Something:
+        def __call__(self):
+            woken.append(self)
+
+    woken: list[Something] = []
+
+    async def main():
+        clock, made = LoopClock(), []
+        for number in range(2000):
+            something = Something()
+            made.append(weakref.ref(something))
+            handle = clock.call_at(1000.0 + number % 7, something)
+            del something
+            if number % 10:
+                handle.cancel()
+            del handle
+        kept = sum(one() is not None for one in made)
+        await clock.sleep(2000)
+        return kept
+
+    assert run_simulated(main()) < 2 * 200 + 101
+    assert len(woken) == 200
