@@ -185,9 +185,11 @@ def test_a_port_that_is_taken_is_said(viewer) -> None:
 def test_a_trace_file_is_read_and_a_damaged_one_refused_with_its_line(run, tmp_path) -> None:
     log, _ = run
     path = tmp_path / "run.jsonl"
-    path.write_text("\n".join([json.dumps(log.header), *log._lines, ""]), encoding="utf-8")
-    assert read_trace(path)._lines == log._lines
-    path.write_text("\n".join([json.dumps(log.header), log._lines[0], log._lines[2]]), encoding="utf-8")
+    header, lines = json.dumps(log.header), [log.line(seq) for seq in range(1, len(log) + 1)]
+    path.write_text("\n".join([header, *lines, ""]), encoding="utf-8")
+    read = read_trace(path)
+    assert [read.line(seq) for seq in range(1, len(read) + 1)] == lines
+    path.write_text("\n".join([header, lines[0], lines[2]]), encoding="utf-8")
     with pytest.raises(InputError, match="jsonl:3: this is not record 2"):
         read_trace(path)
     path.write_text("{}\n", encoding="utf-8")
