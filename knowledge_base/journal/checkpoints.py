@@ -3,8 +3,9 @@
 That waits for the disk, twice, which nobody who commits should: one thread does it for all stores of the process, one
 store after the other and with rests in between, so that the disk has time for the commits.
 
-SQLite before 3.51.3 may lose commits when a checkpoint for which there is nothing to do begins at the very moment in
-which a commit begins the log anew (https://www.sqlite.org/wal.html#walresetbug). So a store is asked for only together
+SQLite from 3.7.0 to 3.51.2 (but for 3.44.6 and 3.50.7) may lose commits when one checkpoint has put everything in its
+place, another one begins soon after it, and at that very moment a commit begins the log anew: a later checkpoint may
+leave out what counts as done then (https://www.sqlite.org/wal.html#walresetbug). So a store is asked for only together
 with a commit that has left something in the log, and whoever does it himself lets the thread `leave` it first.
 """
 
