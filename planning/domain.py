@@ -22,6 +22,7 @@ from knowledge_base.language.expression import (
     Variable,
     substitute,
 )
+from knowledge_base.language.inputs import require
 from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.language.vocabulary import ROOT_TYPE
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
@@ -222,7 +223,10 @@ def _computed(pieces: Iterable[object]) -> Iterator[Computed[Any]]:
 def _text(fragment: PlanningDomain | DomainText | Path | str) -> DomainText:
     if isinstance(fragment, PlanningDomain):
         return text_of(fragment)
-    return fragment if isinstance(fragment, DomainText) else read_domain(fragment)
+    if isinstance(fragment, DomainText):
+        return fragment
+    require(fragment, (str, Path), "a planning domain is a PlanningDomain, a PDDL file or its text")
+    return read_domain(fragment)
 
 
 def _type_test(parameter: TypedVariable, arg: str, schema: Schema) -> Expression:

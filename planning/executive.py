@@ -30,6 +30,7 @@ from knowledge_base.journal.file import Durability
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.compatibility import require_extension
+from planning import entrance
 from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of
 from planning.collecting import settled
 from planning.domain import PlanningDomain
@@ -86,8 +87,8 @@ class Executive:
         store: Path | str | None = None,
         durability: Durability = "process",
     ) -> None:
-        self.components = tuple(components)
-        require_instances(self.components)
+        entrance.require_parts(knowledge, planner, foresight, store)
+        self.components = require_instances(components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
         if any(component.name == PlanningComponent.name for component in self.components):
             raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)

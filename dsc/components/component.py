@@ -14,7 +14,7 @@ from dsc.components.parameters import Parameter, check_relations, known
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.inputs import shown
+from knowledge_base.language.inputs import require_several, shown
 
 NEUTRAL = "neutral"
 """The mode at rest."""
@@ -239,13 +239,15 @@ class Component:
         }
 
 
-def require_instances(components: Iterable[object]) -> None:
-    """Raise an error unless these are components, each with a name of its own.
+def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
+    """All of them, if these are components, each with a name of its own.
 
     Raises:
-        InputError: something is none, e.g. a class instead of its instance.
+        InputError: it is no list of them, or something in it is none, e.g. a class instead of its instance.
         SchemaError: two have one name.
     """
+    require_several(components, "components")
+    components = tuple(components)
     names = set()
     for one in components:
         if not isinstance(one, Component):
@@ -254,3 +256,4 @@ def require_instances(components: Iterable[object]) -> None:
         if one.name in names:
             raise SchemaError(f"two components are named '{one.name}'", found=one.name)
         names.add(one.name)
+    return components

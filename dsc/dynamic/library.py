@@ -30,7 +30,7 @@ class Library:
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
-        if isinstance(plots, ActionPlot | str):
+        if isinstance(plots, ActionPlot | str) or not isinstance(plots, Iterable):
             raise InputError(f"a library is made of a list of plots, not of {shown(plots)[:60]}")
         for plot in plots:
             self.add(plot)

@@ -65,9 +65,7 @@ class Dispatcher:
         part_of: str = "",
     ) -> None:
         self._part_of = part_of
-        components = tuple(components)
-        require_instances(components)
-        self._components = {component.name: component for component in components}
+        self._components = {component.name: component for component in require_instances(components)}
         self._roster = Roster(self._components)
         self._given_up: list[str] = []
         self._answered_for: set[str] = set()

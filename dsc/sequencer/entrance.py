@@ -11,13 +11,27 @@ from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.events import NO_ATTRIBUTES, RESERVED, Event
 from dsc.model.plot import ActionPlot
+from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.messages import KnowledgeMessage, ParameterMessage
+from dsc.sequencer.run_store import RunStore
+from dsc.trace import Trace
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
-from knowledge_base.language.inputs import require_delta, require_text, shown
+from knowledge_base.language.inputs import require, require_delta, require_text, shown
 from knowledge_base.store import KnowledgeBase
 
 _NUMBER = int | float
+
+
+def require_parts(library: object, knowledge: object, clock: object, trace: object, store: object) -> None:
+    """Raise `InputError` unless these are what a sequencer is made of; the last two may be missing."""
+    require(library, Library, "the plots are given as a Library, made by Library(plots)")
+    require(knowledge, KnowledgeBase, "the knowledge is a KnowledgeBase")
+    require(clock, LoopClock, "the clock is a LoopClock, made inside the loop that runs the sequencer")
+    if trace is not None:
+        require(trace, Trace, "a trace is a Trace")
+    if store is not None:
+        require(store, RunStore, "a store is a RunStore")
 
 
 def event(said: object) -> Event:

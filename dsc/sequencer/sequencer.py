@@ -80,6 +80,7 @@ class Sequencer:
         store: RunStore | None = None,
         part_of: str = "",
     ) -> None:
+        entrance.require_parts(library, knowledge, clock, trace, store)
         self.library = library
         self.knowledge = knowledge
         self.trace = trace or Trace(clock.now)

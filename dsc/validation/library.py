@@ -20,6 +20,7 @@ from dsc.validation.reach import check_reach
 from dsc.validation.size import check_size
 from dsc.validation.structure import check_structure
 from dsc.validation.wiring import check_wiring
+from knowledge_base.language.inputs import require, require_several
 from knowledge_base.world.schema import Schema
 
 MAX_FINDINGS = 50
@@ -33,7 +34,8 @@ def validate_library(
     components: Components | None = None,
 ) -> list[Finding]:
     """All findings about all plots; see `validate_plot`."""
-    known = None if skills is None else list(skills)
+    _require_parts(library, schema)
+    known = None if skills is None else _known(skills)
     return [finding for plot in library for finding in validate_plot(plot, library, schema, known, components)]
 
 
@@ -53,8 +55,13 @@ def validate_plot(
         skills: the skills that are deployed; without them, triggers are not checked.
         components: names of the components that are deployed, or also what they declare about their parameters;
             without them, `set` and `switch` are not checked.
+
+    Raises:
+        InputError: one of these is something else.
     """
-    signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in skills}
+    require(plot, ActionPlot, "a plot is an ActionPlot, as load_plot and parse_plot give it")
+    _require_parts(library, schema)
+    signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in _known(skills)}
     nesting = Nesting(plot)
     for check in (check_structure, check_size):
         findings = list(islice(check(plot, library, nesting), MAX_FINDINGS))
@@ -71,6 +78,20 @@ def validate_plot(
         check_components(plot, components) if components is not None else (),
     ]
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
+
+
+def _require_parts(library: object, schema: object) -> None:
+    require(library, Library, "the plots are given as a Library, made by Library(plots)")
+    if schema is not None:
+        require(schema, Schema, "a schema is a Schema; Schema.parse reads its text")
+
+
+def _known(skills: Iterable[SkillSignature]) -> list[SkillSignature]:
+    require_several(skills, "the signatures of skills")
+    skills = list(skills)
+    for one in skills:
+        require(one, SkillSignature, "a skill is known by its SkillSignature, as the skills() of a component give it")
+    return skills
 
 
 def raise_findings(findings: list[Finding]) -> None:

@@ -18,6 +18,18 @@ def shown(value: object) -> str:
         return "a number of thousands of digits"
 
 
+def require(value: object, kinds: type | tuple[type, ...], wanted: str) -> None:
+    """Raise `InputError` unless it is of one of the kinds; `wanted` says what is, as in `a schema is a Schema`."""
+    if not isinstance(value, kinds):
+        raise InputError(f"{wanted}, not {shown(value)[:60]}")
+
+
+def require_several(value: object, what: str) -> None:
+    """Raise `InputError` unless it can be gone through; `what` are the things in it."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise InputError(f"{what} are given as a list, not as {shown(value)[:60]}")
+
+
 def require_condition(text: object) -> None:
     """Raise `InputError` unless it is a text or an expression, which must still be read or checked."""
     if isinstance(text, Fact):

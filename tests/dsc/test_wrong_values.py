@@ -23,9 +23,10 @@ from dsc import (
     skill,
 )
 from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.validation import validate_library, validate_plot
 from knowledge_base import InputError, KnowledgeBase
 from knowledge_base.world.schema import Schema
-from planning import Executive
+from planning import Executive, PlannerProcess
 
 PLOT = parse_plot("""
 plot: p
@@ -57,8 +58,17 @@ def at_work(act):
     return lambda: run_simulated(main())
 
 
-def executive(components, plots=(PLOT,)):
-    return lambda: Executive("(define (domain d))", plots, components)
+def executive(components, plots=(PLOT,), **more):
+    return lambda: Executive("(define (domain d))", plots, components, **more)
+
+
+def sequencer_of(**other):
+    """Making one with something else in one place."""
+
+    async def main():
+        Sequencer(**{"library": Library([PLOT]), "knowledge": KnowledgeBase(Schema()), "components": (), "clock": LoopClock(), **other})
+
+    return lambda: run_simulated(main())
 
 
 @pytest.mark.parametrize(
@@ -76,6 +86,20 @@ def executive(components, plots=(PLOT,)):
         (at_work(lambda run: run.run("p", {"n": 1, "why": {2}})), "the argument 'why' is no plain data"),
         (at_work(lambda _: sequencer([Arm]) and None), "an instance is made by Arm()"),
         (at_work(lambda _: sequencer([Arm(), Arm()]) and None), "two components are named 'arm'"),
+        (sequencer_of(library=[PLOT]), "the plots are given as a Library, made by Library(plots), not [ActionPlot(name='p'"),
+        (sequencer_of(knowledge=5), "the knowledge is a KnowledgeBase, not 5"),
+        (sequencer_of(components=5), "components are given as a list, not as 5"),
+        (sequencer_of(components="arm"), "components are given as a list, not as 'arm'"),
+        (sequencer_of(clock=5), "the clock is a LoopClock, made inside the loop that runs the sequencer, not 5"),
+        (sequencer_of(trace=[]), "a trace is a Trace, not []"),
+        (sequencer_of(store="a.kb"), "a store is a RunStore, not 'a.kb'"),
+        (lambda: Library(5), "a library is made of a list of plots, not of 5"),
+        (lambda: validate_plot("p", Library()), "a plot is an ActionPlot, as load_plot and parse_plot give it, not 'p'"),
+        (lambda: validate_plot(PLOT, [PLOT]), "the plots are given as a Library, made by Library(plots), not ["),
+        (lambda: validate_plot(PLOT, Library(), "(define"), "a schema is a Schema; Schema.parse reads its text, not '(define'"),
+        (lambda: validate_plot(PLOT, Library(), None, 5), "the signatures of skills are given as a list, not as 5"),
+        (lambda: validate_plot(PLOT, Library(), None, ["go"]), "a skill is known by its SkillSignature, as the skills() of a component give it, not 'go'"),
+        (lambda: validate_library([PLOT], None, None), "the plots are given as a Library"),
         (lambda: Library(["p"]), "a plot is an ActionPlot, as load_plot and parse_plot give it, not 'p'"),
         (lambda: Library(PLOT), "a library is made of a list of plots"),
         (lambda: parse_plot(None), "what is read as YAML is text, not None"),
@@ -95,6 +119,14 @@ def executive(components, plots=(PLOT,)):
         (executive(["arm"]), "a component is an instance of a subclass of Component, not 'arm'"),
         (executive([Arm(), Arm()]), "two components are named 'arm'"),
         (executive([], ["p"]), "a plot is an ActionPlot"),
+        (lambda: Executive(5, [PLOT], []), "a planning domain is a PlanningDomain, a PDDL file or its text, not 5"),
+        (lambda: Executive("(define (domain d))", 5, []), "a library is made of a list of plots, not of 5"),
+        (executive(5), "components are given as a list, not as 5"),
+        (executive([], knowledge=5), "the knowledge is a KnowledgeBase, not 5"),
+        (executive([], planner="fast"), "a planner has a method 'solve', which 'fast' has not"),
+        (executive([], planner=PlannerProcess), "a planner is an object, not a class; an instance is made by PlannerProcess()"),
+        (executive([], foresight=5), "a foresight has a method 'foresee', which 5 has not"),
+        (executive([], store=5), "a store is named by a text or a Path, not 5"),
         (lambda: Executive("nowhere.pddl", [PLOT], []), "there is no file 'nowhere.pddl'"),
     ],
 )  # fmt: skip
