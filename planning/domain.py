@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, Place, UnknownNameError
 from knowledge_base.exchange.domain_writer import action_to_text, axiom_to_text, domain_to_text
 from knowledge_base.language.effect import Effect, substitute_effect
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
@@ -24,11 +24,13 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.inputs import require
 from knowledge_base.language.timed import Duration, Timed
-from knowledge_base.language.vocabulary import ROOT_TYPE
-from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
+from knowledge_base.language.typed_list import TypedName
+from knowledge_base.language.vocabulary import ROOT_TYPE, Signature
+from knowledge_base.pddl.action_text import ActionText
+from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.world.schema import Schema
 from planning.actions import Axiom, PlanningAction, checked, checked_axiom, refuse_changed
-from planning.fragments import merged_text, searched, text_of
+from planning.fragments import merged_text, searched
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -138,6 +140,26 @@ class PlanningDomain:
         refuse_changed(actions.values(), axioms)
         return cls(read.name, schema, actions, axioms, tuple(dict.fromkeys(read.remarks())))
 
+    def to_text(self) -> DomainText:
+        """All of it as one file would declare it, the inverse of `from_text`."""
+        schema = self.schema
+        return DomainText(
+            name=self.name,
+            requirements=(),
+            types=tuple(_typed(schema, name, parent) for name, parent in schema.types.items() if parent),
+            constants=tuple(_typed(schema, name, kind) for name, kind in schema.constants.items()),
+            predicates=_declarations(schema.predicates.values()),
+            functions=_declarations(schema.functions.values()),
+            actions=tuple(
+                ActionText(a.name, a.parameters, a.precondition, a.effect, a.place, a.duration, a.timed)
+                for a in self.actions.values()
+            ),
+            axioms=tuple(
+                AxiomText(DeclarationText(a.predicate, a.parameters, a.place), a.condition) for a in self.axioms
+            ),
+            notes=self.notes,
+        )
+
     def to_pddl(self) -> str:
         """All of it as one PDDL file, whatever it was made from; reading that gives the same domain.
 
@@ -147,11 +169,11 @@ class PlanningDomain:
         if self.schema.computed:
             computed = next(iter(self.schema.computed))
             raise InputError(f"the predicate '{computed}' is computed by Python, which PDDL cannot say", found=computed)
-        return domain_to_text(text_of(self))
+        return domain_to_text(self.to_text())
 
     def statements(self) -> dict[str, str]:
         """What plans rely on, in PDDL on one line each: the actions and derived predicates, by what they are called."""
-        text = text_of(self)
+        text = self.to_text()
         found = {f"planning action '{one.name}'": action_to_text(one) for one in text.actions}
         for axiom in text.axioms:
             name = f"derived predicate '{axiom.head.name}'"
@@ -222,11 +244,19 @@ def _computed(pieces: Iterable[object]) -> Iterator[Computed[Any]]:
 
 def _text(fragment: PlanningDomain | DomainText | Path | str) -> DomainText:
     if isinstance(fragment, PlanningDomain):
-        return text_of(fragment)
+        return fragment.to_text()
     if isinstance(fragment, DomainText):
         return fragment
     require(fragment, (str, Path), "a planning domain is a PlanningDomain, a PDDL file or its text")
     return read_domain(fragment)
+
+
+def _declarations(signatures: Iterable[Signature]) -> tuple[DeclarationText, ...]:
+    return tuple(DeclarationText(s.name, s.parameters, s.place, s.result) for s in signatures)
+
+
+def _typed(schema: Schema, name: str, kind: str) -> TypedName:
+    return TypedName(name, (kind,), schema.places.get(name, Place()))
 
 
 def _type_test(parameter: TypedVariable, arg: str, schema: Schema) -> Expression:

@@ -10,19 +10,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from knowledge_base.errors import InputError, Place
-from knowledge_base.language.typed_list import TypedName
-from knowledge_base.pddl.action_text import ActionText, united
-from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.errors import InputError
+from knowledge_base.pddl.action_text import united
+from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
 from knowledge_base.world.schema import agreed_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from dsc.components.component import Component
-    from knowledge_base.language.vocabulary import Signature
-    from knowledge_base.world.schema import Schema
-    from planning.domain import PlanningDomain
 
 
 def shipped_by(components: Iterable[Component]) -> list[DomainText]:
@@ -56,27 +52,6 @@ def merged_text(texts: Sequence[DomainText]) -> DomainText:
     )
 
 
-def text_of(domain: PlanningDomain) -> DomainText:
-    """A domain as one file would declare it; the domain made from that is equal."""
-    schema = domain.schema
-    return DomainText(
-        name=domain.name,
-        requirements=(),
-        types=tuple(_typed(schema, name, parent) for name, parent in schema.types.items() if parent),
-        constants=tuple(_typed(schema, name, kind) for name, kind in schema.constants.items()),
-        predicates=_declarations(schema.predicates.values()),
-        functions=_declarations(schema.functions.values()),
-        actions=tuple(
-            ActionText(a.name, a.parameters, a.precondition, a.effect, a.place, a.duration, a.timed)
-            for a in domain.actions.values()
-        ),
-        axioms=tuple(
-            AxiomText(DeclarationText(a.predicate, a.parameters, a.place), a.condition) for a in domain.axioms
-        ),
-        notes=domain.notes,
-    )
-
-
 @contextmanager
 def searched(texts: Sequence[DomainText]) -> Iterator[None]:
     """Names that are found in none of several fragments: say which those are."""
@@ -87,14 +62,6 @@ def searched(texts: Sequence[DomainText]) -> Iterator[None]:
         if error.found is not None and len(sources) > 1:
             error.message += f" in {', '.join(sources)}"
         raise
-
-
-def _declarations(signatures: Iterable[Signature]) -> tuple[DeclarationText, ...]:
-    return tuple(DeclarationText(s.name, s.parameters, s.place, s.result) for s in signatures)
-
-
-def _typed(schema: Schema, name: str, kind: str) -> TypedName:
-    return TypedName(name, (kind,), schema.places.get(name, Place()))
 
 
 def _read(shipped: Path | str, owner: str) -> DomainText:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, SchemaError, SchemaMismatchError, fact
 from planning import Executive, PlanningDomain
-from planning.fragments import shipped_by, text_of
+from planning.fragments import shipped_by
 
 WORLD = """(define (domain kitchen) (:types item place)
   (:predicates (at ?i - item ?p - place)) (:constants home - place))"""
@@ -147,7 +147,7 @@ def test_a_fragment_can_be_a_domain_a_text_or_a_file(files):
 
 
 def test_a_domain_is_what_its_text_says(clean_up):
-    assert content(PlanningDomain.from_text(text_of(clean_up))) == content(clean_up)
+    assert content(PlanningDomain.from_text(clean_up.to_text())) == content(clean_up)
 
 
 PARTS = [
