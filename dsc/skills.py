@@ -17,7 +17,7 @@ import inspect
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast
 
 from dsc.blocking import in_process, in_thread
 from dsc.calls import Outcome, SkillCall
@@ -26,8 +26,7 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import shown
 
 if TYPE_CHECKING:
-    from dsc.components.component import Component
-
+    from dsc.components.activations import Activations
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
 """What may be done about an action of which nothing is known: do it again, since twice is as once; do it with the
@@ -63,7 +62,19 @@ class SkillSignature:
     after_crash: AfterCrash = "sense"
 
 
-CarryOut = Callable[["Component", SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
+class Skilled(Protocol):
+    """What carries out skills: decorators need know no more of a component.
+
+    Attributes:
+        name: how charts address it.
+        activations: who has activated its events.
+    """
+
+    name: str
+    activations: Activations
+
+
+CarryOut = Callable[[Skilled, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
 """How a decorated body is made to act: the component, the bound body, the call, the arguments."""
 
 
@@ -138,18 +149,18 @@ def require_names(declared: object, what: str, example: str) -> None:
         raise InputError(f"{what} are a mapping of names, as in {example}, not {shown(declared)}")
 
 
-async def _awaited(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _awaited(_: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     coming = body(call, **arguments)
     if not inspect.isawaitable(coming):
         raise SchemaError("it is no coroutine: write `async def`, or say that it is `blocking`")
     return cast(Outcome, await coming)
 
 
-async def _in_thread(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _in_thread(_: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     return await in_thread(body, call, arguments)
 
 
-async def _in_process(component: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _in_process(component: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     return await in_process(body, component.name, call, arguments)
 
 
@@ -157,7 +168,7 @@ _CARRIED_OUT: Mapping[str | None, CarryOut] = {None: _awaited, "thread": _in_thr
 
 
 @cache
-def signatures(kind: type[Component], name: str) -> Mapping[str, SkillSignature]:
+def signatures(kind: type[object], name: str) -> Mapping[str, SkillSignature]:
     """The signatures of a component class's decorated methods, for a component of that name.
 
     Found once for a class and name: every skill call asks for them.

@@ -22,8 +22,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from dsc.calls import Outcome, SkillCall
-from dsc.components.component import TAKES, Component
-from dsc.skills import Declared, SkillBody, require_names
+from dsc.components.component import TAKES
+from dsc.skills import Declared, SkillBody, Skilled, require_names
 
 ANSWERED = "answered"
 """The outcome of a query; its attributes are the answer."""
@@ -68,11 +68,11 @@ def takes(body: _Body) -> _Body:
     return body
 
 
-async def _ask(_: Component, body: SkillBody, __: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _ask(_: Skilled, body: SkillBody, __: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     return Outcome(ANSWERED, await body(**arguments))
 
 
-async def _activate(component: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _activate(component: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     """Test each value until we are cancelled, or the test fails."""
     held = False
     forever: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()

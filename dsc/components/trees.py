@@ -23,8 +23,7 @@ from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Repeat, Retry
 
 from dsc.calls import Outcome, SkillCall
-from dsc.components.component import Component
-from dsc.skills import AfterCrash, Declared, SkillBody
+from dsc.skills import AfterCrash, Declared, SkillBody, Skilled
 from knowledge_base.facts import Delta
 
 PERIOD = 0.1
@@ -55,7 +54,7 @@ def tree_skill(
         after_crash: as for `skill`; the tree begins anew then.
     """
 
-    async def carry_out(_: Component, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    async def carry_out(_: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
         root: Behaviour = body(call, **arguments)
         try:
             root.tick_once()
