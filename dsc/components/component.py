@@ -54,6 +54,7 @@ class Component:
         self.parameters: dict[str, Any] = {
             name: one.default for name, one in self.declares.items() if one.default is not None
         }
+        self._together: Mapping[str, Any] = {}  # parameters that are being set as one
         self.life = LifeCycle()
         self._starting = False
         self.activations = Activations()
@@ -94,6 +95,21 @@ class Component:
         self.check_parameter(parameter, value)
         self.parameters[parameter] = value
 
+    async def configure_all(self, values: Mapping[str, Any]) -> None:
+        """Have the parameters that were in force before a restart: judged as one set, then each set by `configure`.
+
+        Raises:
+            UnknownNameError, InputError: as `configure`; if one value does not fit, none is set.
+        """
+        self._together = values
+        try:
+            for parameter, value in values.items():
+                self.check_parameter(parameter, value)
+            for parameter, value in values.items():
+                await self.configure(parameter, value)
+        finally:
+            self._together = {}
+
     def check_parameter(self, parameter: str, value: object, who: Who | None = None) -> None:
         """Whether a parameter may have that value now; nothing is changed.
 
@@ -111,7 +127,8 @@ class Component:
         declared, name = known(self.name, parameter, self.declares), f"{self.name}.{parameter}"
         if who is not None:
             refuse_change(name, who, declared.changed_by)
-        check_relations(self.name, self.relations, {**self.parameters, parameter: declared.check(name, value)})
+        values = {**self.parameters, **self._together, parameter: declared.check(name, value)}
+        check_relations(self.name, self.relations, values)
 
     async def switch(self, mode: str) -> None:
         """The *state* port: enter a mode (`neutral` is at rest); override to react."""

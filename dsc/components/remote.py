@@ -67,6 +67,7 @@ class Host:
         self._endpoint.answer("how", self._how)
         self._endpoint.answer("stop", self._stop)
         self._endpoint.answer("set", lambda _, said: component.configure(said["parameter"], said["value"]))
+        self._endpoint.answer("set all", lambda _, said: component.configure_all(said))
         self._endpoint.answer("switch", lambda _, said: component.change_mode(said["mode"]))
         self._endpoint.answer("take", lambda _, said: component.take(said["port"], said["message"]))
         self._endpoint.answer("diagnose", lambda _, __: component.diagnose())
@@ -256,6 +257,10 @@ class RemoteComponent(Component):
     async def configure(self, parameter: str, value: object) -> None:
         """Set a parameter there; raises `NoAnswerError` or `RefusedError`."""
         await self._ask("set", {"parameter": parameter, "value": value})
+
+    async def configure_all(self, values: Mapping[str, Any]) -> None:
+        """Set parameters there as one set; raises `NoAnswerError` or `RefusedError`."""
+        await self._ask("set all", dict(values))
 
     async def change_mode(self, mode: str) -> None:
         """Enter a mode there; raises `NoAnswerError` or `RefusedError`."""

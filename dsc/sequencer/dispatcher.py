@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple
@@ -171,9 +171,9 @@ class Dispatcher:
         task.cancel()
         give_up_after(task, GRACE, partial(self._leave_alone, start, task))
 
-    def tell_again(self, told: SetParameter | SwitchMode) -> None:
+    def tell_again(self, component: str, in_force: Sequence[SetParameter | SwitchMode]) -> None:
         """Put in force what was before a restart; raises `UnknownNameError`."""
-        self.telling.tell(self.component(told.component), told, again=True)
+        self.telling.tell_again(self.component(component), in_force)
 
     def take_up(self, start: Start, earlier: Earlier) -> None:
         """Go on with a skill that was under way before a restart; raises `UnknownNameError`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
+from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
 from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.messages import LateMessage
@@ -35,28 +35,27 @@ async def take_up(kept: Kept, dispatcher: Dispatcher, coming: Coming) -> None:
             await dispatcher.abandon(one.what)
     awaited = [one for one in kept.pending if not one.cancelled]
     older = [one for one in awaited if one.step < kept.number]
-    in_force = _in_force(older)
-    for told in in_force.values():
-        dispatcher.tell_again(told)
+    in_force, others = _told_apart(older)
+    for component, told in in_force.items():
+        dispatcher.tell_again(component, told)
     await dispatcher.telling.all_taken()
-    for one in older:
-        if one.place not in in_force:
-            _await_again(one, dispatcher, coming)
+    for one in others:
+        _await_again(one, dispatcher, coming)
     await asyncio.sleep(0)  # until these have begun
     for one in awaited[len(older) :]:
         _await_again(one, dispatcher, coming)
 
 
-def _in_force(older: Iterable[Pending]) -> dict[int, SetParameter | SwitchMode]:
-    """What components have to be told before anything goes on; not what came after a message that was under way."""
-    found: dict[int, SetParameter | SwitchMode] = {}
-    behind = set()
+def _told_apart(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | SwitchMode]], list[Pending]]:
+    """What components have taken, which is in force, by their names; and what is awaited or still under way to them."""
+    in_force: dict[str, list[SetParameter | SwitchMode]] = {}
+    others = []
     for one in older:
-        if isinstance(one.what, SendMessage):
-            behind.add(one.what.component)
-        elif isinstance(one.what, SetParameter | SwitchMode) and one.what.component not in behind:
-            found[one.place] = one.what
-    return found
+        if isinstance(one.what, SetParameter | SwitchMode) and one.reports:
+            in_force.setdefault(one.what.component, []).append(one.what)
+        else:
+            others.append(one)
+    return in_force, others
 
 
 def _await_again(one: Pending, dispatcher: Dispatcher, coming: Coming) -> None:

@@ -49,7 +49,7 @@ class Pending:
         what: the output of the machine that asked for it, or what was handed in to come later.
         step: number of the macrostep that asked.
         at: second of run time at which a skill was started, or at which anything else is due.
-        reports: how many intermediate events of a skill were taken.
+        reports: how many intermediate events of a skill were taken; of a parameter or mode, 1 once it is in force.
         cause: number of the trace record about a skill's start.
         cancelled: whether it is a skill that the last macrostep has cancelled.
     """

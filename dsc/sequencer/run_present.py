@@ -70,6 +70,8 @@ class Present:
         self._frames = _by_serial(self._root)
         for one in kept.pending:
             self._note(one.what, one.place)
+            if one.reports and isinstance(one.what, SetParameter | SwitchMode):
+                self._in_force[_key(one.what)] = one.place
             form = awaited_form(one.what, self._short)
             kind = type(one.what).__name__
             self._rows[one.place] = Row(kind, one.step, one.at, form, one.reports, one.cause, one.cancelled)
@@ -83,7 +85,7 @@ class Present:
             self._reached(state.root)
         serial = None if state.root is None else state.root.serial
         # Most events change none of this; of outcome events there are only ever more.
-        settings = tuple(reactor.settings.values())
+        settings = tuple([(one, type(one.value)) for one in reactor.settings.values()])  # 1 and 1.0 are equal
         remembered = (
             serial, state.finished, len(reactor.emitted), frozenset(reactor.in_vain), reactor.problem, settings,
         )  # fmt: skip
@@ -115,16 +117,22 @@ class Present:
             case LateMessage() | SendLater():
                 self._forget(_key(message), 1)
 
-    def left(self, under_way: Collection[Told]) -> None:
-        """What the macrostep before asked for has left; all that was told has been taken, but for what is under way."""
+    def left(self, under_way: Collection[Told], refused: Collection[Told] = ()) -> None:
+        """What the macrostep before asked for has left; all that was told was taken, but for what is said here."""
         for place in self._cancelled:
             self._drop_row(place)
         self._cancelled.clear()
         for place, told in list(self._telling.items()):
             if not any(told is one for one in under_way):
                 del self._telling[place]
-                if self._in_force.get(_key(told)) != place:
+                if any(told is one for one in refused):
                     self._drop_row(place)
+                    if self._in_force.get(_key(told)) == place:  # again, after a restart
+                        del self._in_force[_key(told)]
+                elif isinstance(told, SendMessage):
+                    self._drop_row(place)
+                else:
+                    self._put_in_force(_key(told), place)
 
     def asked(self, output: Iterable[Output], step: int, now: float, reactor: Reactor) -> None:
         """What is awaited from now on, or no longer, and what is in force."""
@@ -135,7 +143,6 @@ class Present:
                 case StartTimer() | SendLater():
                     self.put(one, step, now + one.seconds)
                 case SetParameter() | SwitchMode() | SendMessage():
-                    self._overtake(_key(one))
                     self.put(one, step, now)
                 case Cancel():
                     for key in self._activations.pop(one.activation, ()):
@@ -176,8 +183,6 @@ class Present:
         self._last_place = place
         if isinstance(what, SetParameter | SwitchMode | SendMessage):
             self._telling[place] = what
-            if not isinstance(what, SendMessage):
-                self._in_force[key] = place
             return
         self._places.setdefault(key, []).append(place)
         if isinstance(what, Start | StartTimer):
@@ -192,11 +197,15 @@ class Present:
             self._put_row(place, self._rows[place]._replace(cancelled=True))
             self._cancelled.append(place)
 
-    def _overtake(self, key: _Key) -> None:
-        """Something else is in force; what has not been taken yet still has to be, and in order."""
-        place = self._in_force.pop(key, None)
-        if place is not None and place not in self._telling:
-            self._drop_row(place)
+    def _put_in_force(self, key: _Key, place: int) -> None:
+        """It was taken, in order: what was in force before is so no longer."""
+        before = self._in_force.get(key)
+        self._in_force[key] = place
+        if before == place:  # told again after a restart
+            return
+        if before is not None:
+            self._drop_row(before)
+        self._put_row(place, self._rows[place]._replace(reports=1))
 
     def _forget(self, key: _Key, most: int | None = None) -> None:
         """What is pending under that key is so no longer, or only the earliest so many."""

@@ -115,6 +115,7 @@ class RunStore:
         output: Iterable[Output],
         reactor: Reactor,
         under_way: Collection[Told] = (),
+        refused: Collection[Told] = (),
     ) -> None:
         """A macrostep; `message` is `None` for the first, in which the plot was started, and for leaving it.
 
@@ -124,11 +125,12 @@ class RunStore:
             output: what is to be carried out after the commit.
             reactor: after it.
             under_way: what components were told before and have not taken yet.
+            refused: what they were told before and did not take.
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
         state, version = reactor.machine.state, self._knowledge.version
-        self._present.left(under_way)
+        self._present.left(under_way, refused)
         if message is not None:
             self._present.taken(message)
         self._present.asked(output, self._number, now, reactor)

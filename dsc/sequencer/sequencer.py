@@ -315,8 +315,8 @@ class Sequencer:
 
     def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:
         assert self.store is not None  # noqa: S101
-        under_way = self.dispatcher.telling.under_way
-        self.store.step(self.clock.now(), message, output, self._reactor, under_way)
+        telling = self.dispatcher.telling
+        self.store.step(self.clock.now(), message, output, self._reactor, telling.under_way, telling.refused())
         for component, memory in self.dispatcher.memories():
             self.store.memory(component, memory)
 

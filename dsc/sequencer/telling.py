@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Collection, Iterable
+from collections import deque
+from collections.abc import Awaitable, Callable, Collection, Iterable, Sequence
+from functools import partial
 
 from dsc.components.component import Component
 from dsc.components.life import Life
@@ -15,6 +17,8 @@ CLOSING = GRACE
 """Seconds for components to take what they were last told, and for cancelled skills to stop."""
 Told = SetParameter | SwitchMode | SendMessage
 """What is told."""
+_MOST_REFUSED = 1000
+"""Of a run that is not kept nobody asks what was refused."""
 
 
 class Telling:
@@ -23,6 +27,7 @@ class Telling:
     def __init__(self) -> None:
         self._telling: dict[str, asyncio.Task[None]] = {}
         self._under_way: dict[int, Told] = {}
+        self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
         self._last = 0
 
     @property
@@ -30,24 +35,44 @@ class Telling:
         """What has been told and not been taken yet, nor refused."""
         return self._under_way.values()
 
-    def tell(self, component: Component, told: Told, *, again: bool = False) -> None:
-        """Let the component take it after what it was told before.
+    def refused(self) -> Collection[Told]:
+        """What components have not taken since this was last asked, nor will."""
+        if not self._refused:  # asked with each macrostep that is kept
+            return ()
+        refused = tuple(self._refused)
+        self._refused.clear()
+        return refused
 
-        Args:
-            component: whom.
-            told: what.
-            again: it is in force since before a restart: a component that was to start anew has done so.
-        """
-        number = self._last = self._last + 1
-        self._under_way[number] = told
+    def tell(self, component: Component, told: Told) -> None:
+        """Let the component take it after what it was told before."""
+        self._begin(component, (told,), lambda: _take(component, told))
 
-        async def take() -> None:
+    def tell_again(self, component: Component, in_force: Sequence[SetParameter | SwitchMode]) -> None:
+        """Let the component have what was in force before a restart: its parameters as one set, and then its modes."""
+        parameters = [one for one in in_force if isinstance(one, SetParameter)]
+        if parameters:
+            values = {one.parameter: one.value for one in parameters}
+            self._begin(component, parameters, lambda: component.configure_all(encoded(values)))
+        for one in in_force:
+            if isinstance(one, SwitchMode):
+                self._begin(component, (one,), partial(_switch_again, component, one.mode))
+
+    def _begin(self, component: Component, told: Iterable[Told], take: Callable[[], Awaitable[None]]) -> None:
+        numbers = {self._last + n: one for n, one in enumerate(told, start=1)}
+        self._under_way |= numbers
+        self._last = max(numbers)
+
+        async def taking() -> None:
             try:
-                await _take(component, told, again=again)
+                await take()
+            except Exception:
+                self._refused.extend(numbers.values())
+                raise
             finally:
-                del self._under_way[number]
+                for number in numbers:
+                    del self._under_way[number]
 
-        self._in_turn(component.name, take)
+        self._in_turn(component.name, taking)
 
     async def taken(self, component: Component) -> None:
         """Wait until the component has taken what it was told; raises what it raised, once."""
@@ -88,16 +113,19 @@ class Telling:
         self._telling[name] = asyncio.get_running_loop().create_task(in_order())
 
 
-async def _take(component: Component, told: Told, *, again: bool) -> None:
+async def _take(component: Component, told: Told) -> None:
     match told:
-        case SwitchMode(mode=Life.INIT) if again:
-            await component.come_alive()
         case SetParameter():
             await component.configure(told.parameter, encoded(told.value))
         case SwitchMode():
             await component.change_mode(told.mode)
         case SendMessage():
             await component.take(told.port, encoded(told.arguments))
+
+
+async def _switch_again(component: Component, mode: str) -> None:
+    """One that was to start anew has done so."""
+    await (component.come_alive() if mode == Life.INIT else component.change_mode(mode))
 
 
 def failure(task: asyncio.Task[None]) -> BaseException | None:

@@ -362,8 +362,11 @@ class TransportSuite:
                 for n in range(10):
                     await remote.configure("speed", n)
                     await remote.take("say", {"text": f"now {n}"})
-                await remote.change_mode("fast")
                 assert robot.log == [one for n in range(10) for one in (("speed", n), f"now {n}")]
+                robot.log.clear()
+                await remote.configure_all({"speed": 3, "gear": 2})
+                assert robot.log == [("speed", 3), ("gear", 2)]
+                await remote.change_mode("fast")
                 assert (await remote.diagnose())["mode"] == "fast"
 
         self.run(main())

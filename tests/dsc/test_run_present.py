@@ -15,7 +15,7 @@ from test_engine_properties import Played
 from dsc.engine.state import MachineState
 from dsc.engine.steps import Cancel, Revoke, SendLater, SetParameter, Start, StartTimer
 from dsc.events import Event
-from dsc.sequencer.messages import SkillMessage, TimerMessage
+from dsc.sequencer.messages import ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.run_forms import Outcome, Shortener, frame_form
 from dsc.sequencer.run_present import Present
 from dsc.sequencer.run_standing import Standing, standing
@@ -76,3 +76,14 @@ def test_what_is_pending_is_the_same_by_changes_and_as_a_whole(happens):
 
 
 NOBODY = SimpleNamespace(caused_by={})
+
+
+def test_another_kind_of_number_is_another_setting():
+    """1 and 1.0 are equal, and not the same; nor are 1 and true."""
+    machine, found = SimpleNamespace(state=MachineState()), Standing()
+    present, reactor = Present(Shortener(lambda *_: None)), reactor_of(machine)
+    for value in (1, 1.0, True):
+        reactor.settings["p", "n"] = ParameterMessage("p", "n", value, of_plot=True)
+        present.reached(reactor)
+        found.take(json.loads(present.change() or "{}"))
+        assert repr(found.reactor["settings"][0]["value"]) == repr(value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from types import MappingProxyType
 
 import pytest
 from dsc_crashes import Crashes, Robot, Run, copied
@@ -10,6 +11,7 @@ from dsc_kept_charts import CHARTS, handed_in
 from dsc_runs import SCHEMA, Ran
 
 from dsc.calls import Ended, Outcome, Status
+from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.events import Event
@@ -158,6 +160,72 @@ def test_what_is_in_force_is_told_again_before_anything_goes_on(tmp_path):
     assert first.robot.told == [("speed", 1), ("speed", 2), ("mode", "careful")]  # none of it may have left
     assert last.robot.told == [("speed", 2), ("mode", "careful")]
     assert last.robot.parameters == {"speed": 2}
+
+
+class Related(Robot):
+    declares = MappingProxyType({
+        "speed": Parameter("number", default=0.5, least=0.1, most=10.0),
+        "wheels": Parameter("number", default=4),
+    })
+    relations = ("(<= ?speed (/ ?wheels 4))",)
+
+
+def test_parameters_in_force_come_back_as_one_set_whatever_order_they_were_set_in(tmp_path):
+    chart = """
+        plot: p
+        emits: {because: {why: text}}
+        states:
+          a: {entry: [{set: robot.wheels, to: 8}, {set: robot.speed, to: 2}, {trigger: robot.work}], on: {did: b, skill_error: f}}
+          b: {entry: [{set: robot.wheels, to: 16}, {trigger: robot.work}], on: {did: c, skill_error: f}}
+          c: {entry: [{trigger: robot.work}], on: {did: d, skill_error: f}}
+          d: {entry: [{trigger: robot.work}], on: {did: e, skill_error: f}}
+          e: {final: true}
+          f: {final: true, emit: because, with: {why: it_failed}}
+    """
+    crashes = Crashes(tmp_path, chart, make=Related)
+    for what, run in crashes.resumed():
+        assert run.outcome() == crashes.whole.outcome(), what
+        assert run.robot.parameters == {"speed": 2, "wheels": 16}
+    assert run.robot.told == [("speed", 2), ("wheels", 16)]
+
+
+def test_what_a_component_has_refused_is_not_in_force_after_a_restart(tmp_path):
+    chart = """
+        plot: p
+        states:
+          a: {entry: [{set: robot.speed, to: 1}, {trigger: robot.work}], on: {did: b, skill_error: e}}
+          b: {entry: [{set: robot.speed, to: 99}, {trigger: robot.work}], on: {did: e, skill_error: c}}
+          c: {entry: [{trigger: robot.work}], on: {did: d, skill_error: e}}
+          d: {entry: [{trigger: robot.work}], on: {did: e, skill_error: e}}
+          e: {final: true}
+    """
+    crashes = Crashes(tmp_path, chart, make=Related)
+    for what, run in crashes.resumed():
+        assert run.outcome() == crashes.whole.outcome(), what
+        assert run.robot.parameters == {"speed": 1, "wheels": 4}
+    assert run.robot.told == [("speed", 1)]
+
+
+def test_a_value_that_was_under_way_is_told_again_after_what_was_in_force(tmp_path):
+    class Slow(Related):
+        async def configure(self, parameter, value):
+            if value == 0.75:
+                await asyncio.sleep(3)
+            await super().configure(parameter, value)
+
+    chart = """
+        plot: p
+        states:
+          a: {entry: [{set: robot.speed, to: 1}, {trigger: robot.work}], on: {did: b}}
+          b: {entry: [{set: robot.speed, to: 0.75}], after: {seconds: 1, to: c}}
+          c: {after: {seconds: 1, to: d}}
+          d: {entry: [{trigger: robot.work}], on: {did: e}}
+          e: {final: true}
+    """
+    crashes = Crashes(tmp_path, chart, make=Slow)
+    for what, run in crashes.resumed():
+        assert run.end == crashes.whole.end, what
+        assert run.robot.parameters == {"speed": 0.75, "wheels": 4}
 
 
 def test_listeners_of_a_resumed_run_hear_numbers_that_go_on(tmp_path):
