@@ -56,7 +56,6 @@ class KnowledgeBase(Observable):
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
-        self._together = Together(self._lock, self._require_free, self._history)
 
     @classmethod
     def open(
@@ -237,7 +236,7 @@ class KnowledgeBase(Observable):
                 further change is refused, and the file, opened anew, has what was before the block.
             ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
         """
-        return self._together
+        return Together(self._lock, self._require_free, self._history)
 
     def bind_source(self, function: str, *args: Value, reference: str) -> Source:
         """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.

@@ -7,12 +7,15 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from types import TracebackType
 
+from knowledge_base.errors import StoreError
 from knowledge_base.journal.history import History
 from knowledge_base.world.turn import Turn
 
 
 class Together:
-    """See `KnowledgeBase.together`; used again and again, by one thread at a time.
+    """See `KnowledgeBase.together`; may be used again and again, by one thread at a time.
+
+    An interrupt may come as it is to be left, before a line of it is run. Then it is broken off when it is forgotten.
 
     Args:
         turn: that of the world.
@@ -21,24 +24,37 @@ class Together:
     """
 
     def __init__(self, turn: Turn, require_free: Callable[[], None], history: History) -> None:
+        self._group: AbstractContextManager[sqlite3.Connection] | None = None  # inside
         self._alone = turn.alone()
         self._require_free = require_free
         self._history = history
-        self._group: AbstractContextManager[sqlite3.Connection] | None = None
 
     def __enter__(self) -> sqlite3.Connection:
         self._alone.__enter__()
         try:
             self._require_free()
-            group = self._group = self._history.together()
-            return group.__enter__()
+            group = self._history.together()
+            connection = group.__enter__()
+            self._group = group
         except BaseException:
             self._alone.__exit__(None, None, None)
             raise
+        return connection
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        assert self._group is not None  # noqa: S101
+        group = self._group
+        assert group is not None  # noqa: S101
         try:
-            self._group.__exit__(kind, error, at)
+            try:
+                group.__exit__(kind, error, at)
+            except BaseException as failed:  # perhaps before it had begun to end
+                group.__exit__(type(failed), failed, None)
+                raise
         finally:
+            self._group = None
             self._alone.__exit__(None, None, None)
+
+    def __del__(self) -> None:
+        if self._group is not None:
+            error = StoreError("a block was interrupted as it was left")
+            self.__exit__(StoreError, error, None)

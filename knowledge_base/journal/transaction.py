@@ -118,7 +118,7 @@ class Group:
             raise
         finally:
             if error is not None and self.appended and self.behind is None:
-                self.behind = error if isinstance(error, StoreError) else StoreError(str(error))
+                self.behind = error if isinstance(error, StoreError) else StoreError(str(error) or type(error).__name__)
 
     def require_abreast(self) -> None:
         """Raise `StoreError` if the file lacks what the world in memory has."""

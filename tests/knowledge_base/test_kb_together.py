@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
+from functools import partial
 
 import pytest
+from kb_interrupts import interrupted as interrupted_at
 
 from knowledge_base import Delta, KnowledgeBase, Schema, fact
 from knowledge_base.errors import ConflictError, SchemaError, StoreError
@@ -152,3 +155,30 @@ def test_a_closed_store_says_so(path):
     kb.close()
     with pytest.raises(StoreError), kb.together():
         pass
+
+
+def test_an_interrupt_at_any_moment_at_which_a_block_is_left_loses_nothing_in_silence(tmp_path):
+    """What is told afterwards is in the file, or refused; and nobody waits for ever."""
+    was_interrupted, moment = True, 0
+    while was_interrupted:
+        path, told = tmp_path / f"world{moment}.kb", []
+
+        def tell_more(kb, told):
+            with suppress(StoreError):
+                tell(kb, "q")
+                told.append("q")
+
+        with KnowledgeBase.open(SCHEMA, path) as kb:
+            block = kb.together()
+            block.__enter__()
+            tell(kb, "p")
+            was_interrupted = interrupted_at(moment, partial(block.__exit__, None, None, None))
+            del block
+            other = threading.Thread(target=tell_more, args=(kb, told), daemon=True)
+            other.start()
+            other.join(5)
+            assert not other.is_alive(), f"interrupted at moment {moment}"
+        assert ("q" in on_file(path)[1]) == bool(told), f"interrupted at moment {moment}"
+        moment += 1
+    assert moment > 1
+    assert on_file(path) == (2, ["p", "q"])
