@@ -1,14 +1,19 @@
 """Skills that block: in a thread, or in a process of their own. Cancellation and a deadline always arrive.
 
 Simulated time stands still meanwhile, so the seconds of the deadline are real ones here. Threads are daemons: one that
-does not stop is left alone after `STOPPING` seconds and does not keep the program alive. A process is ended.
+does not stop is left alone after `STOPPING` seconds and does not keep the program alive. A process is ended; it also
+ends as soon as the program is gone, however that died, so that nothing moves beside a program that takes the run up.
 """
 
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import math
 import multiprocessing
+import os
+import signal
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -24,6 +29,8 @@ STOPPING = 2.0
 """Real seconds for a body that was told to stop."""
 _POLL = 0.02
 """Real seconds after which a body's supervisor looks again whether it shall stop."""
+_PR_SET_PDEATHSIG = 1
+"""Of Linux's `prctl`: the signal that a process gets when its parent dies."""
 
 
 class DeadlineError(TimeoutError):
@@ -202,8 +209,29 @@ def _end(process: BaseProcess) -> None:
 def _child(
     theirs: Connection, body: Callable[..., Outcome], action_id: str, seconds: float, arguments: Mapping[str, Any]
 ) -> None:
+    _end_with_parent()
     call = BlockingCall(action_id, lambda outcome: theirs.send(("report", outcome)), seconds)
     try:
         theirs.send(("ended", body(call, **arguments)))
     except Exception as error:  # noqa: BLE001  # whatever it is goes to the parent, in words
         theirs.send(("error", f"{type(error).__name__}: {error}"))
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as the one that began it is gone: it knows of no deadline, and a resumed run acts anew.
+
+    Linux's kernel sees to that also while the body never lets another thread of this process run. It does so when the
+    thread dies that began us, which lives as long as it supervises us.
+    """
+    parent = multiprocessing.parent_process()
+    assert parent is not None  # noqa: S101
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if not parent.is_alive():  # it died before the kernel was asked
+        os._exit(1)
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, name="ends with its parent", daemon=True).start()

@@ -171,6 +171,38 @@ def test_a_deadline_ends_a_process():
         execute(Far(), "sleeps", seconds=0.2)
 
 
+ORPHAN = """
+import ctypes, math, time
+from dsc import Outcome, SkillCall, component_of, skill
+from dsc.sequencer.clock import LoopClock, run_real
+
+@skill(outcomes={"ok": {}}, blocking="process")
+def moves(call):
+    print("begun", flush=True)
+    BLOCKS(3600)
+    return Outcome("ok")
+
+async def main():
+    await component_of("far", moves).execute("moves", SkillCall("a1.0", LoopClock(), print, math.inf), {})
+
+if __name__ == "__main__":
+    run_real(main())
+"""
+
+
+@pytest.mark.parametrize("blocks", [
+    "time.sleep",
+    pytest.param("ctypes.PyDLL(None).sleep", marks=pytest.mark.skipif(sys.platform != "linux", reason="no thread watches")),
+])  # fmt: skip
+def test_a_process_ends_with_the_program_however_that_dies(tmp_path, blocks):
+    program = tmp_path / "orphan.py"
+    program.write_text(ORPHAN.replace("BLOCKS", blocks))
+    with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE) as running:
+        assert running.stdout.readline() == b"begun\n"
+        running.kill()
+        assert running.communicate(timeout=60) == (b"", None)  # the end of what all of its processes write to
+
+
 # -- skills that do not stop -------------------------------------------------------------------------------
 
 SWALLOWS = """
