@@ -1,7 +1,8 @@
 """Carries actions to components and their answers back as messages; the only part that touches skills.
 
 What is started for an activation is cancelled with it (S0.15). Configuration reaches a component before a
-skill that is started after it. Arguments and answers are encoded, so that nothing is shared by accident.
+skill that is started after it, and what was cancelled there has put things in order, unless the component is
+`concurrent`. Arguments and answers are encoded, so that nothing is shared by accident.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.component import Component, require_instances
 from dsc.components.roster import Roster
-from dsc.components.stopping import GRACE, give_up, give_up_after
+from dsc.components.stopping import GRACE, give_up
 from dsc.engine.steps import (
     Cancel,
     Output,
@@ -31,12 +32,14 @@ from dsc.engine.steps import (
 )
 from dsc.events import SKILL_ERROR
 from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.endings import Endings
 from dsc.sequencer.ends import broken, declared, encoded, late
 from dsc.sequencer.messages import SkillMessage, TimerMessage
 from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
 from dsc.sequencer.telling import CLOSING, Telling, failure
 from dsc.sequencer.time_limit import TimeLimit
 from dsc.sequencer.timers import Timers
+from dsc.skills import Pattern
 from knowledge_base.errors import InputError, UnknownNameError
 
 DEFAULT_WITHIN = 300.0
@@ -72,7 +75,8 @@ class Dispatcher:
         self._clock = clock
         self._post = post
         self._running: dict[str, _Running] = {}
-        self._ending: set[asyncio.Task[None]] = set()
+        self._endings = Endings()
+        self._forgetting: set[asyncio.Task[None]] = set()
         self.telling = Telling()
         self.timers = Timers(clock, post)
 
@@ -105,8 +109,17 @@ class Dispatcher:
         return self._part_of + start.action_id
 
     def _is_event(self, start: Start) -> bool:
+        return self._pattern(start) == "event"
+
+    def _has_to_wait(self, start: Start) -> bool:
+        """Whether skills of its component that were cancelled have to be over first."""
+        if not self._endings.of(start.component) or self.component(start.component).concurrent:
+            return False
+        return self._pattern(start) == "skill"
+
+    def _pattern(self, start: Start) -> Pattern | None:
         signature = self.component(start.component).skills().get(start.skill)
-        return signature is not None and signature.pattern == "event"
+        return None if signature is None else signature.pattern
 
     def dispatch(self, output: Output) -> None:
         """Carry out one output of the machine.
@@ -151,8 +164,8 @@ class Dispatcher:
         component = self._components.get(start.component)
         if component is not None and type(component).forget is not Component.forget:
             task = asyncio.get_running_loop().create_task(_forgotten(component, self._id(start)))
-            self._ending.add(task)
-            task.add_done_callback(self._ending.discard)
+            self._forgetting.add(task)
+            task.add_done_callback(self._forgetting.discard)
 
     def dismiss(self, start: Start) -> None:
         """Stop a skill that has failed by what it reported: that was its answer, and whatever it says now is none."""
@@ -164,12 +177,9 @@ class Dispatcher:
         if start.action_id not in self._running:
             return
         stopped = self._running.pop(start.action_id)
-        task = stopped.task
         stopped.limit.end()
-        self._ending.add(task)
-        task.add_done_callback(self._ending.discard)
-        task.cancel()
-        give_up_after(task, GRACE, partial(self._leave_alone, start, task))
+        stopped.task.cancel()
+        self._endings.add(start.component, stopped.task, partial(self._not_stopped, start))
 
     def tell_again(self, component: str, in_force: Sequence[SetParameter | SwitchMode]) -> None:
         """Put in force what was before a restart; raises `UnknownNameError`."""
@@ -204,7 +214,7 @@ class Dispatcher:
         for activation in {start.activation for start in self.started()}:
             self._cancel(activation)
         self.timers.close()
-        tasks = [*self._ending, *self.telling.tasks()]
+        tasks = [*self._endings.tasks(), *self._forgetting, *self.telling.tasks()]
         if tasks:
             stopped, others = await asyncio.wait(tasks, timeout=CLOSING)
             for task in others:
@@ -262,8 +272,7 @@ class Dispatcher:
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
         call = SkillCall(self._id(start), clock, report, clock.now() + within, self._given_up.append)
         try:
-            await self.telling.taken(component)
-            support = await self._roster.ready(component)
+            support = await self._ready(component, start)
             if earlier is not None:
                 status = await asked_after(component, start, self._id(start))
                 if isinstance(status, Ended):
@@ -284,15 +293,18 @@ class Dispatcher:
                 return late(start, within)
             return broken(start, f"{type(error).__name__}: {error}")
 
+    async def _ready(self, component: Component, start: Start) -> list[Component]:
+        """Wait until the skill can begin; gives what has to stay alive meanwhile."""
+        if self._has_to_wait(start):
+            await self._endings.over(component.name)
+        await self.telling.taken(component)
+        return await self._roster.ready(component)
+
     def _cancel(self, activation: int) -> None:
         for start in self.started():
             if start.activation == activation:
                 self.stop(start)
         self.timers.cancel(activation)
-
-    def _leave_alone(self, start: Start, task: asyncio.Task[None]) -> None:
-        self._ending.discard(task)
-        self._not_stopped(start)
 
 
 class _Running(NamedTuple):

@@ -9,6 +9,7 @@ from dsc_runs import SLOW, Arm, Ran
 
 from dsc.calls import Outcome
 from dsc.components.component import Component
+from dsc.components.ports import query
 from dsc.sequencer.clock import run_simulated
 from dsc.skills import check_arguments, skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
@@ -431,3 +432,67 @@ def test_components_remember_parameters_and_modes():
     component = run_simulated(main())
     assert component.parameters == {"x": 1}
     assert component.mode == "up"
+
+
+# -- putting things in order -------------------------------------------------------------------------------
+
+
+class Tidy(Arm):
+    """Whose fingers take `seconds` to open when it is cancelled."""
+
+    def __init__(self, seconds=1.0):
+        super().__init__()
+        self.seconds = seconds
+
+    @skill(outcomes={"held": {}})
+    async def hold(self, call):
+        try:
+            await call.clock.sleep(SLOW)
+        finally:
+            await call.clock.sleep(self.seconds)
+            self.note(f"open at {call.clock.now():g}")
+
+    @skill(outcomes={"closed": {}})
+    async def close(self, call):
+        self.note(f"closes at {call.clock.now():g}")
+        return Outcome("closed")
+
+    @query({"mode": "text"})
+    async def how(self):
+        self.note("asked")
+        return {"mode": self.mode}
+
+
+class AllAtOnce(Tidy):
+    concurrent = True
+
+
+HOLD_THEN = """
+    plot: p
+    states:
+      hold: {entry: {trigger: arm.hold}, after: {seconds: 2, to: next}, on: {held: x}}
+      next: {entry: {trigger: arm.NEXT, within: WITHIN}, on: {OUTCOME: e, timed_out: e}}
+      x: {}
+      e: {final: true}
+"""
+
+
+@pytest.mark.parametrize(("arm", "next_", "within", "log", "at"), [
+    (Tidy(), "close", 100, ["open at 3", "closes at 3"], 3),
+    (AllAtOnce(), "close", 100, ["closes at 2", "open at 3"], 3),
+    (Tidy(), "how", 100, ["asked", "open at 3"], 3),
+    (Tidy(5), "close", 3, ["open at 7"], 7),
+])  # fmt: skip
+def test_a_skill_waits_until_what_was_cancelled_there_has_put_things_in_order(arm, next_, within, log, at):
+    text = HOLD_THEN.replace("NEXT", next_).replace("WITHIN", str(within))
+    ran = Ran(text.replace("OUTCOME", "answered" if next_ == "how" else "closed"), arm=arm)
+    assert (ran.end.finished, ran.end.problem) == (True, None)
+    assert ran.arm.log == log
+    assert ran.at == pytest.approx(at)
+
+
+def test_a_skill_waits_no_longer_than_until_what_was_cancelled_there_is_given_up():
+    ran = Ran(HOLD_THEN.replace("NEXT", "close").replace("WITHIN", "100").replace("OUTCOME", "closed"), arm=Tidy(SLOW))
+    assert ran.end.finished
+    assert "skill 'arm.hold' went on for 30 s after it was cancelled and was given up" in ran.end.problem
+    assert ran.arm.log == ["closes at 32"]
