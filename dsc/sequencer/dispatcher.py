@@ -31,10 +31,11 @@ from dsc.engine.steps import (
     SwitchMode,
 )
 from dsc.events import SKILL_ERROR
+from dsc.sequencer.attributes import Declared
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.endings import Endings
 from dsc.sequencer.ends import broken, declared, encoded, late
-from dsc.sequencer.messages import SkillMessage, TimerMessage
+from dsc.sequencer.messages import Message, SkillMessage, TimerMessage
 from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
 from dsc.sequencer.telling import CLOSING, Telling, failure
 from dsc.sequencer.time_limit import TimeLimit
@@ -151,6 +152,14 @@ class Dispatcher:
         if name not in self._components:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
+
+    def declared(self, message: Message) -> Declared:
+        """What the attributes of a skill's outcome are declared to be; nothing for any other message."""
+        if not isinstance(message, SkillMessage) or not message.outcome.attributes:
+            return {}
+        component = self._components.get(message.start.component)
+        signature = None if component is None else component.skills().get(message.start.skill)
+        return {} if signature is None else signature.outcomes.get(message.outcome.event, {})
 
     def memories(self) -> Iterator[tuple[str, Any]]:
         """What components have to remember, by their names."""

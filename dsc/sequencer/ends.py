@@ -10,6 +10,7 @@ from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.engine.steps import Start
 from dsc.events import SKILL_ERROR, TIMED_OUT
+from dsc.sequencer.attributes import Declared, require_declared
 from knowledge_base.errors import InputError
 from knowledge_base.language.inputs import require_delta, shown
 
@@ -18,23 +19,34 @@ def encoded(value: Any) -> Any:
     """Plain data of its own, so that nothing is shared by accident."""
     if isinstance(value, dict) and not value:  # most skills take and say nothing
         return {}
-    return json.loads(json.dumps(value))
+    return json.loads(json.dumps(value, allow_nan=False))
 
 
 def declared(component: Component, start: Start, outcome: object) -> Outcome:
-    """The outcome, encoded; an error if it is none, or the skill's signature does not declare it."""
+    """The outcome, encoded; an error if it is none, or the skill's signature does not declare it, or not so."""
+    try:
+        return _sound(outcome, component.skills()[start.skill].outcomes)
+    except InputError as error:
+        return broken(start, str(error))
+
+
+def _sound(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
     if not isinstance(outcome, Outcome):
-        return broken(start, f"it ended with {outcome!r}, which is no outcome")
-    outcomes: Mapping[str, Any] = component.skills()[start.skill].outcomes
-    if outcome.event not in outcomes:
-        return broken(start, f"it ended with '{outcome.event}', which it does not declare")
-    if not isinstance(outcome.attributes, Mapping):
-        return broken(start, f"the attributes of '{outcome.event}' are a mapping, not {shown(outcome.attributes)}")
+        raise InputError(f"it ended with {outcome!r}, which is no outcome")
+    event, attributes = outcome.event, outcome.attributes
+    if event not in outcomes:
+        raise InputError(f"it ended with '{event}', which it does not declare")
+    if not isinstance(attributes, Mapping):
+        raise InputError(f"the attributes of '{event}' are a mapping, not {shown(attributes)}")
     try:
         require_delta(outcome.observed)
     except InputError as error:
-        return broken(start, f"what it observed with '{outcome.event}' is no change of knowledge: {error}")
-    return Outcome(outcome.event, encoded(dict(outcome.attributes)), outcome.observed)
+        raise InputError(f"what it observed with '{event}' is no change of knowledge: {error}") from None
+    require_declared(event, attributes, outcomes[event])
+    try:
+        return Outcome(event, encoded(dict(attributes)), outcome.observed)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the attributes of '{event}' are no plain data: {error}") from None
 
 
 def broken(start: Start, reason: str) -> Outcome:

@@ -12,6 +12,7 @@ from dsc.engine.state import MachineState
 from dsc.engine.steps import Output, SendLater, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
+from dsc.sequencer.attributes import Declared, require_things
 from dsc.sequencer.ends import broken
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.run_forms import Kept
@@ -19,6 +20,7 @@ from dsc.sequencer.tracing import StepTracer
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
+from knowledge_base.language.world import World
 from knowledge_base.store import KnowledgeBase
 
 CHART = "chart"
@@ -104,12 +106,22 @@ class Reactor:
             return ()
         return output
 
-    def believed(self, message: Message) -> Message:
-        """A skill that observes what cannot be has failed, and nothing of it is believed; else the message itself."""
-        if not isinstance(message, SkillMessage) or not message.outcome.observed:
+    def believed(self, message: Message, declared: Declared) -> Message:
+        """A skill that says what cannot be has failed, and nothing of it is believed; else the message itself.
+
+        Args:
+            message: whatever came.
+            declared: the attributes of the outcome, if it is a skill's.
+        """
+        if not isinstance(message, SkillMessage) or not (message.outcome.observed or declared):
             return message
+        said = message.outcome
         try:
-            self.knowledge.overlay().apply(message.outcome.observed)
+            worlds: list[World] = [self.knowledge]
+            if said.observed:
+                worlds.insert(0, after := self.knowledge.overlay())
+                after.apply(said.observed)
+            require_things(said.event, said.attributes, declared, *worlds)
         except InputError as error:
             outcome = broken(message.start, str(error))
             return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)

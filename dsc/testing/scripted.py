@@ -137,6 +137,7 @@ class _ScriptedComponent(Component):
         except Exception as problem:
             self._script.problems.append(problem)
             raise
+        self.check(call.skill, (answer,))  # a free one declares it anew: other answers may have had other attributes
         return Outcome(answer.event, answer.attributes, observed)
 
 

@@ -26,7 +26,7 @@ from dsc.testing import (
 LIBRARY = Library(plots())
 ROBOT = (Base(make_world()), Arm(make_world()), Camera(make_world(), list), Voice(make_world()))
 DOMAIN = HOME / "domain.pddl"
-ITEMS = "cup1 cup2 - cup table - surface bin sink - destination"
+ITEMS = "cup1 cup2 - cup table floor - surface bin sink - destination"
 FACTS = "(lies-at cup1 table) (lies-at cup2 table) (inside cup2 cup1) (seen cup1)"
 
 ARRIVED = Answer("arrived", {"to": "table"}, after=5)

@@ -73,7 +73,7 @@ class Arm(Component):
         await call.clock.sleep(seconds)
         return Outcome("found", {"item": "cup1"}, Delta(nodes={"cup1": "item"}, added=(fact("seen", "cup1"),)))
 
-    @skill(outcomes={"ok": {}})
+    @skill(outcomes={"ok": {}, "made": {"thing": None}})
     async def breaks(self, call, how="raise"):
         await call.clock.sleep(1)
         if how == "raise":
@@ -87,7 +87,7 @@ class Arm(Component):
         if how == "nothing":
             return None
         if how == "no_data":
-            return Outcome("ok", {"thing": object()})
+            return Outcome("made", {"thing": object()})
         return Outcome("ok", observed=Delta(added=(fact("nonsense", "x"),)))
 
     @skill(outcomes={"ok": {}})
@@ -100,9 +100,9 @@ class Arm(Component):
 class Ran:
     """A whole run: how it ended, when, what was traced and what is known then."""
 
-    def __init__(self, text, *inner, arm=None, prepare=None, facts=(), open_ended=False, arguments=None):
+    def __init__(self, text, *inner, arm=None, prepare=None, facts=(), things=(), open_ended=False, arguments=None):
         self.kb = KnowledgeBase(SCHEMA)
-        self.kb.apply(Delta(added=tuple(facts)), "test")
+        self.kb.apply(Delta(nodes=dict.fromkeys(things, "item"), added=tuple(facts)), "test")
         self.arm = arm or Arm()
         self.records = []
         library = Library([plot(text), *map(plot, inner)])

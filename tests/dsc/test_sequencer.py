@@ -39,7 +39,7 @@ def test_a_skill_is_started_and_its_outcome_moves_the_chart():
 
 
 def test_the_outcome_of_the_plot_is_handed_out():
-    ran = Ran(GRASP.replace("{item: cup1}}, on", "{item: cup1, ends: slipped}}, on"))
+    ran = Ran(GRASP.replace("{item: cup1}}, on", "{item: cup1, ends: slipped}}, on"), things=["cup1"])
     assert ran.end.emitted == (Event("lost", {"item": "cup1"}),)
 
 
@@ -268,7 +268,7 @@ BUSY = """
 
 
 def test_the_same_run_twice_gives_the_same_trace():
-    one, other = Ran(BUSY), Ran(BUSY)
+    one, other = Ran(BUSY, things=["cup2"]), Ran(BUSY, things=["cup2"])
     assert one.end.finished
     assert one.lines == other.lines
     assert len(one.lines) > 10

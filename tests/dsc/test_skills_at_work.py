@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 
 import pytest
 from dsc_runs import SLOW, Arm, Ran
@@ -11,6 +12,7 @@ from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.components.ports import query
 from dsc.sequencer.clock import run_simulated
+from dsc.sequencer.sequencer import RunEnd
 from dsc.skills import check_arguments, skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, fact
@@ -201,6 +203,73 @@ def test_a_skill_that_observes_what_cannot_be_has_failed_and_nothing_of_it_is_kn
     assert event.attributes["why"].startswith(f"arm.{skill_name}: ")
     assert not ran.kb.ask("(p)")
     assert ran.at == 0
+
+
+SAID = {"n": "number", "sure": "boolean", "why": "text", "what": "symbol", "item": "item", "any": None}
+
+
+class Sayer(Component):
+    """Ends, or reports and goes on, with attributes that fit what it declares or do not."""
+
+    name = "arm"
+
+    def __init__(self, attributes, observed=Delta()):  # noqa: B008  # a value
+        super().__init__()
+        self.outcome = Outcome("said", attributes, observed)
+
+    @skill(outcomes={"said": SAID})
+    async def says(self, call):
+        return self.outcome
+
+    @skill(outcomes={"said": SAID, "over": {}})
+    async def reports(self, call):
+        call.report(self.outcome)
+        await call.clock.sleep(5)
+        return Outcome("over")
+
+
+FITTING = {"n": 2, "sure": True, "why": "so", "what": "cup", "item": "cup1", "any": [{"deep": 1.5}]}
+SAYS = BREAKS.replace("arm.breaks, with: {how: HOW}", "arm.SKILL").replace("ok: e", "said: e")
+
+
+@pytest.mark.parametrize(("wrong", "reason"), [
+    ({"n": "blue"}, "the attribute 'n' of 'said' is a finite number, not 'blue'"),
+    ({"n": True}, "the attribute 'n' of 'said' is a finite number, not True"),
+    ({"n": math.nan}, "the attribute 'n' of 'said' is a finite number, not nan"),
+    ({"n": math.inf}, "the attribute 'n' of 'said' is a finite number, not inf"),
+    ({"sure": 1}, "the attribute 'sure' of 'said' is a truth value, not 1"),
+    ({"why": None}, "the attribute 'why' of 'said' is text, not None"),
+    ({"what": 7}, "the attribute 'what' of 'said' is a name, not 7"),
+    ({"item": "ghost"}, "the attribute 'item' of 'said' is of type item, and there is no object 'ghost'; valid: cup1, cup2"),
+    ({"item": 3}, "the attribute 'item' of 'said' is of type item, and 3 is no name"),
+    ({"item": "fork"}, "the attribute 'item' of 'said' is of type item, and 'fork' is of type object"),
+    ({"any": [math.nan]}, "the attributes of 'said' are no plain data: Out of range float values"),
+    ({"whi": "so"}, "the outcome 'said' has no attribute 'whi'; did you mean 'why'?"),
+])  # fmt: skip
+@pytest.mark.parametrize("skill_name", ["says", "reports"])
+def test_attributes_that_do_not_fit_their_declaration_are_a_skill_error(wrong, reason, skill_name):
+    forks = Delta(nodes={"fork": "object"}, added=(fact("p"),))
+    ran = Ran(SAYS.replace("SKILL", skill_name), arm=Sayer(FITTING | wrong, forks), things=["cup1", "cup2"])
+    (event,) = ran.end.emitted
+    assert event.attributes["why"].startswith(f"arm.{skill_name}: {reason}")
+    assert not ran.kb.ask("(p)")
+    assert ran.at == 0
+
+
+def test_an_attribute_that_is_missing_is_a_skill_error_that_names_it():
+    ran = Ran(SAYS.replace("SKILL", "says"), arm=Sayer({name: value for name, value in FITTING.items() if name != "item"}), things=["cup1", "cup2"])
+    (event,) = ran.end.emitted
+    assert event.attributes["why"] == "arm.says: the outcome 'said' needs its attribute 'item' of type item"
+
+
+@pytest.mark.parametrize(("item", "observed"), [
+    ("cup1", Delta()),
+    ("cup9", Delta(nodes={"cup9": "item"})),
+    ("cup1", Delta(removed_nodes=("cup1",))),
+])  # fmt: skip
+def test_an_attribute_may_name_what_is_seen_for_the_first_or_the_last_time(item, observed):
+    ran = Ran(SAYS.replace("SKILL", "says"), arm=Sayer(FITTING | {"item": item}, observed), things=["cup1", "cup2"])
+    assert ran.end == RunEnd(finished=True)
 
 
 def test_a_skill_that_reports_what_is_no_outcome_of_its_own_is_stopped():

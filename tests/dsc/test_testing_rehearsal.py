@@ -98,6 +98,12 @@ def test_a_skill_may_report_on_its_way():
     assert run.seconds == pytest.approx(5.5)
 
 
+def test_a_free_skill_may_say_one_thing_with_other_attributes_each_time():
+    reports = (Answer("felt", {"force": 2}), Answer("felt", {"force": 3, "where": "thumb"}), Answer("felt", {"force": 4}))
+    run = rehearse([FEELING], "feel", skills={"arm.grasp": Answer("grasped", reports=reports)})
+    assert run.emitted == (Event("end", {"felt": 9}),)
+
+
 def test_a_skill_may_break_or_never_answer():
     text = """
         plot: p
