@@ -20,10 +20,10 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from dsc.calls import Outcome, SkillCall
+from dsc.calls import OBSERVED, Outcome, SkillCall
+from knowledge_base.facts import Delta
 
 STOPPING = 2.0
 """Real seconds for a body that was told to stop."""
@@ -56,6 +56,10 @@ class BlockingCall:
     report: Callable[[Outcome], None]
     seconds: float
     stopping: threading.Event = field(default_factory=threading.Event)
+
+    def observe(self, observed: Delta) -> None:
+        """As in `SkillCall`."""
+        self.report(Outcome(OBSERVED, observed=observed))
 
     def sleep(self, seconds: float = 0.0) -> None:
         """Wait for real seconds; with none, only look whether to stop.

@@ -10,6 +10,9 @@ from typing import Any, Protocol
 
 from knowledge_base.facts import Delta
 
+OBSERVED = "(observed)"
+"""What `SkillCall.observe` reports instead of an event; no event can be called so in a chart."""
+
 
 class Clock(Protocol):
     """Time as skills and the sequencer see it: simulated or real, always injected."""
@@ -56,6 +59,10 @@ class SkillCall:
     report: Callable[[Outcome], None]
     deadline: float = math.inf
     give_up: Callable[[str], None] = lambda _: None
+
+    def observe(self, observed: Delta) -> None:
+        """Hand over at once what was observed: it is known however the skill ends, and no event for the chart."""
+        self.report(Outcome(OBSERVED, observed=observed))
 
     @property
     def remaining(self) -> float:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Mapping
+from contextvars import ContextVar
 from typing import Any, TypeVar
 
 from py_trees.behaviour import Behaviour
@@ -23,13 +24,17 @@ from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Repeat, Retry
 
 from dsc.calls import Outcome, SkillCall
-from dsc.skills import AfterCrash, Declared, SkillBody, Skilled
+from dsc.skills import AfterCrash, Declared, SkillBody, Skilled, require_names
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
+from knowledge_base.language.inputs import shown
 
 PERIOD = 0.1
 """Seconds between two ticks."""
 FOREVER = -1
 """How often `repeat` repeats without end."""
+_observe: ContextVar[Callable[[Delta], None]] = ContextVar("observe")
+"""Where the actions of a tree hand over what they have observed: each skill has a context of its own."""
 _Body = TypeVar("_Body", bound=Callable[..., Behaviour])
 
 
@@ -43,7 +48,7 @@ def tree_skill(
 ) -> Callable[[_Body], _Body]:
     """Declare a method that makes a behaviour tree as a skill; each call makes a fresh tree.
 
-    What the actions in the tree observe is handed over when the skill ends.
+    What an action in the tree has observed is handed over when it ends, so it is known however the skill ends.
 
     Args:
         success: the outcome when the root succeeds.
@@ -52,9 +57,17 @@ def tree_skill(
         types: of the parameters, as for `skill`.
         period: seconds of run time between two ticks.
         after_crash: as for `skill`; the tree begins anew then.
+
+    Raises:
+        UnknownNameError: success or failure is not among the outcomes.
+        InputError: it is, and has attributes; or the outcomes are no mapping.
     """
+    require_names(outcomes, "the outcomes of a tree", "outcomes={'served': {}, 'not_served': {}}")
+    for end in (success, failure):
+        _require_bare(end, outcomes)
 
     async def carry_out(_: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+        _observe.set(call.observe)
         root: Behaviour = body(call, **arguments)
         try:
             root.tick_once()
@@ -64,15 +77,26 @@ def tree_skill(
             succeeded = root.status is Status.SUCCESS
         finally:
             await _halt(root)
-        return Outcome(success if succeeded else failure, observed=_observed(root))
+        return Outcome(success if succeeded else failure)
 
     declared = {name: dict(one) for name, one in outcomes.items()}
     return Declared(dict(types or {}), declared, carry_out, after_crash=after_crash)
 
 
-def sequence(*children: Behaviour, name: str = "sequence") -> Behaviour:
-    """One after the other, until one fails; what has succeeded is not ticked again."""
-    return Sequence(name, memory=True, children=list(children))
+def _require_bare(end: str, outcomes: Mapping[str, Mapping[str, str | None]]) -> None:
+    if end not in outcomes:
+        raise UnknownNameError(f"a tree ends with '{end}', which is not declared", found=end, valid=outcomes)
+    if outcomes[end]:
+        raise InputError(f"a tree ends with '{end}', for whose attributes it has no values", found=end)
+
+
+def sequence(*children: Behaviour, name: str = "sequence", reactive: bool = False) -> Behaviour:
+    """One after the other, until one fails; if `reactive`, earlier ones are tried anew at each tick.
+
+    So a condition before an action holds when it begins or, if `reactive`, as long as it runs; an action before
+    another one is then begun anew, too.
+    """
+    return Sequence(name, memory=not reactive, children=list(children))
 
 
 def fallback(*children: Behaviour, name: str = "fallback", reactive: bool = False) -> Behaviour:
@@ -119,30 +143,27 @@ class _Action(Behaviour):
         self._ends = ends
         self._task: asyncio.Future[Outcome] | None = None
         self.stopping: list[asyncio.Future[Outcome]] = []
-        self.observed = Delta()
 
     def initialise(self) -> None:
-        self._task = asyncio.ensure_future(self._begin())
+        self._task = asyncio.ensure_future(self._carry_out())
+
+    async def _carry_out(self) -> Outcome:
+        outcome = await self._begin()
+        if not isinstance(outcome, Outcome):
+            raise InputError(f"the action '{self.name}' ended with {shown(outcome)}, which is no outcome")
+        if outcome.observed:
+            _observe.get()(outcome.observed)
+        return outcome
 
     def update(self) -> Status:
         if self._task is None or not self._task.done():
             return Status.RUNNING
-        outcome = self._task.result()
-        self.observed = self.observed.then(outcome.observed)
-        return Status.SUCCESS if outcome.event in self._ends else Status.FAILURE
+        return Status.SUCCESS if self._task.result().event in self._ends else Status.FAILURE
 
     def terminate(self, new_status: Status) -> None:
         if new_status is Status.INVALID and self._task is not None and not self._task.done():
             self._task.cancel()
             self.stopping.append(self._task)
-
-
-def _observed(root: Behaviour) -> Delta:
-    observed = Delta()
-    for one in root.iterate():
-        if isinstance(one, _Action):
-            observed = observed.then(one.observed)
-    return observed
 
 
 async def _halt(root: Behaviour) -> None:

@@ -6,10 +6,10 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from dsc.calls import Outcome
+from dsc.calls import OBSERVED, Outcome
 from dsc.components.component import Component
 from dsc.engine.steps import Start
-from dsc.events import SKILL_ERROR, TIMED_OUT
+from dsc.events import NO_ATTRIBUTES, SKILL_ERROR, TIMED_OUT
 from dsc.sequencer.attributes import Declared, require_declared
 from knowledge_base.errors import InputError
 from knowledge_base.language.inputs import require_delta, shown
@@ -34,7 +34,8 @@ def _sound(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
     if not isinstance(outcome, Outcome):
         raise InputError(f"it ended with {outcome!r}, which is no outcome")
     event, attributes = outcome.event, outcome.attributes
-    if event not in outcomes:
+    declared = NO_ATTRIBUTES if event == OBSERVED else outcomes.get(event)
+    if declared is None:
         raise InputError(f"it ended with '{event}', which it does not declare")
     if not isinstance(attributes, Mapping):
         raise InputError(f"the attributes of '{event}' are a mapping, not {shown(attributes)}")
@@ -42,7 +43,7 @@ def _sound(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
         require_delta(outcome.observed)
     except InputError as error:
         raise InputError(f"what it observed with '{event}' is no change of knowledge: {error}") from None
-    require_declared(event, attributes, outcomes[event])
+    require_declared(event, attributes, declared)
     try:
         return Outcome(event, encoded(dict(attributes)), outcome.observed)
     except (TypeError, ValueError) as error:

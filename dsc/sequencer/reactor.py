@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from dsc.calls import OBSERVED
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
@@ -177,8 +178,12 @@ class Reactor:
             self.trace.cause = self.tracer.event(event, "timer")
         return event
 
-    def _answered(self, message: SkillMessage) -> Event:
+    def _answered(self, message: SkillMessage) -> Event | None:
         start, outcome = message.start, message.outcome
+        if outcome.event == OBSERVED:
+            self.trace.cause = self.caused_by.get(start.action_id)
+            self._apply(outcome.observed, start.component)
+            return None
         if message.final:
             self.tracer.answered(start)
         name = start.names.get(outcome.event, outcome.event)

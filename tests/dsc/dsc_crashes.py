@@ -51,9 +51,12 @@ class Robot(Component):
         await super().switch(mode)
 
     @skill(outcomes={"did": {"n": "number"}, "progress": {"n": "number"}}, after_crash="same_id")
-    async def work(self, call, seconds=2.0, reports=0, observes="p"):
+    async def work(self, call, seconds=2.0, reports=0, observes="p", sees=False):
         for n in range(reports):
             await call.clock.sleep(seconds)
+            if sees:
+                call.observe(Delta(added=(Fact("q"),)))
+                continue
             call.report(Outcome("progress", {"n": n}))
         await call.clock.sleep(seconds)
         if call.action_id not in self.done:

@@ -45,6 +45,14 @@ CHARTS = {
           wrong:
           e: {final: true}
     """,
+    "what a skill sees on the way": """
+        plot: p
+        states:
+          a: {entry: [{trigger: robot.work, with: {reports: 1, sees: true}}], always: {to: b, when: (q)}, on: {did: wrong}}
+          b: {entry: [{trigger: robot.work, with: {reports: 1, sees: true}}], on: {did: e}}
+          wrong:
+          e: {final: true}
+    """,
     "two regions": """
         plot: p
         states:

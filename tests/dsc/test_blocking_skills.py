@@ -19,6 +19,7 @@ from dsc.components.functions import component_of
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.skills import skill
 from knowledge_base.errors import InputError
+from knowledge_base.facts import Delta, Fact
 
 
 class Worker(Arm):
@@ -35,6 +36,11 @@ class Worker(Arm):
     def add(self, call, a: float, b: float):
         call.report(Outcome("half"))
         return Outcome("added", {"sum": a + b})
+
+    @skill(outcomes={"ok": {}}, blocking="thread")
+    def sees_and_breaks(self, call):
+        call.observe(Delta(added=(Fact("p"),)))
+        raise RuntimeError("the bus is stuck")
 
     @skill(outcomes={"ok": {}}, blocking="thread")
     def dawdles(self, call):
@@ -112,6 +118,12 @@ def test_a_blocking_skill_runs_in_a_thread_and_reports(run):
     assert outcome == Outcome("added", {"sum": 3})
     assert [one.event for one in reports] == ["half"]
     assert not given_up
+
+
+def test_what_a_thread_has_observed_is_known_even_if_it_breaks():
+    ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.sees_and_breaks}, on: {ok: e}}, e: {final: true}}}", arm=Worker())
+    assert "the bus is stuck" in ran.end.problem
+    assert ran.kb.ask("(p)")
 
 
 def test_what_a_thread_raises_reaches_the_chart():

@@ -13,6 +13,7 @@ from dsc.components.trees import action, condition, fallback, repeat, retry, seq
 from dsc.dynamic.library import Library
 from dsc.sequencer.plot_skill import PlotComponent
 from dsc.validation import validate_plot
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 
 ENDS = {"served": {}, "not_served": {}}
@@ -67,6 +68,22 @@ class Butler(Arm):
         )
 
     @tree_skill("served", "not_served", ENDS)
+    def takes_then(self, call, then=None):
+        take = action("take", lambda: self.try_it(call), {"grasped"})
+        if then == "broken":
+            return sequence(take, action("broken", lambda: self.breaks(call), {"ok"}))
+        return sequence(take, action("wait", lambda: self.try_it(call, "cup2", 1e6), {"grasped"}))
+
+    @tree_skill("served", "not_served", ENDS, period=0.5)
+    def guards(self, call, reactive: bool):
+        closed = condition("closed", lambda: not self.open)
+        return sequence(closed, action("wait", lambda: self.try_it(call, "door", 10.0), {"grasped"}), reactive=reactive)
+
+    @tree_skill("served", "not_served", ENDS)
+    def says_nothing(self, call):
+        return action("mute", lambda: asyncio.sleep(1), {"ok"})
+
+    @tree_skill("served", "not_served", ENDS)
     def raises(self, call):
         return action("broken", lambda: self.breaks(call), {"ok"})
 
@@ -75,7 +92,7 @@ SERVE = """
     plot: p
     emits: {sorry: {}}
     states:
-      a: {entry: {trigger: arm.SKILL}, after: {seconds: LIMIT, to: e}, on: {served: e, not_served: {to: e, emit: sorry}, skill_error: {to: e, emit: sorry}}}
+      a: {entry: {trigger: arm.SKILL}, after: {seconds: LIMIT, to: e}, on: {served: e, not_served: {to: e, emit: sorry}, timed_out: e, skill_error: {to: e, emit: sorry}}}
       e: {final: true}
 """
 
@@ -126,6 +143,44 @@ def test_a_reactive_tree_turns_elsewhere_and_stops_what_it_began():
     ran = Ran(SERVE.replace("SKILL", "watches").replace("LIMIT", "60"), arm=butler, prepare=opens)
     assert ran.at == pytest.approx(3.5)
     assert ran.arm.log == ["try door", "cancelled"]
+
+
+@pytest.mark.parametrize(("then", "limit"), [("broken", 60), ("waits", 60), ("waits", 5)])
+def test_what_an_action_of_a_tree_has_observed_is_known_however_the_tree_ends(then, limit):
+    ran = serve(f"takes_then, with: {{then: {then}}}, within: 20", Butler(), limit)
+    assert ran.end.finished
+    assert ran.kb.ask("(seen cup1)")
+    (known,) = [record for record in ran.records if record.type == "knowledge"]
+    assert (known.t, known.data["author"]) == (pytest.approx(1), "arm")
+
+
+@pytest.mark.parametrize(("reactive", "end"), [(True, "not_served"), (False, "served")])
+def test_a_sequence_asks_conditions_again_if_it_is_reactive(reactive, end):
+    butler = Butler()
+
+    def opens(_):
+        asyncio.get_running_loop().call_later(3.2, setattr, butler, "open", True)
+
+    skill = f"guards, with: {{reactive: {str(reactive).lower()}}}"
+    ran = Ran(SERVE.replace("SKILL", skill).replace("LIMIT", "60"), arm=butler, prepare=opens)
+    assert [event["name"] for event in ran.of_type("event")] == [end]
+    assert ran.at == pytest.approx(3.5 if reactive else 10)
+
+
+@pytest.mark.parametrize(("success", "outcomes", "why"), [
+    ("serve", ENDS, "a tree ends with 'serve', which is not declared; did you mean 'served'"),
+    ("served", {"served": {"item": "item"}, "not_served": {}}, "'served', for whose attributes it has no values"),
+    ("served", ["served"], "the outcomes of a tree are a mapping"),
+])  # fmt: skip
+def test_how_a_tree_ends_is_declared(success, outcomes, why):
+    with pytest.raises(InputError, match=why):
+        tree_skill(success, "not_served", outcomes)
+
+
+def test_an_action_of_a_tree_that_ends_with_no_outcome_is_a_skill_error():
+    ran = serve("says_nothing", Butler())
+    (reason,) = [event["attributes"].get("reason") for event in ran.of_type("event")]
+    assert reason == "arm.says_nothing: InputError: the action 'mute' ended with None, which is no outcome"
 
 
 def test_what_an_action_of_a_tree_raises_is_a_skill_error():
