@@ -211,10 +211,12 @@ class Execution(Performer):
     def _complete(self, frame: Frame, index: int) -> None:
         if index:
             self._done(frame, index, {})
-        elif frame.parent is None:
+            return
+        outputs = {name: frame.variables[name] for name in frame.compiled.plot.outputs}
+        if frame.parent is None:
             self.finished = True
+            self.outputs = outputs
         else:
-            outputs = {name: frame.variables[name] for name in frame.compiled.plot.outputs}
             self._done(frame.parent, frame.parent.compiled.index[frame.host], outputs)
 
     def _done(self, frame: Frame, index: int, outputs: Mapping[str, Any]) -> None:

@@ -75,6 +75,7 @@ class Macrostep(Execution):
             tuple(self.output),
             tuple(self.emitted),
             tuple(self.errors),
+            self.outputs,
         )
 
     def _rest(self) -> None:

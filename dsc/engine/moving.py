@@ -8,7 +8,7 @@ from __future__ import annotations
 from dsc.engine.choice import Choice, Question
 from dsc.engine.reaction import Reaction
 from dsc.engine.situation import Situation
-from dsc.engine.state import FrameState, MachineState, at_rest
+from dsc.engine.state import NOTHING, FrameState, MachineState, at_rest
 from dsc.engine.steps import NO_CHANGE, Microstep, Step
 from dsc.events import Event
 from knowledge_base.errors import InputError
@@ -36,7 +36,7 @@ def move(state: MachineState, root: FrameState, event: Event, situation: Situati
         frame = _new(FrameState, (serial, compiled, following, variables, activations, children, kept))
         after = _new(MachineState, (frame, state.serials, False))
     micro = _new(Microstep, (event, choice.taken, choice.exited, choice.entered, ()))
-    step = _new(Step, (after, event, True, (micro,), (), NO_CHANGE, (), (), ()))
+    step = _new(Step, (after, event, True, (micro,), (), NO_CHANGE, (), (), (), NOTHING))
     if before.bare is state and before.choices[event.name] is choice:
         before.steps[event.name] = step
     return step

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
+from typing import Any
 
+from dsc.engine.state import NOTHING
 from dsc.engine.steps import NO_CHANGE, Bound, DecisionMade, Microstep, Output, Taken
 from dsc.events import Event
 
@@ -14,12 +17,13 @@ class Record:
     Attributes:
         serials: the last serial number given out.
         internal: events that the chart has still to take.
+        outputs: what the outermost plot hands back, once it has reached its end.
         exited, entered, bound: of the microstep that is going on.
     """
 
     __slots__ = (
         "bound", "decisions", "emitted", "entered", "errors", "exited", "internal", "knowledge", "microsteps",
-        "output", "serials",
+        "output", "outputs", "serials",
     )  # fmt: skip
 
     def __init__(self, serials: int) -> None:
@@ -31,6 +35,7 @@ class Record:
         self.emitted: list[Event] = []
         self.errors: list[str] = []
         self.knowledge = NO_CHANGE
+        self.outputs: Mapping[str, Any] = NOTHING
         self.exited: list[str] = []
         self.entered: list[str] = []
         self.bound: list[Bound] = []

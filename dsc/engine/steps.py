@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from dsc.engine.situation import Decision
-from dsc.engine.state import MachineState
+from dsc.engine.state import NOTHING, MachineState
 from dsc.events import AFTER, Event
 from dsc.model.plot import ActionPlot
 from knowledge_base.facts import Delta
@@ -162,6 +162,7 @@ class Step(NamedTuple):
         output: external actions and timers, in order.
         emitted: outcome events of the outermost plot.
         errors: actions or guards that could not be evaluated and that no transition on `error` took.
+        outputs: what the outermost plot hands back, as it has reached its end with this step.
     """
 
     state: MachineState
@@ -173,6 +174,7 @@ class Step(NamedTuple):
     output: tuple[Output, ...] = ()
     emitted: tuple[Event, ...] = ()
     errors: tuple[str, ...] = ()
+    outputs: Mapping[str, Any] = NOTHING
 
     @property
     def moved(self) -> bool:

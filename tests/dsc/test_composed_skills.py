@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 from dsc_charts import plot
-from dsc_runs import Arm, Ran
+from dsc_runs import SCHEMA, Arm, Ran
 
 from dsc.calls import Outcome
 from dsc.components.trees import action, condition, fallback, repeat, retry, sequence, tree_skill
@@ -15,6 +15,7 @@ from dsc.sequencer.plot_skill import PlotComponent
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
+from knowledge_base.store import KnowledgeBase
 
 ENDS = {"served": {}, "not_served": {}}
 
@@ -223,6 +224,36 @@ def test_a_plot_can_be_a_skill():
     assert ran.end.finished
     assert ran.end.emitted[0].attributes == {"item": "cup7"}
     assert ran.at == pytest.approx(5)
+
+
+SEEK = """
+    plot: seek
+    outputs: {seen: {type: number, initial: 0}}
+    emits: {glimpse: {n: number}, over: {}}
+    states:
+      a:
+        entry: {trigger: arm.look, with: {glimpses: 2}}
+        on:
+          glimpse: {assign: {seen: (+ ?seen 1)}, emit: glimpse, with: {n: ?event.n}}
+          found: {to: e, emit: over}
+      e: {final: true}
+"""
+
+
+def test_what_a_plot_that_is_a_skill_emits_on_the_way_comes_at_once_and_its_outputs_at_the_end():
+    ran = Ran(
+        """
+        plot: p
+        emits: {told: {seen: number}}
+        states:
+          a: {entry: {trigger: helper.seek}, on: {glimpse: {}, over: {}, completed: {to: e, emit: told, with: {seen: ?event.seen}}}}
+          e: {final: true}
+        """,
+        arm=PlotComponent("helper", Library([plot(SEEK)]), [Arm()], lambda: KnowledgeBase(SCHEMA)),
+    )
+    events = [(record.data["name"], record.t) for record in ran.records if record.type == "event"]
+    assert events == [("glimpse", 1), ("glimpse", 2), ("over", 3), ("completed", 3)]
+    assert ran.end.emitted[0].attributes == {"seen": 2}
 
 
 def test_a_plot_that_is_a_skill_is_left_when_it_is_cancelled():

@@ -5,15 +5,20 @@ from __future__ import annotations
 import asyncio
 
 import pytest
+from dsc_charts import plot
 from dsc_crashes import Crashes, Robot, Run, copied
+from dsc_runs import SCHEMA
 
 from dsc.blocking import BlockingCall
 from dsc.calls import Outcome
 from dsc.components.ports import event, query, takes
 from dsc.components.trees import action, sequence, tree_skill
+from dsc.dynamic.library import Library
 from dsc.events import Event
+from dsc.sequencer.plot_skill import PlotComponent
 from dsc.skills import skill
 from knowledge_base.facts import Delta, Fact
+from knowledge_base.store import KnowledgeBase
 
 
 class Station(Robot):
@@ -220,6 +225,41 @@ def test_blocking_skills_and_behaviour_trees_are_done_again_if_they_say_so(tmp_p
     assert whole.whole.end.finished
     for what, run in whole.resumed():
         assert (run.end, run.facts, run.robot.done) == (whole.whole.end, whole.whole.facts, whole.whole.robot.done), what
+
+
+class Composed(PlotComponent):
+    """Works twice, and says so in between."""
+
+    def __init__(self, done=(), crash=lambda: None):
+        self.inside = Robot(done, crash)
+        twice = plot("""
+            plot: twice
+            emits: {half: {n: number}}
+            states:
+              a: {entry: {trigger: robot.work}, on: {did: {to: b, emit: half, with: {n: ?event.n}}}}
+              b: {entry: {trigger: robot.work}, on: {did: e}}
+              e: {final: true}
+        """)
+        super().__init__("robot", Library([twice]), [self.inside], lambda: KnowledgeBase(SCHEMA), after_crash="repeat")
+
+    @property
+    def done(self):
+        return self.inside.done
+
+
+def test_a_plot_that_is_a_skill_is_done_again_if_it_says_so(tmp_path):
+    whole = Crashes(tmp_path, """
+        plot: p
+        variables: {halves: {type: number, initial: 0}}
+        states:
+          a: {entry: {trigger: robot.twice}, on: {half: {assign: {halves: (+ ?halves 1)}}, completed: [{to: e, when: (= ?halves 1)}, wrong]}}
+          wrong:
+          e: {final: true}
+    """, make=Composed)
+    assert whole.whole.end.finished
+    assert list(whole.whole.robot.done.values()) == [1, 2]
+    for what, run in whole.resumed():
+        assert (run.end, run.robot.done) == (whole.whole.end, whole.whole.robot.done), what
 
 
 def test_a_skill_that_was_not_believed_is_stopped_even_if_the_crash_came_first(tmp_path):
