@@ -217,7 +217,7 @@ def _child(
     call = BlockingCall(action_id, lambda outcome: theirs.send(("report", outcome)), seconds)
     try:
         theirs.send(("ended", body(call, **arguments)))
-    except Exception as error:  # noqa: BLE001  # whatever it is goes to the parent, in words
+    except (Exception, SystemExit) as error:  # noqa: BLE001  # whatever it is goes to the parent, in words
         theirs.send(("error", f"{type(error).__name__}: {error}"))
 
 

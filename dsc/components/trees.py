@@ -148,7 +148,10 @@ class _Action(Behaviour):
         self._task = asyncio.ensure_future(self._carry_out())
 
     async def _carry_out(self) -> Outcome:
-        outcome = await self._begin()
+        try:
+            outcome = await self._begin()
+        except SystemExit as error:  # would end the program with the task
+            raise RuntimeError(f"SystemExit: {error}") from error
         if not isinstance(outcome, Outcome):
             raise InputError(f"the action '{self.name}' ended with {shown(outcome)}, which is no outcome")
         if outcome.observed:

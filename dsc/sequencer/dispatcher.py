@@ -207,7 +207,7 @@ class Dispatcher:
         try:
             async with asyncio.timeout(CLOSING):
                 ended = await component.abandon(action_id, start.skill, encoded(start.arguments))
-        except Exception as error:  # whatever a component does wrong must not end the program
+        except (Exception, SystemExit) as error:  # whatever a component does wrong must not end the program
             why = f"{type(error).__name__}: {error}"
             raise InputError(f"{start.component}.{start.skill} may still go on: {why}") from error
         if ended is not None:
@@ -297,10 +297,16 @@ class Dispatcher:
             if _cancelled_from_outside():
                 raise
             return broken(start, "CancelledError: it cancelled itself")
-        except Exception as error:  # noqa: BLE001  # whatever a skill does wrong must not end the run
-            if limit.expired or isinstance(error, DeadlineError):
-                return late(start, within)
-            return broken(start, f"{type(error).__name__}: {error}")
+        except (KeyboardInterrupt, GeneratorExit):
+            raise
+        except BaseException as error:  # noqa: BLE001  # whatever a skill does wrong, `sys.exit` too, must not end the run
+            return self._raised(start, error, limit, within)
+
+    @staticmethod
+    def _raised(start: Start, error: BaseException, limit: TimeLimit, within: float) -> Outcome:
+        if limit.expired or isinstance(error, DeadlineError):
+            return late(start, within)
+        return broken(start, f"{type(error).__name__}: {error}")
 
     async def _ready(self, component: Component, start: Start) -> list[Component]:
         """Wait until the skill can begin; gives what has to stay alive meanwhile."""

@@ -65,8 +65,10 @@ class Telling:
         async def taking() -> None:
             try:
                 await take()
-            except Exception:
+            except (Exception, SystemExit) as error:
                 self._refused.extend(numbers.values())
+                if isinstance(error, SystemExit):  # would end the program with the task
+                    raise RuntimeError(f"SystemExit: {error}") from error
                 raise
             finally:
                 for number in numbers:

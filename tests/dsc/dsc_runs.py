@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import threading
 
 from dsc_charts import plot
 
+from dsc.blocking import StoppedError
 from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
@@ -80,6 +82,10 @@ class Arm(Component):
             raise RuntimeError("the gripper is stuck")
         if how == "timeout":
             raise TimeoutError("the bus does not answer")
+        if how == "exit":
+            sys.exit("the driver says no")
+        if how == "base":
+            raise StoppedError("of no usual kind")
         if how == "cancel":
             raise asyncio.CancelledError
         if how == "undeclared":

@@ -83,6 +83,10 @@ class Far(Component):
         raise RuntimeError("the bus is stuck")
 
     @skill(outcomes={"ok": {}}, blocking="process")
+    def exits(self, call):
+        sys.exit("no driver")
+
+    @skill(outcomes={"ok": {}}, blocking="process")
     def dies(self, call):
         os._exit(7)
 
@@ -172,7 +176,7 @@ def test_a_blocking_skill_runs_in_a_process_and_reports():
     assert reports == [Outcome("begun", {"n": 3})]
 
 
-@pytest.mark.parametrize(("name", "why"), [("raises", "RuntimeError: the bus is stuck"), ("dies", "exit code 7")])
+@pytest.mark.parametrize(("name", "why"), [("raises", "RuntimeError: the bus is stuck"), ("dies", "exit code 7"), ("exits", "SystemExit: no driver")])
 def test_what_goes_wrong_in_a_process_is_told(name, why):
     with pytest.raises(RuntimeError, match=why):
         execute(Far(), name)

@@ -85,8 +85,8 @@ class Butler(Arm):
         return action("mute", lambda: asyncio.sleep(1), {"ok"})
 
     @tree_skill("served", "not_served", ENDS)
-    def raises(self, call):
-        return action("broken", lambda: self.breaks(call), {"ok"})
+    def raises(self, call, how: str = "raise"):
+        return action("broken", lambda: self.breaks(call, how), {"ok"})
 
 
 SERVE = """
@@ -184,9 +184,10 @@ def test_an_action_of_a_tree_that_ends_with_no_outcome_is_a_skill_error():
     assert reason == "arm.says_nothing: InputError: the action 'mute' ended with None, which is no outcome"
 
 
-def test_what_an_action_of_a_tree_raises_is_a_skill_error():
-    ran = serve("raises", Butler())
-    assert any("the gripper is stuck" in event["attributes"].get("reason", "") for event in ran.of_type("event"))
+@pytest.mark.parametrize(("how", "reason"), [("raise", "the gripper is stuck"), ("exit", "SystemExit: the driver says no")])
+def test_what_an_action_of_a_tree_raises_is_a_skill_error(how, reason):
+    ran = serve(f"raises, with: {{how: {how}}}", Butler())
+    assert any(reason in event["attributes"].get("reason", "") for event in ran.of_type("event"))
 
 
 # -- plots as skills ---------------------------------------------------------------------------------------

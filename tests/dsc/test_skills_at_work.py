@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import sys
 
 import pytest
 from dsc_runs import SLOW, Arm, Ran
@@ -154,6 +155,8 @@ BREAKS = """
     [
         ("raise", "RuntimeError: the gripper is stuck"),
         ("timeout", "TimeoutError: the bus does not answer"),
+        ("exit", "SystemExit: the driver says no"),
+        ("base", "StoppedError: of no usual kind"),
         ("cancel", "CancelledError"),
         ("undeclared", "'splendid', which it does not declare"),
         ("nothing", "None"),
@@ -430,6 +433,28 @@ def test_a_component_that_cannot_be_configured_fails_the_skill_that_needs_it():
     assert ran.end.finished
     assert ran.arm.log == ["approach=side", "grasp cup1"]
     assert "cannot be set" in ran.of_type("event")[0]["attributes"]["reason"]
+
+
+def test_a_component_that_exits_while_it_is_configured_fails_the_skill_that_needs_it():
+    class Exits(Arm):
+        async def configure(self, parameter, value):
+            sys.exit("no driver")
+
+    text = "{plot: p, states: {a: {entry: [{set: arm.speed, to: 1}, {trigger: arm.grasp}], on: {grasped: x, skill_error: e}}, x: {}, e: {final: true}}}"
+    ran = Ran(text, arm=Exits())
+    assert ran.end.finished
+    (event,) = ran.of_type("event")
+    assert event["attributes"]["reason"] == "arm.grasp: RuntimeError: SystemExit: no driver"
+
+
+def test_ctrl_c_goes_through_whoever_runs_then():
+    class Interrupted(Arm):
+        @skill(outcomes={"ok": {}})
+        async def go(self, call):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Ran(BREAKS.replace("arm.breaks, with: {how: HOW}", "arm.go"), arm=Interrupted())
 
 
 def test_a_component_that_is_for_ever_being_configured_is_timed_out():
