@@ -18,6 +18,7 @@ import threading
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -27,6 +28,8 @@ from knowledge_base.facts import Delta
 
 STOPPING = 2.0
 """Real seconds for a body that was told to stop."""
+_KILLING = 3
+"""How often `STOPPING` passes until a process is left alone: first it is told to end, then it is killed."""
 _POLL = 0.02
 """Real seconds after which a body's supervisor looks again whether it shall stop."""
 _PR_SET_PDEATHSIG = 1
@@ -78,7 +81,7 @@ async def in_thread(body: Callable[..., Outcome], call: SkillCall, arguments: Ma
         DeadlineError: the deadline has passed.
     """
     blocking = _blocking(call)
-    return await _supervised(lambda: body(blocking, **arguments), blocking, call)
+    return await _supervised(lambda: body(blocking, **arguments), blocking, call, "thread", STOPPING)
 
 
 async def in_process(
@@ -90,7 +93,8 @@ async def in_process(
         RuntimeError: the body raised, or its process ended by itself.
     """
     blocking = _blocking(call)
-    return await _supervised(lambda: _in_child(body, name, blocking, arguments), blocking, call)
+    work = partial(_in_child, body, name, blocking, arguments)
+    return await _supervised(work, blocking, call, "process", _KILLING * STOPPING)
 
 
 def _blocking(call: SkillCall) -> BlockingCall:
@@ -102,8 +106,13 @@ def _blocking(call: SkillCall) -> BlockingCall:
     return BlockingCall(call.action_id, report, call.remaining)
 
 
-async def _supervised(work: Callable[[], Outcome], blocking: BlockingCall, call: SkillCall) -> Outcome:
-    """Run work in a daemon thread; tell it to stop when we are cancelled or its time is over."""
+async def _supervised(
+    work: Callable[[], Outcome], blocking: BlockingCall, call: SkillCall, what: str, stopping: float
+) -> Outcome:
+    """Run work in a daemon thread; tell it to stop when we are cancelled or its time is over.
+
+    If it has not stopped after `stopping` real seconds, `what` the body runs in is left alone, and that is said.
+    """
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[Outcome] = loop.create_future()
 
@@ -123,10 +132,10 @@ async def _supervised(work: Callable[[], Outcome], blocking: BlockingCall, call:
 
     def stop() -> None:
         blocking.stopping.set()
-        watchers.append(_later(STOPPING, lambda: post(leave_alone, None)))
+        watchers.append(_later(stopping, lambda: post(leave_alone, None)))
 
     def leave_alone(_: None) -> None:
-        call.give_up(f"the thread of action '{call.action_id}' went on for {STOPPING:g} s after it was told to stop")
+        call.give_up(f"the {what} of action '{call.action_id}' went on for {stopping:g} s after it was told to stop")
         ended.set_exception(DeadlineError())
 
     watchers: list[threading.Timer] = []
@@ -206,7 +215,7 @@ def _end(process: BaseProcess) -> None:
     process.join(STOPPING)
     if process.is_alive():
         process.kill()
-        process.join()
+        process.join()  # where it hangs in a device, even that takes its time: we are left alone then
     process.close()
 
 

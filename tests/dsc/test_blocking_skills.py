@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -89,6 +90,13 @@ class Far(Component):
     @skill(outcomes={"ok": {}}, blocking="process")
     def dies(self, call):
         os._exit(7)
+
+    @skill(outcomes={"ok": {}, "begun": {}}, blocking="process")
+    def stubborn(self, call):
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        call.report(Outcome("begun"))
+        time.sleep(3600)
+        return Outcome("ok")
 
     @skill(outcomes={"ok": {}}, blocking="process")
     def sleeps(self, call):
@@ -217,6 +225,29 @@ def test_a_process_ends_with_the_program_however_that_dies(tmp_path, blocks):
         assert running.stdout.readline() == b"begun\n"
         running.kill()
         assert running.communicate(timeout=60) == (b"", None)  # the end of what all of its processes write to
+
+
+def test_a_process_that_does_not_end_when_it_is_told_to_is_killed_and_nothing_goes_on(monkeypatch):
+    monkeypatch.setattr(blocking, "STOPPING", 0.2)
+    reports, given_up = [], []
+
+    async def main():
+        begun = asyncio.Event()
+
+        def report(outcome):
+            reports.append(outcome)
+            begun.set()
+
+        call = SkillCall("a1.0", LoopClock(), report, give_up=given_up.append)
+        task = asyncio.ensure_future(Far().execute("stubborn", call, {}))
+        await begun.wait()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    run_real(main())
+    assert [one.event for one in reports] == ["begun"]
+    assert not given_up
 
 
 # -- skills that do not stop -------------------------------------------------------------------------------
