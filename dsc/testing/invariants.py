@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from dsc.dynamic.library import Library
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_tables import StepRow, archive
 from dsc.trace import Record
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
 from knowledge_base.store import KnowledgeBase
 
@@ -78,8 +80,17 @@ def comes_to_an_end(seconds: float) -> Invariant:
 
 
 def executed_once(executed: Iterable[str]) -> Invariant:
-    """What the robot did, by action id, was committed before, and is done once."""
-    counts = Counter(iter(executed))
+    """What the robot did, by action id, was committed before, and is done once.
+
+    Args:
+        executed: an id for each time that something was done.
+
+    Raises:
+        InputError: it is a mapping or a set, in which no action could stand twice.
+    """
+    if isinstance(executed, Mapping | AbstractSet):
+        raise InputError(f"what was done is told in order, each time anew; a {type(executed).__name__} has an id once")
+    counts = Counter(executed)
 
     def invariant(run: KeptRun) -> Iterable[str]:
         started = Counter(run.started)

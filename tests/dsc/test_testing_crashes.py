@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 
 import pytest
@@ -53,16 +54,28 @@ class Robot(Component):
         return Outcome("did", observed=Delta(added=(Fact("p"),)))
 
 
+class Forgetful(Robot):
+    """Says that it does each id once, and does it whenever it is asked to."""
+
+    @skill(outcomes={"did": {}}, after_crash="same_id")
+    async def work(self, call):
+        await call.clock.sleep(2)
+        with self._file.open("a") as file:
+            file.write(f"{call.action_id}\n")
+        return Outcome("did", observed=Delta(added=(Fact("p"),)))
+
+
 class Lives:
     """A run of the chart that lives on in folders."""
 
-    def __init__(self, folder, seed, chance, most=3):
+    def __init__(self, folder, seed, chance, most=3, robot=Robot):
+        self.robot = robot
         self.crashes = Crashes(folder, seed, chance, most)
         self.begun = 0
 
     def live(self, folder):
         self.begun += 1
-        store, robot = folder / "run.kb", self.crashes.inject(Robot(folder))
+        store, robot = folder / "run.kb", self.crashes.inject(self.robot(folder))
         goes_on = is_unfinished(store)
         if has_run(store) and not goes_on:
             return None
@@ -104,6 +117,17 @@ def test_wherever_a_run_is_killed_it_comes_to_the_same_end(tmp_path):
         "killed before commit", "killed after commit", "killed after an action", "disk full after commit",
         "overtaken after commit", "overtaken after an action",
     }  # fmt: skip
+
+
+def test_an_action_that_a_robot_does_again_is_seen(tmp_path):
+    wrong = []
+    for seed in range(25):
+        (folder := tmp_path / str(seed)).mkdir()
+        lives = Lives(folder, seed, 0.1, robot=Forgetful)
+        lives.crashes.survive(lives.live)
+        wrong += lives.judged()
+    assert wrong
+    assert all(re.search(r"was executed [2-9] times", one) for one in wrong)
 
 
 def test_without_a_chance_nothing_happens(tmp_path):

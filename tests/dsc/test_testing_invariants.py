@@ -18,7 +18,7 @@ from dsc.testing import (
     replays,
     violations,
 )
-from knowledge_base import StoreError, fact
+from knowledge_base import InputError, StoreError, fact
 
 CHART = """
     plot: chart
@@ -43,7 +43,7 @@ def changed(store, *statements):
 def test_all_hold_of_a_run_that_went_well(run):
     facts = [fact("p"), fact("q")]
     invariants = [
-        comes_to_an_end(4), executed_once(run.robot.done), knows(facts, ["p", "q"]), one_history, replays(),
+        comes_to_an_end(4), executed_once(list(run.robot.done)), knows(facts, ["p", "q"]), one_history, replays(),
         claims_nothing_false(lambda _: True, reached=True), claims_nothing_false(lambda _: False, reached=False),
     ]  # fmt: skip
     assert violations(run.path, invariants) == []
@@ -70,6 +70,12 @@ def test_a_run_is_looked_at_as_it_is(run):
 )
 def test_what_is_wrong_is_said(run, invariant, wrong):
     assert any(wrong in one for one in violations(run.path, [invariant]))
+
+
+@pytest.mark.parametrize("executed", [{"a1.0": "cup1"}, {"a1.0": "cup1"}.keys(), {"a1.0"}])
+def test_what_was_executed_is_not_told_in_a_way_that_has_no_place_for_a_second_time(executed):
+    with pytest.raises(InputError, match="has an id once"):
+        executed_once(executed)
 
 
 def test_a_run_that_has_not_ended_is_told_from_one_that_has(run):
