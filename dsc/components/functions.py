@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from dsc.components.component import Component
-from dsc.skills import DECLARED, SkillBody, SkillSignature, signature_of
+from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError
 from knowledge_base.language.inputs import shown
 
@@ -30,15 +30,18 @@ class _OfFunctions(Component):
     def __init__(self, name: str, functions: Mapping[str, SkillBody]) -> None:
         super().__init__(name)
         self._functions = functions
+        self._signatures = {skill: _signature(self.name, skill, function) for skill, function in functions.items()}
 
     def skills(self) -> dict[str, SkillSignature]:
-        """The signatures of the functions, which have no `self`."""
-        declared = {name: getattr(function, DECLARED) for name, function in self._functions.items()}
-        return {
-            name: signature_of(self.name, name, function, replace(declared[name], own=declared[name].own - 1))
-            for name, function in self._functions.items()
-        }
+        """The signatures of the functions."""
+        return dict(self._signatures)
 
     def body(self, skill_name: str) -> SkillBody:
         """The function."""
         return self._functions[skill_name]
+
+
+def _signature(component: str, name: str, function: SkillBody) -> SkillSignature:
+    """As of a method, but for `self`, which a function has not."""
+    declared: Declared = getattr(function, DECLARED)
+    return signature_of(component, name, function, replace(declared, own=declared.own - 1))

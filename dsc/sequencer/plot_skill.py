@@ -54,7 +54,7 @@ class PlotComponent(Component):
 
     def skills(self) -> dict[str, SkillSignature]:
         """A signature for each plot."""
-        return self._signatures
+        return dict(self._signatures)
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
         """Run the plot to its end; what it emits on the way is reported. Cancelled, it leaves its states.
