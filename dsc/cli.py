@@ -170,6 +170,30 @@ def diff(
 
 
 @app.command()
+def clone(
+    file: Annotated[Path, typer.Argument(metavar="PLOT", help="A plot file (YAML); what it uses is in its folder.")],
+    prefix: Annotated[str, typer.Option("--prefix", metavar="X", help="Stands before all new names.")],
+    into: Annotated[
+        Path | None, typer.Option("--into", metavar="FOLDER", help="Where the clones go.  [default: beside PLOT]")
+    ] = None,
+    profile: Annotated[
+        list[Path] | None, typer.Option("--profile", metavar="P.yaml", help="A profile to be cloned with them.")
+    ] = None,
+) -> None:
+    """Clone a plot for another robot, with all plots that it depends on; clones that were made before are used."""
+    from dsc.text.cloning import clone_files
+
+    found = clone_files(file, prefix, into, profile or ())
+    for target in {target.parent for target in found.texts}:
+        target.mkdir(parents=True, exist_ok=True)
+    for target, text in found.texts.items():
+        _write(str(target), text)
+        typer.echo(f"made {target}")
+    for target in found.kept:
+        typer.echo(f"kept {target}, which was made before")
+
+
+@app.command()
 def schema(
     profile: Annotated[bool, typer.Option("--profile", help="That of profiles instead.")] = False,
 ) -> None:

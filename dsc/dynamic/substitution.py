@@ -20,14 +20,20 @@ def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
     Raises:
         SchemaError: a holder of the original could not hold the substitute.
     """
-    _check(original, substitute)
+    require_stand_in(original, substitute)
     role = {key: getattr(original, key) for key in _ROLE if key not in substitute.model_fields_set}
     emits = {**original.emits, **substitute.emits}
     return substitute.model_copy(update={"name": original.name, "emits": emits, **role})
 
 
-def _check(original: ActionPlot, substitute: ActionPlot) -> None:
-    """Who holds the original gives all of its parameters, or only the required ones, and wires its outcomes."""
+def require_stand_in(original: ActionPlot, substitute: ActionPlot) -> None:
+    """Raise an error unless who holds the original could hold the substitute.
+
+    Holders give all parameters of the original, or only the required ones, and wire its outcomes.
+
+    Raises:
+        SchemaError: see above; the message says what does not fit.
+    """
     for name, parameter in original.parameters.items():
         own = substitute.parameters.get(name)
         if own is None:

@@ -8,7 +8,7 @@ from typing import Any
 from dsc.model.profile import Profile
 from dsc.text.files import read_file
 from dsc.text.form import read_model
-from dsc.text.yaml import load_document
+from dsc.text.yaml import dump, load_document
 from knowledge_base.errors import InputError
 
 
@@ -25,6 +25,11 @@ def parse_profile(text: str, source: str | None = None) -> Profile:
 def load_profile(path: Path | str) -> Profile:
     """Read a profile file; see `parse_profile`."""
     return parse_profile(read_file(path), str(path))
+
+
+def profile_to_yaml(profile: Profile) -> str:
+    """The profile as YAML; reading it gives the same profile."""
+    return dump(profile.model_dump(mode="json", by_alias=True, exclude_defaults=True))
 
 
 def find_profile(name: str, folder: Path) -> Profile:

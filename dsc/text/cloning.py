@@ -1,0 +1,122 @@
+"""Files of plots cloned for another robot; comments and layout stay (S2.10)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from dsc.dynamic.cloning import cloned, cloned_profile, references
+from dsc.dynamic.library import Library
+from dsc.model.plot import ActionPlot
+from dsc.model.plot import Path as FormPath
+from dsc.text.files import read_file
+from dsc.text.neighbours import Neighbours
+from dsc.text.plots import load_plot, parse_plot, plot_to_yaml
+from dsc.text.profiles import load_profile, profile_to_yaml
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
+
+_KEY = r"""["']?[\w\-]+["']?\s*:\s*"""
+
+
+@dataclass(frozen=True, slots=True)
+class Clones:
+    """What cloning comes to; nothing has been written yet.
+
+    Attributes:
+        texts: what is to be written where.
+        kept: files with clones that were made before, which stay as they are.
+    """
+
+    texts: Mapping[Path, str]
+    kept: tuple[Path, ...]
+
+
+def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Sequence[Path] = ()) -> Clones:
+    """A plot file cloned with all that it depends on.
+
+    Args:
+        file: a plot; what it depends on is in its folder.
+        prefix: stands before the names of clones and of their files.
+        into: the folder for them, if it is another one; see `dsc.dynamic.cloning.cloned` for what that means.
+        profiles: files that say what parameters of the plots are worth; their clones say it of the clones.
+
+    Raises:
+        InputError: a file cannot be read or is there already, a plot uses one that is not there, the prefix makes no
+            name, or a clone that was made before does not fit any more.
+    """
+    if not re.fullmatch(r"[a-zA-Z_][\w\-]*", prefix):
+        raise SchemaError(f"no name begins with '{prefix}': letters, digits, _ and -, a letter first", found=prefix)
+    folder = file.parent if into is None else into
+    apart = folder.resolve() != file.parent.resolve()
+    plot = load_plot(file)
+    library, broken = Neighbours().of(file, plot)
+    there = dict(_plots_in(folder))
+    made = Library(there.values())
+    if not apart:
+        library = Library({one.name: one for one in (*library, *made)}.values())
+    try:
+        clones = cloned(plot, library, prefix, made=made if apart else None)
+    except UnknownNameError as error:  # the plot that is not there may be in a file that cannot be read
+        raise (broken or [error])[0] from None
+    new = {clone.name: clone for clone in clones}
+    names = {one.name: prefix + one.name for one in library if prefix + one.name in (*new, *(p.name for p in made))}
+    originals = {name: library.plot(old) for old, name in names.items() if name in new}
+    texts = {folder / f"{prefix}{_stem(one)}.yaml": _text(one, new[name], names) for name, one in originals.items()}
+    for target in texts:
+        if target.exists():
+            raise InputError("the file is there already, and holds no clone", place=Place(str(target)))
+    for profile in profiles:
+        told = cloned_profile(load_profile(profile), prefix, names)
+        if not (folder / f"{prefix}{profile.name}").exists():
+            texts[folder / f"{prefix}{profile.name}"] = profile_to_yaml(told)
+    kept = [path for path, one in there.items() if one.name in names.values()]
+    kept += [folder / f"{prefix}{one.name}" for one in profiles if folder / f"{prefix}{one.name}" not in texts]
+    return Clones(texts, tuple(kept))
+
+
+def _plots_in(folder: Path) -> Iterator[tuple[Path, ActionPlot]]:
+    """Those that can be read."""
+    for file in sorted(folder.glob("*.yaml")):
+        with suppress(InputError):
+            yield file, load_plot(file)
+
+
+def _stem(plot: ActionPlot) -> str:
+    place = plot.place(("plot",))
+    return Path(place.source).stem if place is not None and place.source else plot.name
+
+
+def _text(original: ActionPlot, clone: ActionPlot, names: Mapping[str, str]) -> str:
+    """The original's text with other names, if that is how the clone is read; else the clone's own."""
+    place = original.place(("plot",))
+    if place is not None and place.source:
+        text = _substituted(read_file(place.source), original, names)
+        lost = [key for key in original.to_form() if key not in clone.to_form()]
+        text = "".join(line for line in text.splitlines(keepends=True) if line.partition(":")[0] not in lost)
+        with suppress(InputError):
+            if parse_plot(text).text == clone.text:
+                return text
+    return plot_to_yaml(clone)
+
+
+def _substituted(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
+    """The text with other names of plots, as far as they are found where they were read; from behind, as they move."""
+    lines = text.splitlines(keepends=True)
+    for line, column, path, old in sorted(_written(plot), key=lambda one: one[:2], reverse=True):
+        key = _KEY if isinstance(path[-1], str) else ""
+        before, rest = lines[line - 1][: column - 1], lines[line - 1][column - 1 :]
+        found = re.match(rf"""({key}["']?){re.escape(old)}(?![\w\-#.])""", rest)
+        if found is not None:
+            lines[line - 1] = before + found[1] + names.get(old, old) + rest[found.end() :]
+    return "".join(lines)
+
+
+def _written(plot: ActionPlot) -> Iterator[tuple[int, int, FormPath, str]]:
+    """Line and column of each name of a plot, the path there, and the name."""
+    for path, name in ((("plot",), plot.name), *references(plot)):
+        place = plot.place(path)
+        if place is not None and place.line is not None and place.column is not None:
+            yield place.line, place.column, path, name
