@@ -167,15 +167,14 @@ def _viewed(
     from dsc.viewer.cli import page, until_interrupt, viewer_installed
 
     viewer_installed()
-    from dsc.viewer.control import Control
-    from dsc.viewer.records import RecordLog
+    from dsc.viewer.entrance import Entrance
+    from dsc.viewer.live import LivePage
 
-    log = RecordLog(header(**deployed.header()), live=True)
-    deployed.executive.listen(log.hear)
-    hands = Control(log.wake) if control else None
-    with page(log, hands, port, opens=opens) as viewer:
-        report = follow(prepare=hands.attach if hands else None)
-        log.end()
+    live = LivePage(header(**deployed.header()), Entrance.on(port), control=control)
+    deployed.executive.listen(live.hear)
+    with page(live, opens=opens) as viewer:
+        report = follow(prepare=live.control.attach if live.control else None)
+        live.end()
         _print(report, as_json=bool(follow.keywords["quiet"]))
         if wait:
             until_interrupt(viewer)

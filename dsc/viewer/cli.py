@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Protocol, TypeVar
 
 import typer
-
-if TYPE_CHECKING:
-    from dsc.viewer.control import Control
-    from dsc.viewer.records import RecordLog
-    from dsc.viewer.server import Viewer
 
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Where to listen on this machine; 0 picks a free port.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
@@ -25,35 +20,50 @@ def view_command(
 ) -> None:
     """Look at a recorded run, or at a store as others change it, in the browser; Ctrl-C ends it."""
     viewer_installed()
+    from dsc.viewer.entrance import Entrance
     from dsc.viewer.opening import records_of
+    from dsc.viewer.server import Viewer
 
-    with records_of(file) as log, page(log, None, port, opens=not no_open) as viewer:
+    with records_of(file) as log, page(Viewer(log, Entrance.on(port)), opens=not no_open) as viewer:
         until_interrupt(viewer)
 
 
+class Page(Protocol):
+    """What answers at an address from `start` to `close`."""
+
+    @property
+    def url(self) -> str:
+        """What to open."""
+
+    def start(self) -> None:
+        """Answer from now on."""
+
+    def wait(self) -> None:
+        """Until it is closed; an interrupt gets through."""
+
+    def close(self) -> None:
+        """Answer no longer."""
+
+
+P = TypeVar("P", bound=Page)
+
+
 @contextmanager
-def page(log: RecordLog, control: Control | None, port: int, *, opens: bool) -> Iterator[Viewer]:
-    """The page in a browser, while the block lasts; its address is printed first.
-
-    Raises:
-        InputError: the port is taken.
-    """
-    from dsc.viewer.server import Viewer
-
-    viewer = Viewer(log, control, port)
-    viewer.start()
-    typer.echo(viewer.url)
+def page(shown: P, *, opens: bool) -> Iterator[P]:
+    """A page in a browser, while the block lasts; its address is printed first."""
+    shown.start()
+    typer.echo(shown.url)
     if opens:
         import webbrowser
 
-        webbrowser.open(viewer.url)
+        webbrowser.open(shown.url)
     try:
-        yield viewer
+        yield shown
     finally:
-        viewer.close()
+        shown.close()
 
 
-def until_interrupt(viewer: Viewer) -> None:
+def until_interrupt(viewer: Page) -> None:
     """The page stays there until Ctrl-C."""
     typer.echo("Ctrl-C ends it", err=True)
     try:

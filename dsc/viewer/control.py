@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from dsc.events import Event
 from dsc.sequencer.clock import LoopClock
@@ -19,7 +19,21 @@ if TYPE_CHECKING:
     from knowledge_base.language.expression import Expression
 
 AUTHOR = "viewer"
+MOST_SECONDS = 10
+"""That a command waits for the run, which computes."""
 KINDS = ("state", "event", "condition", "plan_step")
+
+
+class Hands(Protocol):
+    """What a page needs of a run that it may change, in this process or another."""
+
+    @property
+    def paused(self) -> str | None:
+        """Why the run stands still, if it does."""
+
+    def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
+        """Do what a page asks for; raises `InputError` if that makes no sense."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +158,10 @@ class Control:
             act(run)
 
         assert loop is not None  # noqa: S101  told apart by _run
-        asyncio.run_coroutine_threadsafe(acting(), loop).result(timeout=10)
+        try:
+            asyncio.run_coroutine_threadsafe(acting(), loop).result(timeout=MOST_SECONDS)
+        except TimeoutError:
+            raise InputError(f"the run did not listen for {MOST_SECONDS} seconds") from None
 
     # --- in the run's thread
 

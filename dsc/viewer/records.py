@@ -15,20 +15,17 @@ from knowledge_base.pddl.files import read_text
 MOST_RECORDS = 2000
 MOST_CHARACTERS = 400_000
 """What goes out at once at most: a browser takes it in without a stutter."""
-MOST_WAITING = 20_000
-"""Records that nobody has read yet; older ones are kept as text, which takes less room."""
 
 
 class RecordLog:
     """The lines of a trace; the record with number `seq` is line `seq`, counted from 1 behind the header.
 
-    One thread appends, any thread reads. Nothing is ever taken away, so that readers need no queues of their own. A
-    record becomes text when it is read first: a run that appends does not wait for that.
+    One thread appends, any thread reads. Nothing is ever taken away, so that readers need no queues of their own.
     """
 
     def __init__(self, first_line: str | None = None, lines: Iterable[str] = (), *, live: bool = False) -> None:
         self.header: dict[str, Any] = json.loads(first_line or header())
-        self._lines: list[str | Record] = list(lines)
+        self._lines = list(lines)
         self._live = live
         self._lock = Lock()
         self._wakers: tuple[Callable[[], None], ...] = ()
@@ -45,9 +42,11 @@ class RecordLog:
 
     def hear(self, record: Record) -> None:
         """Take in a record; a `Listener` of a trace."""
-        self._lines.append(record)
-        if len(self._lines) > MOST_WAITING:
-            self._text(len(self._lines) - MOST_WAITING)
+        self.append(record.to_line())
+
+    def append(self, line: str) -> None:
+        """Take in a record as its line, which nobody looks at."""
+        self._lines.append(line)
         self.wake()
 
     def end(self) -> None:
@@ -68,7 +67,7 @@ class RecordLog:
 
     def wake(self) -> None:
         """Tell everybody who waits that there is something new."""
-        for waker in self._wakers:  # a tuple that nobody changes: a run does not take a lock for each record
+        for waker in self._wakers:  # a tuple that nobody changes: no record needs a lock
             waker()
 
     def batch(self, seq: int) -> tuple[str, int]:
@@ -77,11 +76,11 @@ class RecordLog:
         last = min(len(self._lines), seq - 1 + MOST_RECORDS)
         while end < last and characters < MOST_CHARACTERS:
             end += 1
-            characters += len(self._text(end))
+            characters += len(self._lines[end - 1])
         kept = self._batch
         if kept[:2] != (seq, end):  # browsers that have caught up get the same: it is put together once
             # The lines are JSON already; writing them anew would cost more than everything else here.
-            lines = ",\n".join(map(self._text, range(seq, end + 1)))
+            lines = ",\n".join(self._lines[seq - 1 : end])
             text = f'{{"type":"records","from":{seq},"records":[\n{lines}\n]}}'
             kept = self._batch = (seq, end, text)
         return kept[2], end + 1
@@ -94,13 +93,7 @@ class RecordLog:
         """
         if not 1 <= seq <= len(self._lines):
             raise InputError(f"there is no record {seq}; the last one is {len(self._lines)}")
-        return self._text(seq)
-
-    def _text(self, seq: int) -> str:
-        said = self._lines[seq - 1]
-        if isinstance(said, Record):
-            said = self._lines[seq - 1] = said.to_line()
-        return said
+        return self._lines[seq - 1]
 
     def record(self, seq: int) -> dict[str, Any]:
         """The record as data; errors as for `line`."""

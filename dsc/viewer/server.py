@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import secrets
-import socket
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -22,7 +20,8 @@ from starlette.websockets import WebSocket
 
 from dsc.viewer.access import Access
 from dsc.viewer.answers import Answers
-from dsc.viewer.control import Control
+from dsc.viewer.control import Hands
+from dsc.viewer.entrance import Entrance
 from dsc.viewer.records import RecordLog
 from dsc.viewer.rounds import Rounds
 from dsc.viewer.stream import Stream
@@ -38,35 +37,30 @@ class Viewer:
 
     Args:
         log: the records.
+        entrance: where it is to be had; it is given away.
         control: the run, if whoever looks may change it.
-        port: where to listen on 127.0.0.1; 0 picks a free port.
 
-    Raises:
-        InputError: somebody else listens there.
+    Attributes:
+        url: what to open.
+        port: of the address.
+        token: in the address, the only key.
     """
 
-    def __init__(self, log: RecordLog, control: Control | None = None, port: int = 0) -> None:
-        self._log, self._control = log, control
+    def __init__(self, log: RecordLog, entrance: Entrance, control: Hands | None = None) -> None:
+        self._log, self._control, self._socket = log, control, entrance.listening
+        self.url, self.port, self.token = entrance.url, entrance.port, entrance.token
         self._answers = Answers(log)
         self._rounds = Rounds(log, self._status)
-        self._socket = _listening(port)
-        self.port: int = self._socket.getsockname()[1]
-        self.token = secrets.token_urlsafe(24)
         config = uvicorn.Config(
             self.application(),
             lifespan="off",
             ws_max_size=1 << 16,
-            ws_per_message_deflate=False,  # nothing leaves this machine, and a run would pay for it
+            ws_per_message_deflate=False,  # nothing leaves this machine, so that it would only cost
             log_level="error",
             access_log=False,
         )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]}, daemon=True)
-
-    @property
-    def url(self) -> str:
-        """What to open; the token in it is the only key."""
-        return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
     def application(self) -> ASGIApp:
         """The application behind the check of who may come in."""
@@ -135,19 +129,6 @@ class Viewer:
 
     def _status(self) -> dict[str, Any]:
         return {"ended": not self._log.live, "paused": self._control.paused if self._control else None}
-
-
-def _listening(port: int) -> socket.socket:
-    """Bound here, so that the port is known before anybody asks."""
-    made = socket.socket()
-    made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        made.bind(("127.0.0.1", port))
-        made.listen()  # who comes before the server runs waits
-    except OSError as error:
-        made.close()
-        raise InputError(f"cannot listen on port {port}: {error.strerror}") from None
-    return made
 
 
 async def _body(request: Request) -> Mapping[str, Any]:

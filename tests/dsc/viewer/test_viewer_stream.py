@@ -14,7 +14,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from dsc.trace import Record, header
 from dsc.viewer.records import MOST_RECORDS, RecordLog
-from dsc.viewer.rounds import LOOK_EVERY_S, SHARE, Pace, Rounds
+from dsc.viewer.rounds import Rounds
 from dsc.viewer.stream import Stream
 
 
@@ -119,41 +119,6 @@ def test_of_a_status_only_the_latest_is_said_and_only_if_it_is_new():
     streamed(use)
 
 
-class Clocks:
-    """Seconds that went by, that the viewer computed, and that a run beside it did."""
-
-    def __init__(self) -> None:
-        self.now = self.viewer = self.run = 0.0
-
-    def pace(self) -> Pace:
-        return Pace(lambda: self.now, lambda: self.viewer, lambda: self.viewer + self.run)
-
-
-def test_while_a_run_computes_the_viewer_does_a_fiftieth_of_that():
-    clocks = Clocks()
-    pace = clocks.pace()
-    pace.begin()
-    clocks.viewer += 0.01
-    clocks.run += 0.03
-    clocks.now += 0.04
-    while (rest := pace.rest()) > 0:
-        clocks.now += rest
-        clocks.run += rest / 3  # the machine is busy with other things besides
-    assert SHARE * (clocks.run - LOOK_EVERY_S) <= clocks.viewer <= SHARE * clocks.run
-
-
-def test_a_run_that_waits_is_not_waited_for():
-    clocks = Clocks()
-    pace = clocks.pace()
-    pace.begin()
-    clocks.viewer += 1.0
-    clocks.now += 1.0
-    clocks.run += 0.9
-    assert pace.rest() > 0
-    clocks.now += LOOK_EVERY_S  # it is held now
-    assert pace.rest() == 0
-
-
 def test_all_browsers_are_offered_the_same_in_a_round_and_one_that_takes_nothing_holds_up_nobody():
     async def going() -> None:
         log, made = RecordLog(header(), live=True), []
@@ -176,20 +141,3 @@ def test_all_browsers_are_offered_the_same_in_a_round_and_one_that_takes_nothing
         await asyncio.wait_for(asyncio.gather(*made), 10)
 
     asyncio.run(going())
-
-
-def test_a_record_that_nobody_reads_becomes_text_only_when_many_wait(monkeypatch):
-    monkeypatch.setattr("dsc.viewer.records.MOST_WAITING", 2)
-    written: list[int] = []
-
-    class Told(Record):
-        def to_line(self) -> str:
-            written.append(self.seq)
-            return super().to_line()
-
-    log = RecordLog(header(), live=True)
-    for seq in (1, 2, 3):
-        log.hear(Told(seq, 0.0, "log", None, {"text": "x"}))
-    assert written == [1]
-    assert [log.record(seq)["seq"] for seq in (3, 1, 3)] == [3, 1, 3]
-    assert written == [1, 3]

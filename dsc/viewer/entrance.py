@@ -1,0 +1,50 @@
+"""Where a page is to be had: a port of this machine, and the token that is the only key to it."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from dataclasses import dataclass, field
+
+from knowledge_base.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Entrance:
+    """A listening socket on 127.0.0.1, bound before anybody serves it, so that the address is known at once.
+
+    Attributes:
+        listening: the socket; who comes before it is served waits.
+        token: what a request must know.
+    """
+
+    listening: socket.socket
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
+
+    @classmethod
+    def on(cls, port: int = 0) -> Entrance:
+        """Listen there, with a new token; port 0 picks a free one.
+
+        Raises:
+            InputError: somebody else listens there.
+        """
+        made = socket.socket()
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            made.bind(("127.0.0.1", port))
+            made.listen()
+        except OSError as error:
+            made.close()
+            raise InputError(f"cannot listen on port {port}: {error.strerror}") from None
+        return cls(made)
+
+    @property
+    def port(self) -> int:
+        """Its number."""
+        number: int = self.listening.getsockname()[1]
+        return number
+
+    @property
+    def url(self) -> str:
+        """What to open."""
+        return f"http://127.0.0.1:{self.port}/?token={self.token}"

@@ -1,0 +1,96 @@
+"""The process that serves the page of a run in another process: lines of its trace come in, commands go out.
+
+Lines on standard input are records as in a trace, or something else to be told: `begin` (first, with the `socket` to
+serve, its `token`, and whether there is `control`), `paused`, an `answer` to a command, `end`. Lines on standard output
+are commands of who looks, with a number. The end of the input is that of the page.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
+from io import TextIOWrapper
+from itertools import count
+from socket import socket
+from typing import IO, Any
+
+from dsc.viewer.entrance import Entrance
+from dsc.viewer.records import RecordLog
+from dsc.viewer.server import Viewer
+from knowledge_base.errors import InputError
+
+NICENESS = 5
+"""Where there is not enough processor for both, the run goes first."""
+_RECORD = '{"seq": '
+
+
+class FarHands:
+    """A run in another process, in the hands of who looks.
+
+    Args:
+        to: where commands go.
+        changed: is called when what `paused` says has changed.
+    """
+
+    def __init__(self, to: IO[str], changed: Callable[[], None]) -> None:
+        self._to, self._changed = to, changed
+        self._numbers = count(1)
+        self._asked: dict[int, Future[dict[str, Any]]] = {}
+        self.paused: str | None = None
+
+    def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
+        """What the run answers to a command; raises `InputError` if that makes no sense to it."""
+        number = next(self._numbers)
+        answer = self._asked[number] = Future()
+        self._to.write(json.dumps({"number": number, "command": command}) + "\n")
+        self._to.flush()
+        return answer.result()
+
+    def hold(self, why: str | None) -> None:
+        """The run stands still, or goes on."""
+        self.paused = why
+        self._changed()
+
+    def answer(self, number: int, said: dict[str, Any] | None, wrong: str) -> None:
+        """What came of a command."""
+        asked = self._asked.pop(number)
+        if said is not None:
+            asked.set_result(said)
+        else:
+            asked.set_exception(InputError(wrong))
+
+
+def take_in(lines: Iterable[str], log: RecordLog, hands: FarHands) -> None:
+    """All that a run tells about itself."""
+    for line in lines:
+        if line.startswith(_RECORD):
+            log.append(line.rstrip("\n"))
+            continue
+        match told := json.loads(line):
+            case {"paused": why}:
+                hands.hold(why)
+            case {"answer": number}:
+                hands.answer(number, told.get("said"), told.get("wrong", ""))
+            case {"end": True}:
+                log.end()
+
+
+def main() -> None:
+    """Serve until the run's process closes the pipe, or is no more."""
+    os.nice(NICENESS)
+    lines = TextIOWrapper(sys.stdin.buffer, encoding="utf-8")
+    begin = json.loads(lines.readline())
+    log = RecordLog(begin["begin"], live=True)
+    hands = FarHands(sys.stdout, log.wake)
+    entrance = Entrance(socket(fileno=begin["socket"]), begin["token"])
+    viewer = Viewer(log, entrance, hands if begin["control"] else None)
+    viewer.start()
+    take_in(lines, log, hands)
+    viewer.close()
+
+
+if __name__ == "__main__":
+    main()
