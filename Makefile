@@ -107,8 +107,8 @@ test-viewer: $(VENV)/.test   ## the page's own tests, then the page in Debian's 
 screenshots: $(VENV)/.test $(NODE_MODULES)   ## the pictures of the page that the docs show (needs Chromium)
 	cd frontend && node screenshots.mjs
 
-bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watching costs a run, 100,000 records opened and scrubbed
-	$(BIN)/python benchmarks/viewer.py --rounds $(or $(RUNS),5)
+bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watching costs a run, 100,000 records opened and scrubbed (RUNS=N rounds)
+	$(BIN)/python benchmarks/viewer.py $(if $(RUNS),--rounds $(RUNS))
 
 clean:   ## forget the environment and caches
 	rm -rf $(VENV) $(BENCH) frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -1,11 +1,6 @@
 """What the page costs: its weight, its layouts, a run that is watched, a long run opened (`make bench-viewer`).
 
-Runs are measured with nobody, 1 and 8 browsers attached, in turn, each browser a process that takes in all records;
-what counts is the ratio to the same runs without a page: of the time they take (median of the rounds), and of the
-computing time of their own process, in which the page is served too (the least of all rounds, since what else the
-machine does only adds to it). All plans are known before, so that nothing but the run is measured. Eight
-processes that read at the same time on two cores slow the run besides; that is in the first ratio and not in the
-second. Layouts and pages are measured by `frontend/bench.mjs`.
+Runs that are watched are measured by `watched.py`, layouts and pages by `frontend/bench.mjs`.
 """
 
 from __future__ import annotations
@@ -13,43 +8,28 @@ from __future__ import annotations
 import argparse
 import gzip
 import json
-import statistics
 import subprocess
-import sys
 import tempfile
-import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from websockets.sync.client import connect
+from watched import SCENARIO, print_watched
 
 from domains.clean_up_table.deployment import deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.trace import header, write_to
-from dsc.viewer.records import RecordLog
-from dsc.viewer.server import STATIC, Viewer
-from planning import Planner
-from planning.engines.cache import CachingPlanner
-from planning.engines.planner import PlannerProcess
+from dsc.viewer.server import STATIC
 
 FRONTEND = Path(__file__).parent.parent / "frontend"
-WATCHED = {"no page": None, "nobody looks": 0, "1 browser": 1, "8 browsers": 8}
-SCENARIO = "table: {cups: 4, cans: 3, crisp_cans: [small, large]}"
 RECORDS = 100_000
-RUNS = 4
-"""One after the other, with faults: one alone is too short to be measured."""
+ROUNDS = 12
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=5, help="runs with each number of browsers")
-    parser.add_argument("--client", help=argparse.SUPPRESS)
+    parser.add_argument("--rounds", type=int, default=ROUNDS, help="runs with each number of browsers")
     chosen = parser.parse_args()
-    if chosen.client:
-        watch(chosen.client)
-        return
     print_weight()
     print_watched(chosen.rounds)
     for count, milliseconds in node("layout").items():
@@ -65,88 +45,6 @@ def print_weight() -> None:
 
 
 _FETCHED = {".html", ".js", ".css", ".svg"}
-
-
-def print_watched(rounds: int) -> None:
-    """How much longer runs take when they are watched; who begins changes from round to round."""
-    figures: dict[str, list[Taken]] = {name: [] for name in WATCHED}
-    process = PlannerProcess()
-    planner = CachingPlanner(process)
-    runs_watched(None, planner)  # all plans are known from here on
-    for number in range(rounds):
-        names = list(WATCHED)[number % len(WATCHED) :] + list(WATCHED)[: number % len(WATCHED)]
-        for name in names:
-            figures[name].append(runs_watched(WATCHED[name], planner))
-    process.kill()
-    bare = figures["no page"]
-    for name, taken in figures.items():
-        wall = statistics.median(one.wall / other.wall for one, other in zip(taken, bare, strict=True))
-        seconds = statistics.median(one.wall for one in taken)
-        computed = min(one.cpu for one in taken)
-        cpu = computed / min(one.cpu for one in bare)
-        print(f"{RUNS} runs, {name:<12} {seconds:6.2f} s {wall:5.2f} x, computing {computed:5.2f} s {cpu:5.2f} x")
-
-
-class Taken(NamedTuple):
-    """Seconds: by the clock on the wall, and of computing in this process, all threads."""
-
-    wall: float
-    cpu: float
-
-
-def runs_watched(browsers: int | None, planner: Planner) -> Taken:
-    """What runs with so many browsers take; `None` browsers are runs without a page and without records."""
-    log = RecordLog(header(), live=True)
-    wall, cpu = 0.0, 0.0
-    with ExitStack() as stack:
-        if browsers is not None:
-            viewer = stack.enter_context(serving(log))
-            stack.enter_context(watching(viewer, browsers))
-        for seed in range(RUNS):
-            table = deploy(Scenario.parse(SCENARIO), seed, 0.2, planner, None if browsers is None else log.hear)
-            with table.executive:
-                started, computed = time.perf_counter(), time.process_time()
-                table.run()
-                wall, cpu = wall + time.perf_counter() - started, cpu + time.process_time() - computed
-        log.end()
-    return Taken(wall, cpu)
-
-
-@contextmanager
-def serving(log: RecordLog) -> Iterator[Viewer]:
-    viewer = Viewer(log)
-    viewer.start()
-    try:
-        yield viewer
-    finally:
-        viewer.close()
-
-
-@contextmanager
-def watching(viewer: Viewer, count: int) -> Iterator[None]:
-    """So many processes attached, each of which has said that it is."""
-    command = [sys.executable, __file__, "--client", f"{viewer.port} {viewer.token}"]
-    clients = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(count)]
-    try:
-        for client in clients:
-            assert client.stdout is not None
-            assert client.stdout.readline() == "attached\n"
-        yield
-    finally:
-        for client in clients:
-            client.kill()
-            client.wait()
-
-
-def watch(where: str) -> None:
-    """As a browser: take in all records, and read them."""
-    port, token = where.split()
-    with connect(f"ws://127.0.0.1:{port}/socket?token={token}", origin=f"http://127.0.0.1:{port}") as socket:
-        socket.recv()
-        socket.send(json.dumps({"want": 1}))
-        print("attached", flush=True)
-        for said in socket:
-            json.loads(said)
 
 
 def print_opened() -> None:
