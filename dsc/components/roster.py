@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import Awaitable, MutableMapping
 from typing import TYPE_CHECKING, TypeVar
 
 from dsc.components.life import Life
@@ -57,17 +57,13 @@ class Roster:
         me = asyncio.current_task()
         lost: list[Component] = []
 
-        def listener(one: Component) -> Callable[[], None]:
-            def changed() -> None:
-                if one.life.state is not Life.ALIVE and not lost and me is not None:
-                    lost.append(one)
-                    me.cancel()
+        def changed() -> None:
+            if not lost and me is not None and (dead := next(filter(_is_not_alive, support), None)) is not None:
+                lost.append(dead)
+                me.cancel()
 
-            return changed
-
-        listening = [(one.life, listener(one)) for one in support]
-        for life, changed in listening:
-            life.listen(changed)
+        for one in support:
+            one.life.listen(changed)
         try:
             return await work
         except asyncio.CancelledError:
@@ -76,8 +72,8 @@ class Roster:
             said = _state_of(lost[0])
             raise NotAliveError(said if lost[0] is component else f"it needs {said}") from None
         finally:
-            for life, changed in listening:
-                life.leave(changed)
+            for one in support:
+                one.life.leave(changed)
 
     async def _needed(self, component: Component, found: dict[str, Component], above: tuple[str, ...]) -> None:
         if component.name in above:
@@ -93,6 +89,10 @@ class Roster:
             self._deployed.clear()
             await self._deployed.wait()
         return self._components[name]
+
+
+def _is_not_alive(component: Component) -> bool:
+    return component.life.state is not Life.ALIVE
 
 
 def _state_of(component: Component) -> str:

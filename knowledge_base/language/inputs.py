@@ -9,6 +9,8 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import VALUE_TYPES, Delta, Fact, Value
 from knowledge_base.language.expression import Expression, free_variables
 
+_NO_CHANGE = Delta()
+
 
 def shown(value: object) -> str:
     """The value as a message says it, whatever it is."""
@@ -104,6 +106,8 @@ def require_delta(delta: object) -> None:
     """Raise `InputError` unless it is a `Delta` whose parts are what they are declared to be."""
     if not isinstance(delta, Delta):
         raise InputError(f"a change is a Delta, not {shown(delta)}")
+    if delta == _NO_CHANGE:  # as most are; what is empty and of the wrong kind does not equal it
+        return
     for name in ("nodes", "values"):
         if not isinstance(part := getattr(delta, name), Mapping):
             raise InputError(f"a Delta's '{name}' is a mapping, not {shown(part)}")
