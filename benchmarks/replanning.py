@@ -36,7 +36,8 @@ _HERE = tuple(part for part in OURS if part != "translate")  # that the engine's
 _WRAPPED = (
     (search, "mending", "mend"), (search, "pose", "pose"), (search, "deordered", "validate, de-order"),
     (asking, "written", "write"),
-    (plotting, "deordered", "validate, de-order"), (plotting, "plot_from_plan", "generate"),
+    (plotting, "deordered", "validate, de-order"), (plotting, "laid_out", "generate"),
+    (plotting, "plot_of", "generate"),
 )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -43,6 +44,7 @@ class Carried:
         watched: how far watching it is; `None` before that begins.
         begun: is told when a step begins, while the plan is watched.
         stopped: who watched it ended it; otherwise a step did.
+        superseded: is set when no more of its steps shall begin, but the one at work goes on.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Carried:
     watched: Watched | None = None
     begun: Callable[[int], None] | None = None
     stopped: bool = False
+    superseded: asyncio.Event = field(default_factory=asyncio.Event)
 
     def begin(self, number: int) -> None:
         """A step of its plot has begun; what was told before a restart may be told again."""
@@ -88,7 +91,7 @@ class Carried:
     def from_json(cls, form: Mapping[str, Any], now: Settled) -> Carried:
         """The inverse of `to_json`, with conditions written for the present state of the world."""
         goal = parse_condition(form["goal"])
-        return cls(
+        carried = cls(
             goal=goal,
             course=Course.from_json(form["course"], now.domain, now.condition(goal)),
             attempt=Attempt.from_json(form["attempt"]),
@@ -97,3 +100,6 @@ class Carried:
             watched=None if form["watched"] is None else Watched.from_json(form["watched"]),
             **{name: form[name] for name in _PLAIN},
         )
+        if carried.following is not None and not carried.stopped:
+            carried.superseded.set()
+        return carried

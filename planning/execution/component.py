@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,7 @@ _PLAN_FOUND = {"plot": "plot", "name": "symbol", "steps": "number"}
 
 
 class PlanningComponent(Component):
-    """The skills behind the plot `achieve`: `plan`, `monitor`, `repair`, `judge`.
+    """The skills behind the plot `achieve` and the plots of plans: `plan`, `monitor`, `hold`, `repair`, `judge`.
 
     Several plans may be on their way, side by side in regions or one inside a step of another. Each has a
     name, and the component's parameter of that name says which step has begun.
@@ -192,6 +193,14 @@ class PlanningComponent(Component):
         if outcome.event == "goal_holds":
             self._plans.over(plan)
         return outcome
+
+    @skill(outcomes={"held": {}}, after_crash="repeat")
+    async def hold(self, call: SkillCall, plan: str) -> Outcome:  # noqa: ARG002
+        """End when no more steps of that plan shall begin: others take their place, after the one at work."""
+        carried = self._plans.get(plan)
+        superseded = asyncio.Event() if carried is None else carried.superseded
+        await superseded.wait()
+        return Outcome("held")
 
     @skill(
         outcomes={

@@ -86,7 +86,7 @@ def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> 
 class Course:
     """How far a plan is; steps are spoken of by their number, from 1.
 
-    A step is done when one that has to come after it has begun: nobody begins a step too early.
+    A step is done, or left out by a rule, when one that has to come after it has begun: nobody begins a step too early.
 
     Args:
         steps: the plan's steps.
@@ -136,6 +136,10 @@ class Course:
         course = Course(self.steps, domain, goal, self._before)
         course._begun, course._done = set(self._begun), set(self._done)
         return course
+
+    def take_in_order(self, before: AbstractSet[tuple[int, int]]) -> None:
+        """The steps wait for each other in this way as well; nothing has begun yet."""
+        self._before = None if self._before is None else self._before | before
 
     def begin(self, number: int) -> None:
         """A step has begun."""

@@ -107,6 +107,8 @@ class Ladder:
         name = carried.following_name or self.plans.new_name()
         if carried.following_name is not None:
             self.telling.replaced(carried.name, name, carried.following_kept)
+        elif carried.following is not None:  # it was told when that was decided
+            pass
         elif len(steps) < len(left):
             self.telling.skipped(carried.name, [step for step in left if step not in steps], why)
         else:

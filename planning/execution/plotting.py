@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from planning.generation.plot import plot_from_plan
+from planning.generation.plot import laid_out, plot_of
 from planning.ordering.order import PartialOrder, deordered, in_sequence
 from planning.ordering.timed_links import linked
 from planning.plan import Plan
@@ -47,10 +47,15 @@ class Plotting:
         return order if self.parallel else replace(order, before=in_sequence(plan).before)
 
     def form(self, carried: Carried, order: PartialOrder, instead_of: str | None = None) -> dict[str, Any]:
-        """The plot as data; its first step is done rather not with the candidate `instead_of`."""
+        """The plot as data; its first step is done rather not with the candidate `instead_of`.
+
+        The plan's course learns in which order the plot takes the steps.
+        """
         rules = self.library.plot(carried.holder).rules if carried.holder in self.library else ()
         plan, domain = Plan(carried.course.steps), carried.course.domain
-        plot = plot_from_plan(plan, domain, self.library, rules, carried.name, order, self.shared)
+        layout = laid_out(plan, domain, self.library, rules, order, self.shared)
+        carried.course.take_in_order(layout.before)
+        plot = plot_of(plan, layout, carried.name, watched=True)
         self.library.expect(plot)
         form = plot.to_form()
         if instead_of is not None:

@@ -130,8 +130,7 @@ class _Watch:
                 self._about.telling.skipped(carried.name, carried.course.left_steps, "the goal holds")
                 outcome = Outcome("goal_holds")
             case Shorter(steps):
-                carried.following = steps
-                outcome = Outcome("plan_changed", {"why": "fewer steps lead to the goal"})
+                outcome = self._shorten(steps)
             case StepEnded():
                 outcome = Outcome("plan_changed", {"why": "another plan takes its place"})
             case NotFound():
@@ -224,16 +223,35 @@ class _Watch:
             return None
         return (step, *end)
 
+    def _shorten(self, steps: tuple[PlanStep, ...]) -> Outcome | None:
+        """Leave steps out, after the step at work if that is not one of them."""
+        carried, why = self._carried, "fewer steps lead to the goal"
+        left_out = [step for step in carried.course.left_steps if step not in steps]
+        self._about.telling.skipped(carried.name, left_out, why)
+        if not self._takes_over(steps):
+            return Outcome("plan_changed", {"why": why})
+        self._install().watch()  # it was judged just now, as if the step at work were done
+        return None
+
     def _follow(self, answer: PlanFound, steps: tuple[PlanStep, ...], kept: int) -> Outcome | None:
         """Let a new plan take the place, after the step at work if it begins with that one too."""
         about, carried = self._about, self._carried
-        carried.following, carried.following_kept = steps, kept
+        carried.following_kept = kept
         carried.following_name = about.new_name()
         about.telling.found(answer, carried.following_name)
-        if [carried.course.steps[number - 1] for number in carried.course.at_work] != list(steps[:1]):
+        if not self._takes_over(steps):
             return Outcome("plan_changed", {"why": "a new plan begins in another way"})
-        carried.course = Course(steps, carried.course.domain, carried.course.goal)
-        carried.course.begin(1)
-        self._state.said_broken = False
         self._look("earlier")
         return None
+
+    def _takes_over(self, steps: tuple[PlanStep, ...]) -> bool:
+        """These steps take the place; whether the step at work is the first of them, and may go on."""
+        carried = self._carried
+        carried.following = steps
+        if carried.course.steps_of(carried.course.at_work) != steps[:1]:
+            return False
+        carried.course = Course(steps, carried.course.domain, carried.course.goal)
+        carried.course.begin(1)
+        carried.superseded.set()
+        self._state.said_broken = False
+        return True

@@ -5,8 +5,9 @@ r"""One control flow of a generated plot: steps one after the other, waiting for
 
 `after_n` waits until the step's effects are observed. `before_n` waits for steps of other flows: they set the variables
 `done_n` and `begun_n`, so that nobody has to ask again and again. Then it looks at what the step needs, so that no step
-begins on a wrong premise. Where there is nobody to wait for, `after_n` does that as well. A step that
-rules may leave out has `step_n_skipped` besides: like `after_n`, without waiting for what the step would have changed.
+begins on a wrong premise. Where there is nobody to wait for, `after_n` does that as well. Once the planner's component
+has said that other steps take the place of what is left (`held`), none begins. A step that rules may leave out has
+`step_n_skipped` besides: like `after_n`, without waiting for what the step would have changed.
 """
 
 from __future__ import annotations
@@ -26,6 +27,11 @@ from planning.generation.steps import CarriedStep
 from planning.ordering.order import PartialOrder
 
 FINISHED = "finished"
+HELD = "held"
+"""Variable of a plot: no more steps begin, since others are going to take their place."""
+MOST_WATCHED = 86400
+"""Seconds: who watches a plan does so for as long as it takes; every wait has a bound."""
+_HELD = Comparison("=", Variable(HELD), Constant(value=True))
 _DONE, _BEGUN = "done", "begun"
 
 
@@ -79,8 +85,9 @@ class Writer:
 
     @property
     def variables(self) -> Mapping[str, Any]:
-        """What lanes tell each other."""
-        return {flag: {"type": "boolean", "initial": False} for flag in self._flags}
+        """What lanes tell each other, and what they are told."""
+        names = (*self._flags, *([] if self._plan is None else [HELD]))
+        return {flag: {"type": "boolean", "initial": False} for flag in names}
 
     def states(self, lane: Lane) -> dict[str, Any]:
         """The states of one lane, without the one at its end."""
@@ -109,7 +116,9 @@ class Writer:
         done = {"to": f"after_{number}", **({"tell": step.effect} if step.assumed else {})}
         state: dict[str, Any] = {"about": step.text, **step.content, "on": {"done": done}}
         if self._plan is not None:
-            state["entry"] = {"set": f"planner.{self._plan}", "to": number}
+            listen = {"trigger": "planner.hold", "with": {"plan": self._plan}, "within": MOST_WATCHED}
+            state["entry"] = [{"set": f"planner.{self._plan}", "to": number}, listen]
+            state["on"]["held"] = {"assign": {HELD: True}}
         if step.over_all:
             state["always"] = [
                 self._replan(lane, f"lost during {step.text}: {to_text(one)}", Not(one))
@@ -151,7 +160,14 @@ class Writer:
         begin = {"to": f"step_{number}", **({"assign": assigned} if assigned else {})}
         both = _joined((*first, *step.needed)) if after is None else _between(after, step)
         otherwise = [] if both == begun else [self._replan(lane, f"not applicable: {step.text}", begun)]
-        return [_guarded(begin, both), *otherwise]
+        return [*self._held(lane, first, after), _guarded(begin, both), *otherwise]
+
+    def _held(self, lane: Lane, first: Iterable[Expression], after: CarriedStep | None) -> list[dict[str, Any]]:
+        """No step begins if others take its place."""
+        if self._plan is None:
+            return []
+        when = _joined((_HELD, *first)) if after is None else _held_after(after)
+        return [self._replan(lane, "another plan takes its place", when)]
 
     def _replan(self, lane: Lane, reason: str, when: Expression | None = None) -> dict[str, Any]:
         return _guarded({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, when)
@@ -174,11 +190,18 @@ def _joined(conditions: Iterable[Expression]) -> Expression | None:
 
 # What is known of a condition is known by its identity, and one plan has most pairs of steps of the one before.
 _pairs: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
+_ends: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
 
 
 def _seen(step: CarriedStep) -> Expression | None:
     """What is to be seen when it is done."""
     (found,) = _pairs.find(step, None) or _pairs.keep(step, None, (_joined(step.expected),))
+    return found
+
+
+def _held_after(step: CarriedStep) -> Expression | None:
+    """When nothing begins after it."""
+    (found,) = _ends.find(step, None) or _ends.keep(step, None, (_joined((_HELD, *step.expected)),))
     return found
 
 

@@ -10,6 +10,8 @@ lead to `replan`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dsc.events import FAILURES, GAVE_UP
@@ -31,6 +33,49 @@ if TYPE_CHECKING:
 
 WORK = "work"
 """Name of the state that holds the regions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How the steps of a plan are spread.
+
+    Attributes:
+        steps: ready to become states.
+        order: which of them wait for which, also since they use the same component.
+        lanes: the chains that they stand in.
+        rules: those that the plot inherits, as far as they are about its steps.
+    """
+
+    steps: Sequence[CarriedStep]
+    order: PartialOrder
+    lanes: Sequence[Lane]
+    rules: Sequence[Rule]
+
+    @property
+    def before(self) -> frozenset[tuple[int, int]]:
+        """Pairs of steps of which the first is done, or left out, when the second begins."""
+        return self.order.before.union(*(pairwise(lane.numbers) for lane in self.lanes))
+
+
+def laid_out(
+    plan: Plan,
+    domain: PlanningDomain,
+    library: Library | None,
+    rules: Sequence[Rule] = (),
+    order: PartialOrder | None = None,
+    shared: Collection[str] = (),
+) -> Layout:
+    """How the plot of a plan will carry it out; the arguments are those of `plot_from_plan`."""
+    if order is None:
+        order = scheduled(plan) if plan.schedule else in_sequence(plan)
+    domain = derivation(domain).domain  # the knowledge base knows no derived predicates
+    rules = [own for rule in rules if (own := _inherited(rule, plan)) is not None]
+    writing = None if library is None else Carrier.of(domain, library, rules)
+    steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
+    order = order.restricted(_clashes([step.usage for step in steps], order, shared))
+    outcomes = FAILURES.union(*(step.outcomes for step in steps))
+    answering = [rule for rule in rules if rule.on is None or rule.on in outcomes]
+    return Layout(steps, order, _lanes(order, steps), answering)
 
 
 def plot_from_plan(
@@ -57,19 +102,16 @@ def plot_from_plan(
     Raises:
         UnknownNameError: no plot implements a step's action.
     """
-    if order is None:
-        order = scheduled(plan) if plan.schedule else in_sequence(plan)
-    domain = derivation(domain).domain  # the knowledge base knows no derived predicates
-    rules = [own for rule in rules if (own := _inherited(rule, plan)) is not None]
-    writing = None if library is None else Carrier.of(domain, library, rules)
-    steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
-    order = order.restricted(_clashes([step.usage for step in steps], order, shared))
-    lanes = _lanes(order, steps)
+    layout = laid_out(plan, domain, library, rules, order, shared)
+    return plot_of(plan, layout, name, watched=library is not None)
+
+
+def plot_of(plan: Plan, layout: Layout, name: str, *, watched: bool) -> ActionPlot:
+    """The plot of a plan that is laid out; `watched`: the planner's component hears how far it is."""
+    steps, lanes, rules = layout.steps, layout.lanes, layout.rules
     left_out = [n for n, step in enumerate(plan.steps, start=1) if any(_leaves_out(rule, step) for rule in rules)]
-    outcomes = FAILURES.union(*(step.outcomes for step in steps))
-    rules = [rule for rule in rules if rule.on is None or rule.on in outcomes]
     leading = {rule.outcome: dict.fromkeys(rule.do.passed, "symbol") for rule in rules if rule.leads_away}
-    writer = Writer(steps, order, lanes, None if library is None else name, left_out, leading)
+    writer = Writer(steps, layout.order, lanes, name if watched else None, left_out, leading)
     ends = {FINISHED: {"final": True}}
     if len(lanes) == 1:
         states = {**writer.states(lanes[0]), **ends}

@@ -16,7 +16,7 @@ from soak_judge import PROMISES
 from soak_run import Outcome, Planners, Trial
 
 FAULTS = 0.1
-CHUNK = 25
+CHUNK = 50
 REPLAYED_EVERY = 3
 """`make soak` replays every run."""
 SOAK = Path(soak.__file__)

@@ -125,6 +125,44 @@ rules:
     assert knowledge.ask("(forall (?t - thing) (shown ?t))")
 
 
+def started(records):
+    """The robot's skills that were started and cancelled, in order."""
+    own = [one.data for one in records if one.type == "action" and str(one.data.get("skill")).startswith("studio.")]
+    return [(one["action"], one["skill"]) for one in own]
+
+
+@pytest.mark.parametrize("left_out", ["cup", "pot"])
+@pytest.mark.parametrize("parallel", [True, False])
+def test_what_comes_after_a_step_that_is_left_out_begins_once(left_out, parallel):
+    """The step that is left out counts as done, so that nobody thinks there are steps of no use."""
+    rule = "rules: [{before: light, when: (dirty ?step.thing), do: {tell: (lit ?step.thing), then: continue}}]"
+    records = []
+    end, studio, _ = away(rule, fact("dirty", left_out), records=records, parallel=parallel)
+    assert (end.finished, end.emitted) == (True, ())
+    assert len(studio.done) == 3
+    assert started(records) == [("start", f"studio.{what}") for what in ("light", "show", "show")]
+    assert not [one for one in records if one.type in ("plan.skipped", "plan.broken")]
+
+
+def test_the_step_at_work_is_not_interrupted_when_a_later_one_turns_out_to_be_of_no_use():
+    """Nor does the next one of the old plan begin: the plan goes on without the steps that are left out."""
+
+    def guest(sequencer):
+        sequencer.change(Delta(added=(fact("shown", "pot"),)), "guest", after=1.5)
+
+    studio, records = Studio(), []
+    plots = [parse_plot(text) for text in (HOLDER, *PLOTS)]
+    with Executive(DOMAIN, plots, [studio]) as robot:
+        robot.listen(records.append)
+        known = tuple(fact("known", thing) for thing in ("cup", "pot"))
+        robot.knowledge.apply(Delta(nodes={"cup": "thing", "pot": "thing"}, added=known), "test")
+        end = robot.run("photograph", prepare=guest)
+    assert (end.finished, end.emitted) == (True, ())
+    assert started(records) == [("start", f"studio.{what}") for what in ("light", "light", "show")]
+    (skipped,) = [one.data for one in records if one.type == "plan.skipped"]
+    assert skipped["steps"] == ["(show pot)"]
+
+
 def test_a_retry_changes_the_parameters_of_the_step():
     rule = "rules: [{on: blurred, of: show, do: {then: retry, pass: {zoom: near}}}]"
     end, done, _ = photographed(rule, blurred=["cup"])
