@@ -7,7 +7,7 @@ from functools import cached_property
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import Outcomes, answerable, outputs_of
-from dsc.dynamic.steps import Step, concerns, terms_of
+from dsc.dynamic.steps import Step, concerns, mentioned_in, terms_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
@@ -74,10 +74,13 @@ class _Data:
             yield from self._handler(handler, ("handlers", number))
 
     def _rule(self, rule: Rule, path: Path) -> Iterator[Finding]:
-        # Rules travel to generated plots, where the holder's variables do not exist.
         scope = self._rules.of(rule)
         if scope is None:
             yield self._rules.never(rule, path)
+            return
+        far = list(self._rules.out_of_reach(rule, mentioned_in(rule), path))
+        if far:
+            yield from far
             return
         if rule.when is not None:
             yield from self._condition(rule.when, scope, (*path, "when"))

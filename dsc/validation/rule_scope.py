@@ -1,4 +1,8 @@
-"""What rules and handlers can read: their event's attributes, wherever it can come from, and a step's arguments."""
+"""What rules and handlers can read: the plot's own variables, their event's attributes, a step's arguments.
+
+An event's attributes are those that it has wherever it can come from. A rule that answers for steps of plans does so in
+the plots of these plans, which have no variables of the plot that holds the rule: it cannot read them.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,13 @@ from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import Outcomes, answerable
 from dsc.dynamic.steps import Step, concerns, contents_of
 from dsc.errors import Finding
-from dsc.model.plot import ActionPlot, Path
+from dsc.events import FAILURES
+from dsc.model.plot import ActionPlot, Parameter, Path, Variable
 from dsc.model.rules import STEP, Handler, Rule
 from dsc.model.states import DynamicState
 from dsc.validation.attributes import Skills
 from dsc.validation.nesting import Nesting
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import SchemaError, UnknownNameError
 
 Types = Mapping[str, str | None]
 
@@ -32,6 +37,7 @@ class RuleScope:
     ) -> None:
         self._plot, self._library, self._skills = plot, library, skills or {}
         self._type = type_
+        self._declared = frozenset({*plot.parameters, *plot.variables, *plot.outputs})
         self._steps = {name: state for name, state, _ in nesting.states if isinstance(state, Step)}
         planned = any(isinstance(state, DynamicState) and state.goal is not None for state in self._steps.values())
         self._implementing = [other for other in library if other.implements] if planned else []
@@ -40,13 +46,28 @@ class RuleScope:
 
     def of(self, rule: Rule) -> Types | None:
         """Names and types; `None` if what the rule answers never happens where it is for."""
-        steps = self._arguments(rule)
+        steps = {**self._own(rule), **self._arguments(rule)}
         if rule.on is None:
             return steps
         sources = [outcomes[rule.on] or {} for outcomes in self._sources(rule) if rule.on in outcomes]
         types = [{name: self._type(kind) for name, kind in one.items()} for one in sources]
         event = {f"event.{name}": _common(name, types) for name in dict.fromkeys(chain.from_iterable(types))}
         return {**event, **steps} if sources else None
+
+    def in_plans(self, rule: Rule) -> bool:
+        """Whether it may answer for steps of plans that are made for goals of this plot."""
+        named = [plot for plot in self._implementing if not rule.steps or plot.implements in rule.steps]
+        return any(rule.on is None or rule.on in FAILURES or rule.on in plot.emits for plot in named)
+
+    def out_of_reach(self, rule: Rule, read: Iterable[str], path: Path) -> Iterator[Finding]:
+        """Findings about variables of the plot in a rule that answers for steps of plans."""
+        for name in sorted(self._declared.intersection(read) if self.in_plans(rule) else ()):
+            error = SchemaError(
+                f"'?{name}' is a variable of this plot; a rule that answers for steps of plans cannot read it",
+                place=self._plot.place(path), found=f"?{name}",
+            )  # fmt: skip
+            fix = "a fact says it as well; or name with `of` steps that are states of this plot"
+            yield Finding(error, "declared variable", fix)
 
     def never(self, rule: Rule, path: Path) -> Finding:
         """The finding about a rule whose event never happens where it is for."""
@@ -103,6 +124,14 @@ class RuleScope:
             message = f"'{listen.trigger}' does not bring the event '{handler.on}'"
             other = UnknownNameError(message, place=place, found=handler.on, valid=brought)
             yield Finding(other, "known event")
+
+    def _own(self, rule: Rule) -> Types:
+        """The plot's variables, where the rule may read them."""
+        if self.in_plans(rule):
+            return {}
+        plot = self._plot
+        declared: dict[str, Parameter | Variable] = {**plot.parameters, **plot.variables, **plot.outputs}
+        return {name: self._type(declared[name].type) for name in declared}
 
     def _sources(self, rule: Rule) -> Iterator[Outcomes]:
         for name, state in self._steps.items():

@@ -56,6 +56,38 @@ def run_of(rules, text=HOLDER, facts=()):
     return run
 
 
+READING = """
+    plot: p
+    parameters: {most: {type: number, default: 1}, what: {type: item, default: cup2}}
+    variables: {done: {type: number, initial: 0}}
+    states:
+      do_it: {use: step, on: {done: again}}
+      again: {use: step, on: {done: fine}}
+      fine:
+      elsewhere:
+    rules:
+      - {on: failed, when: (> ?most 1), do: {then: elsewhere}}
+      - {on: failed, when: (and (< ?done ?most) (on cup3 ?what)), do: {use: recover, with: {item: ?what}, then: continue}}
+"""
+
+
+@pytest.mark.parametrize(("most", "states"), [(1, ["do_it_failed_1_recover"]), (2, ["elsewhere"]), (0, ["again"])])
+def test_a_rule_reads_the_parameters_and_variables_of_its_plot(most, states):
+    run = Run(plot(READING), plot(STEP), plot(RECOVER), facts=[fact("on", "cup3", "cup2")])
+    run.start(most=most)
+    step = run.send("bad")
+    assert [name for name in run.active if "/" not in name] == states
+    told = [one.value for one in step.output if isinstance(one, SetParameter)]
+    assert told == (["cup2"] if most == 1 else [])
+
+
+def test_rules_that_read_variables_of_their_plot_pass_the_validator():
+    text = READING.replace("fine:\n", "fine: {final: true}\n").replace("elsewhere:\n", "elsewhere: {final: true}\n")
+    others = "      - {on: failed, do: {then: continue}}\n      - {on: broken, do: {then: continue}}\n"
+    holder = parse_plot(text + others)
+    assert validate_plot(holder, Library([holder, parse_plot(STEP), parse_plot(RECOVER)])) == []
+
+
 def generated(rules=(), on="done: finished"):
     indented = "".join(f"      - {rule}\n" for rule in rules)
     made = plot(f"""

@@ -233,9 +233,15 @@ WRONG = [
     ),
     (
         "declared variable",
+        ITEM + "  a:\n    goal: (free)\n    on: {done: e, no_plan: e, gave_up: e}\n" + E
+        + "rules:\n  - on: lost\n    when: (on ?item table)\n    do: {then: e}\n",
+        9, "'?item' is a variable of this plot; a rule that answers for steps of plans cannot read it", "a fact says it",
+    ),
+    (
+        "declared variable",
         ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E
-        + "rules:\n  - on: lost\n    do: {use: grasp, with: {item: ?item}, then: e}\n",
-        11, "no variable '?item' here", "",
+        + "rules:\n  - on: lost\n    do: {use: grasp, with: {item: ?itm}, then: e}\n",
+        11, "no variable '?itm' here; did you mean 'item'", "",
     ),
     (
         "skill arguments",
@@ -270,14 +276,14 @@ WRONG = [
     ("condition", S + "  a:\n    goal: (on table table)\n    on: {done: e, no_plan: e, gave_up: e}\n" + E, 4, "of type place", ""),
     (
         "condition",
-        ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    when: (on ?item table)\n    do: {}\n",
-        11, "?item", "",
+        ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    when: (on ?itm table)\n    do: {}\n",
+        11, "?itm", "",
     ),
     ("effect", ITEM + "  a:\n    on:\n      done: {to: e, tell: (onn ?item table)}\n" + E, 6, "mean 'on'", ""),
     (
         "effect",
-        ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    do: {tell: (on ?item table)}\n",
-        11, "?item", "",
+        ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    do: {tell: (on ?itm table)}\n",
+        11, "?itm", "",
     ),
     ("rule event", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lots\n    do: {then: e}\n", 10, "mean 'lost'", ""),
     ("value fits", ITEM + "  a:\n    use: grasp\n    with: {item: ?item, speed: fast}\n" + WIRED + E, 6, "'speed' is of type number", ""),
