@@ -17,6 +17,7 @@ from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
+from dsc.profiles import configure
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
@@ -68,8 +69,8 @@ class Executive:
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
-        InputError: a domain file is wrong, two fragments contradict each other, two plots have one name, or both
-            knowledge and a store are given.
+        InputError: a domain file is wrong, two fragments contradict each other, two plots have one name, a component's
+            parameter has no value, a relation between them does not hold, or both knowledge and a store are given.
         SchemaMismatchError: the given world model does not know what the domain is about.
         StoreError: the store cannot be opened, or somebody else is writing it.
     """
@@ -89,6 +90,7 @@ class Executive:
     ) -> None:
         entrance.require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
+        configure(self.components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
         if any(component.name == PlanningComponent.name for component in self.components):
             raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, cast
 
 from dsc.calls import Ended, Outcome, SkillCall, Status
 from dsc.components.activations import Activations
+from dsc.components.declarations import check_declarations
 from dsc.components.life import Life, LifeCycle
 from dsc.components.parameters import Parameter, check_relations, known
 from dsc.model.ranges import Who, refuse_change
@@ -47,6 +48,11 @@ class Component:
     declares: ClassVar[Mapping[str, Parameter]] = {}
     relations: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        """Check what its builder declares; raises `InputError`."""
+        super().__init_subclass__(**named)
+        check_declarations(cls.name or cls.__name__.lower(), cls.declares, cls.relations, cls.__module__)
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()

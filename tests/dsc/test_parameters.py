@@ -115,3 +115,43 @@ def test_what_rules_may_set_and_what_not():
 def test_names_of_components_alone_say_nothing_about_their_parameters():
     plot = parse_plot(HOLDER % "speed, to: 3")
     assert validate_plot(plot, Library([plot]), None, [], {"base"}) == []
+
+
+# -- what a builder declares is checked when the class is made ---------------------------------------------------
+
+
+def a_class(relations=(), **declares):
+    return type("Crane", (Component,), {"name": "crane", "declares": declares, "relations": relations, "__module__": __name__})
+
+
+@pytest.mark.parametrize(
+    ("declared", "said"),
+    [
+        (Parameter("number", default=5, least=10), "the default of parameter 'crane.lift' is 5, but it is 10 or more"),
+        (Parameter("number", default="fast"), "the default of parameter 'crane.lift' is fast, but it is a number"),
+        (Parameter("text", default="upp", among=("up", "down")), "is upp, but it is one of up, down; did you mean 'up'?"),
+        (Parameter("number", default=5, least=9, most=1), "parameter 'crane.lift': no number is 9 or more and 1 or less"),
+        (Parameter("text", least=1), "`least` and `most` are about numbers, and this is a text"),
+        (Parameter("nmber", default=5), "the type of parameter 'crane.lift' is 'nmber', which is none; did you mean 'number'?"),
+        (Parameter("number", default=5, changed_by="operater"), "'operater', which is nobody's role; did you mean 'operator'?"),
+    ],
+)
+def test_a_parameter_that_cannot_be_meant_is_refused_with_its_file(declared, said):
+    with pytest.raises(InputError) as refused:
+        a_class(lift=declared)
+    assert said in str(refused.value)
+    assert str(refused.value).startswith(f"{__file__}: ")
+
+
+@pytest.mark.parametrize(
+    ("relations", "said"),
+    [
+        (("(< ?lft 3)",), "the relation (< ?lft 3) of component 'crane' reads '?lft', which it does not declare; did you mean 'lift'?"),
+        (("(< ?lift 3",), "the relation (< ?lift 3 of component 'crane' is no condition"),
+        ("(< ?lift 3)", "`relations` of component 'crane' is a tuple of conditions, not one text"),
+    ],
+)
+def test_a_relation_that_cannot_be_meant_is_refused(relations, said):
+    with pytest.raises(InputError) as refused:
+        a_class(relations, lift=Parameter("number", default=1))
+    assert said in str(refused.value)

@@ -1,10 +1,12 @@
 """The executive with planners that misbehave: nothing is executed that is no plan, and nothing ever waits for ever."""
 
 import asyncio
+from typing import ClassVar
 
 import pytest
 
 from dsc import Component, Event, Outcome, SkillCall, parse_plot, primitive_plot, skill
+from dsc.components.parameters import Parameter
 from dsc.errors import PlotError
 from knowledge_base import Delta, InputError, fact
 from planning import Executive, Plan, PlanningDomain, PlanStep
@@ -565,3 +567,19 @@ def test_bounds_that_make_no_sense_are_refused(bounds):
     (name,) = bounds
     with robot, pytest.raises(InputError, match=f"'{name}' is "):
         robot.achieve("(on l1)", **bounds)
+
+
+def test_a_component_whose_parameter_nobody_has_said_is_refused_before_anything_runs():
+    class Laser(Component):
+        name = "laser"
+        declares: ClassVar = {
+            "port": Parameter("text", changed_by="profile"), "rate": Parameter("number", default=30), "most": Parameter("number", default=20),
+        }
+        relations = ("(<= ?rate ?most)",)
+
+    with pytest.raises(InputError, match=r"'laser\.port' has no value: its builder leaves it to a profile"):
+        Executive("(define (domain d))", [], [Laser()])
+    bound = Laser()
+    bound.parameters["port"] = "ttyS0"
+    with pytest.raises(InputError, match=r"component 'laser' needs .<= .rate .most., but most is 20, rate is 30"):
+        Executive("(define (domain d))", [], [bound])
