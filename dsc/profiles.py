@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dsc.components.component import Component
-from dsc.components.parameters import check_relations, known
+from dsc.components.parameters import changed, check_relations, known, require_bound
 from dsc.model.plot import ActionPlot
 from dsc.model.profile import Profile
 from dsc.model.ranges import refuse_change
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Value
 
 
@@ -32,6 +32,7 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
             raise _unknown(profile, "components", "component", name, by_name)
     values = {name: _configured(component, profile) for name, component in by_name.items()}
     for name, component in by_name.items():
+        component.parameters.clear()
         component.parameters.update(values[name])
 
 
@@ -62,19 +63,14 @@ def _configured(component: Component, profile: Profile | None) -> dict[str, Valu
         except InputError as error:
             error.place = None if profile is None else profile.place("components", component.name, parameter)
             raise
-    values = {**component.parameters, **settings}
-    for parameter in component.declares:
-        if parameter not in values:
-            raise SchemaError(
-                f"'{component.name}.{parameter}' has no value: its builder leaves it to a profile",
-                place=None if profile is None else profile.place("components", component.name), found=parameter,
-            )  # fmt: skip
     try:
+        values = changed(component.name, component.declares, component.parameters, settings)
+        require_bound(component.name, component.declares, values)
         check_relations(component.name, component.relations, values)
     except InputError as error:
         error.place = None if profile is None else profile.place("components", component.name)
         raise
-    return settings
+    return values
 
 
 def _adapted(plot: ActionPlot, profile: Profile) -> ActionPlot:

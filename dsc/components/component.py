@@ -11,7 +11,7 @@ from dsc.calls import Ended, Outcome, SkillCall, Status
 from dsc.components.activations import Activations
 from dsc.components.declarations import check_declarations
 from dsc.components.life import Life, LifeCycle
-from dsc.components.parameters import Parameter, check_relations, known
+from dsc.components.parameters import Parameter, changed, check_relations, known, require_bound, unsaid
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
@@ -57,10 +57,8 @@ class Component:
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
         self.mode = NEUTRAL
-        self.parameters: dict[str, Any] = {
-            name: one.default for name, one in self.declares.items() if one.default is not None
-        }
-        self._together: Mapping[str, Any] = {}  # parameters that are being set as one
+        self.parameters: dict[str, Any] = dict(unsaid(self.declares))
+        self._judged = False  # the parameters that are being set are known to fit together
         self.life = LifeCycle()
         self._starting = False
         self.activations = Activations()
@@ -83,6 +81,7 @@ class Component:
                 f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
             )
         check_arguments(signature, arguments)
+        require_bound(self.name, self.declares, self.parameters)
         body = self.body(skill_name)
         declared: Declared = getattr(body, DECLARED)
         return declared.carry_out(self, body, call, arguments)
@@ -94,27 +93,34 @@ class Component:
     async def configure(self, parameter: str, value: object) -> None:
         """The *param* port: set a named parameter; override to react.
 
+        Of a declared one, `None` takes back what was said. What relies on it is unbound, see `Parameter.depends_on`.
+
         Raises:
             UnknownNameError: the component declares its parameters, and this is none.
             InputError: the value does not fit what is declared, or a relation.
         """
-        self.check_parameter(parameter, value)
-        self.parameters[parameter] = value
+        after = self._after(parameter, value)
+        self.parameters.clear()
+        self.parameters.update(after)
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
         """Have the parameters that were in force before a restart: judged as one set, then each set by `configure`.
 
+        They come in the order in which they were said last, as what is said anew unbinds what relies on it.
+
         Raises:
             UnknownNameError, InputError: as `configure`; if one value does not fit, none is set.
         """
-        self._together = values
+        after = dict(self.parameters)
+        for parameter, value in values.items():
+            after = self._changed(after, parameter, value)
+        check_relations(self.name, self.relations, after)
+        self._judged = True
         try:
-            for parameter, value in values.items():
-                self.check_parameter(parameter, value)
             for parameter, value in values.items():
                 await self.configure(parameter, value)
         finally:
-            self._together = {}
+            self._judged = False
 
     def check_parameter(self, parameter: str, value: object, who: Who | None = None) -> None:
         """Whether a parameter may have that value now; nothing is changed.
@@ -130,11 +136,23 @@ class Component:
         """
         if not self.declares and who is None:  # it takes anything from plots, and nothing from others
             return
-        declared, name = known(self.name, parameter, self.declares), f"{self.name}.{parameter}"
         if who is not None:
-            refuse_change(name, who, declared.changed_by)
-        values = {**self.parameters, **self._together, parameter: declared.check(name, value)}
-        check_relations(self.name, self.relations, values)
+            declared = known(self.name, parameter, self.declares)
+            refuse_change(f"{self.name}.{parameter}", who, declared.changed_by)
+        self._after(parameter, value)
+
+    def _after(self, parameter: str, value: Any) -> dict[str, Any]:
+        """The values after one has been set."""
+        after = self._changed(self.parameters, parameter, value)
+        if not self._judged:
+            check_relations(self.name, self.relations, after)
+        return after
+
+    def _changed(self, values: Mapping[str, Any], parameter: str, value: Any) -> dict[str, Any]:
+        if not self.declares:
+            return {**values, parameter: value}
+        known(self.name, parameter, self.declares)
+        return changed(self.name, self.declares, values, {parameter: value})
 
     async def switch(self, mode: str) -> None:
         """The *state* port: enter a mode (`neutral` is at rest); override to react."""

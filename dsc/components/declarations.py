@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping
+from graphlib import CycleError
 from typing import get_args
 
-from dsc.components.parameters import Parameter, Type
+from dsc.components.parameters import Parameter, Type, unsaid
 from dsc.model.ranges import Who, written
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.language.expression import free_variables
@@ -32,6 +33,7 @@ def check_declarations(
     try:
         for name, parameter in declares.items():
             _check_parameter(f"{component}.{name}", parameter)
+        _check_dependencies(component, declares)
         _check_relations(component, declares, relations)
     except InputError as error:
         file = getattr(sys.modules.get(module), "__file__", None)
@@ -48,6 +50,8 @@ def _check_parameter(name: str, parameter: Parameter) -> None:
         raise UnknownNameError(message, found=str(parameter.changed_by), valid=get_args(Who))
     for problem in parameter.range.problems():
         raise SchemaError(f"parameter '{name}': {problem}")
+    if parameter.default is not None and parameter.follows is not None:
+        raise SchemaError(f"parameter '{name}' has a default and follows from others; only one of both can be")
     if parameter.default is not None:
         try:
             parameter.check(name, parameter.default)
@@ -57,6 +61,27 @@ def _check_parameter(name: str, parameter: Parameter) -> None:
                 f"the default of parameter '{name}' is {found}, but it is {parameter.range}",
                 found=found, valid=map(str, parameter.among),
             ) from error  # fmt: skip
+
+
+def _check_dependencies(component: str, declares: Mapping[str, Parameter]) -> None:
+    for name, parameter in declares.items():
+        full = f"{component}.{name}"
+        if isinstance(parameter.depends_on, str):
+            raise SchemaError(f"`depends_on` of parameter '{full}' is a tuple of names, not one text")
+        try:
+            reasons = parameter.reasons
+        except InputError as error:
+            raise SchemaError(f"what parameter '{full}' follows, {parameter.follows}, is no term: {error}") from error
+        for reason in sorted(reasons - set(declares)):
+            message = f"parameter '{full}' relies on '{reason}', which is not declared"
+            raise UnknownNameError(message, found=reason, valid=declares)
+    try:
+        values = unsaid(declares)
+    except CycleError as error:
+        round_ = ", ".join(f"'{name}'" for name in error.args[1])
+        raise SchemaError(f"parameters of component '{component}' rely on each other in a circle: {round_}") from error
+    for name, value in values.items():
+        declares[name].check(f"{component}.{name}", value)
 
 
 def _check_relations(component: str, declares: Mapping[str, Parameter], relations: Iterable[str]) -> None:

@@ -5,6 +5,7 @@
             "speed": Parameter("number", default=0.5, least=0.1, most=1.5),
             "port": Parameter("text", changed_by="profile"),              # no default: a profile has to say it
             "wheels": Parameter("number", default=4, changed_by="nobody"),
+            "reach": Parameter("number", follows="(/ ?wheels 4)"),        # as long as nobody says another value
         }
         relations = ("(<= ?speed (/ ?wheels 4))",)
 
@@ -15,14 +16,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
+from graphlib import TopologicalSorter
 from typing import Literal
 
 from dsc.model.ranges import Range, Who, written
 from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.facts import Value
+from knowledge_base.language.asking import evaluate_term
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import free_variables
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
@@ -36,11 +40,14 @@ class Parameter:
 
     Attributes:
         type: `number`, `text` (any word) or `boolean`.
-        default: its value if no profile says another; without one, a profile has to.
+        default: its value as long as nobody says another; without one, a profile has to.
         least, most: the range of a number.
         among: the values of which it is one; empty means any.
         changed_by: who may change it, each one also what those after it may: `nobody`; a `profile`, before a run; an
             `operator`, while it goes on; the `rules` of plots, when something has gone wrong; `plots` anywhere.
+        follows: in place of a default, a term over other parameters, as `(* 0.5 ?cycle)`.
+        depends_on: parameters on whose values this one's relies, besides those that it follows. When one of them is
+            said anew, what was said of this one is void: it has its default again, follows anew, or has no value.
     """
 
     type: Type
@@ -49,6 +56,23 @@ class Parameter:
     most: float | None = None
     among: tuple[Value, ...] = ()
     changed_by: Who = "plots"
+    follows: str | None = None
+    depends_on: tuple[str, ...] = ()
+
+    @property
+    def reasons(self) -> frozenset[str]:
+        """The parameters on which its value relies."""
+        return frozenset(self.depends_on) | (free_variables(_term(self.follows)) if self.follows else frozenset())
+
+    def unsaid(self, values: Mapping[str, Value]) -> Value | None:
+        """What it is worth if nobody says it, given the values of others; `None` if it has no value then."""
+        if self.follows is None:
+            return self.default
+        term = _term(self.follows)
+        if not all(name in values for name in free_variables(term)):
+            return None
+        found = evaluate_term(term, _NOTHING, values)
+        return found if isinstance(found, str | int | float | bool) else None
 
     @property
     def range(self) -> Range:
@@ -58,6 +82,65 @@ class Parameter:
     def check(self, name: str, value: object) -> Value:
         """The value, if it fits; see `Range.check`."""
         return self.range.check(name, value)
+
+
+def in_order(declared: Mapping[str, Parameter]) -> tuple[str, ...]:
+    """The names, those first on whose values others rely; raises `graphlib.CycleError`."""
+    return tuple(TopologicalSorter({name: one.reasons for name, one in declared.items()}).static_order())
+
+
+def unsaid(declared: Mapping[str, Parameter]) -> dict[str, Value]:
+    """What parameters are worth when nobody has said anything, as far as they have a value then."""
+    values: dict[str, Value] = {}
+    for name in in_order(declared):
+        value = declared[name].unsaid(values)
+        if value is not None:
+            values[name] = value
+    return values
+
+
+def changed(
+    component: str, declared: Mapping[str, Parameter], values: Mapping[str, Value], said: Mapping[str, Value | None]
+) -> dict[str, Value]:
+    """What all parameters are worth after some have been said anew.
+
+    What relies on one of these is unbound, unless it has been said as well (S1.11). That goes for the same value said
+    again, too: so what is so follows from what was said last of each, in order, and is the same after a restart.
+
+    Args:
+        component: its name, for messages.
+        declared: what its builder says.
+        values: what was so.
+        said: what is so now; `None` takes back what was said.
+
+    Raises:
+        InputError: a value does not fit what is declared, or one that follows does not.
+    """
+    found, others = dict(values), set[str]()
+    for name in in_order(declared):
+        parameter, word = declared[name], said.get(name)
+        if name not in said and others.isdisjoint(parameter.reasons):
+            continue
+        value = parameter.unsaid(found) if word is None else word
+        if value is None:
+            found.pop(name, None)
+        else:
+            found[name] = parameter.check(f"{component}.{name}", value)
+        others.add(name)
+    return found
+
+
+def require_bound(component: str, declared: Mapping[str, Parameter], values: Mapping[str, Value]) -> None:
+    """Raise `SchemaError` if a parameter has no value; the message says whose it is to say, and why it is missing."""
+    for name, parameter in declared.items():
+        if name not in values:
+            raise SchemaError(f"'{component}.{name}' has no value: {_whose(parameter)}", found=name)
+
+
+def _whose(parameter: Parameter) -> str:
+    reasons = ", ".join(f"'{name}'" for name in sorted(parameter.reasons))
+    told = "its builder leaves it to a profile"
+    return told if not reasons else f"{told}, and what is said of it is void when {reasons} is said anew"
 
 
 def known(component: str, name: str, declared: Mapping[str, Parameter]) -> Parameter:
@@ -91,4 +174,5 @@ def check_relations(component: str, relations: Iterable[str], values: Mapping[st
             raise SchemaError(f"component '{component}' needs {text}, but {said}")
 
 
+_term = cache(parse_term)
 _NOTHING = Overlay(WorldState(Schema()))

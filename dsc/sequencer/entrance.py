@@ -78,7 +78,7 @@ def parameter(
     else:
         valid = [*components, *(plot.name for plot in library)]
         raise UnknownNameError(f"there is no component or plot '{owner}'", found=owner, valid=valid)
-    assert isinstance(value, str | int | float | bool)  # noqa: S101  as everything that fits a range
+    assert value is None or isinstance(value, str | int | float | bool)  # noqa: S101  as everything that fits a range
     return ParameterMessage(owner, name, value, of_plot=owner not in components)
 
 

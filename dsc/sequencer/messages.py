@@ -48,13 +48,13 @@ class ParameterMessage:
 
     Attributes:
         owner: the component, or the plot, that has it.
-        name, value: of the parameter.
+        name, value: of the parameter; `None` takes back what was said of a component's.
         of_plot: whether it is a plot's.
     """
 
     owner: str
     name: str
-    value: Value
+    value: Value | None
     of_plot: bool
 
 

@@ -171,7 +171,7 @@ class Sequencer:
         Args:
             owner: the component, or the plot, that has the parameter.
             name: of the parameter.
-            value: within its range.
+            value: within its range; of a component, `None` takes back what was said.
             after: as for `post`.
 
         Raises:

@@ -8,9 +8,14 @@ from typing import ClassVar
 
 import pytest
 
-from dsc import Component, Library, parse_plot, validate_plot
+from dsc import Component, Library, Outcome, Sequencer, parse_plot, skill, validate_plot
 from dsc.components.parameters import Parameter
-from knowledge_base import InputError
+from dsc.profiles import configure
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.sequencer.sequencer import RunEnd
+from dsc.text.profiles import parse_profile
+from knowledge_base import InputError, KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 
 class Base(Component):
@@ -155,3 +160,124 @@ def test_a_relation_that_cannot_be_meant_is_refused(relations, said):
     with pytest.raises(InputError) as refused:
         a_class(relations, lift=Parameter("number", default=1))
     assert said in str(refused.value)
+
+
+# -- what relies on other parameters ---------------------------------------------------------------------------
+
+
+class Axle(Component):
+    """A worst-case time that is measured for each processor, and what follows from it (S1.11)."""
+
+    name = "axle"
+    declares: ClassVar = {
+        "period": Parameter("number", follows="(* 2 ?worst)", most=100),
+        "processor": Parameter("text", default="a", among=("a", "b"), changed_by="operator"),
+        "worst": Parameter("number", default=3, depends_on=("processor",)),
+        "label": Parameter("text", changed_by="profile", depends_on=("period",)),
+    }
+    relations = ("(>= ?period ?worst)",)
+
+
+def axle(**said):
+    made = Axle()
+    for name, value in said.items():
+        asyncio.run(made.configure(name, value))
+    return made
+
+
+def test_what_follows_has_a_value_from_the_beginning_and_whenever_its_reasons_are_said_anew():
+    assert axle().parameters == {"period": 6, "processor": "a", "worst": 3}
+    assert axle(worst=5).parameters["period"] == 10
+    assert axle(worst=5, period=7).parameters["period"] == 7
+    assert axle(period=7, worst=5).parameters["period"] == 10
+
+
+def test_what_relies_on_what_is_said_anew_is_unbound_all_along_the_chain():
+    bound = axle(worst=5, period=8, label="measured", processor="b")
+    assert bound.parameters == {"period": 6, "processor": "b", "worst": 3}
+
+
+def test_what_was_said_is_taken_back():
+    assert axle(worst=5, period=7, label="x").parameters["label"] == "x"
+    assert axle(worst=5, label="x", period=None).parameters == {"processor": "a", "worst": 5, "period": 10}
+    made = axle(label="x")
+    asyncio.run(made.configure("label", None))
+    assert "label" not in made.parameters
+
+
+def test_what_follows_is_in_its_range_or_nothing_changes():
+    made = axle()
+    with pytest.raises(InputError, match=r"'axle\.period' is 100 or less; found 120"):
+        asyncio.run(made.configure("worst", 60))
+    assert made.parameters == {"period": 6, "processor": "a", "worst": 3}
+
+
+def test_a_profile_binds_what_relies_on_each_other_at_once():
+    made = axle()
+    with pytest.raises(InputError, match=r"'axle\.label' has no value: .* what is said of it is void when 'period' is said anew"):
+        configure([made])
+    configure([made], parse_profile("profile: p\ncomponents: {axle: {label: x, worst: 9, processor: b}}"))
+    assert made.parameters == {"period": 18, "processor": "b", "worst": 9, "label": "x"}
+
+
+@pytest.mark.parametrize(
+    ("declared", "said"),
+    [
+        (Parameter("number", follows="(* 2 ?lft)"), "parameter 'crane.lift' relies on 'lft', which is not declared; did you mean 'lift'?"),
+        (Parameter("number", default=1, depends_on=("lft",)), "relies on 'lft', which is not declared"),
+        (Parameter("number", follows="(* 2 ?lift)"), "parameters of component 'crane' rely on each other in a circle: 'lift', 'lift'"),
+        (Parameter("number", default=1, follows="2"), "has a default and follows from others"),
+        (Parameter("number", follows="(* 2"), "is no term"),
+        (Parameter("number", follows="2", most=1), "'crane.lift' is 1 or less; found 2"),
+        (Parameter("number", default=1, depends_on="lift"), "is a tuple of names, not one text"),
+    ],
+)
+def test_a_dependency_that_cannot_be_meant_is_refused(declared, said):
+    with pytest.raises(InputError) as refused:
+        a_class(lift=declared)
+    assert said in str(refused.value)
+
+
+def test_an_operator_changes_what_others_rely_on_and_the_next_skill_says_what_is_missing():
+    class Wheel(Component):
+        name = "wheel"
+        declares: ClassVar = {
+            "tyre": Parameter("text", default="soft", among=("soft", "hard"), changed_by="operator"),
+            "slip": Parameter("number", changed_by="operator", depends_on=("tyre",)),
+        }
+
+        @skill(outcomes={"rolled": {}})
+        async def roll(self, call):
+            return Outcome("rolled")
+
+    text = """
+    plot: p
+    emits: {lost: {why: text}}
+    states:
+      one: {entry: {trigger: wheel.roll}, on: {rolled: rest, skill_error: lost}}
+      rest: {after: {seconds: 2, to: two}}
+      two:
+        entry: {trigger: wheel.roll}
+        on: {rolled: over, skill_error: {to: over, emit: lost, with: {why: ?event.reason}}}
+      lost: {final: true}
+      over: {final: true}
+    """
+
+    def ran(*said):
+        wheel = Wheel()
+        configure([wheel], parse_profile("profile: p\ncomponents: {wheel: {slip: 3}}"))
+
+        async def main():
+            sequencer = Sequencer(Library([parse_plot(text)]), KnowledgeBase(Schema()), [wheel], LoopClock())
+            for name, value in said:
+                sequencer.set_parameter("wheel", name, value, after=1)
+            return await sequencer.run("p")
+
+        return run_simulated(main())
+
+    assert ran() == RunEnd(finished=True)
+    (lost,) = ran(("tyre", "hard")).emitted
+    assert "'wheel.slip' has no value" in lost.attributes["why"]
+    assert ran(("tyre", "hard"), ("slip", 4)) == RunEnd(finished=True)
+    (lost,) = ran(("slip", None)).emitted
+    assert "'wheel.slip' has no value" in lost.attributes["why"]
