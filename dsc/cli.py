@@ -10,6 +10,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dsc.components.component import Component
     from dsc.dynamic.library import Library
     from dsc.errors import Finding
     from dsc.model.plot import ActionPlot
@@ -45,6 +46,14 @@ def check(
             help="What conditions may speak of.  [default: domain.pddl beside FILE or one folder up]",
         ),
     ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot",
+            metavar="MODULE:NAME",
+            help="A component, several, or a function that makes them: then skills and parameters are checked, too.",
+        ),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of findings.")] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Warnings count, too.")] = False,
 ) -> None:
@@ -52,10 +61,12 @@ def check(
 
     A plot may use the other plots in its folder. Exit status: 0 nothing found, or warnings alone, 2 findings.
     """
+    from dsc.components.named import robot_of
     from dsc.text.neighbours import Neighbours
 
     neighbours = Neighbours()
-    found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours)]
+    components = None if robot is None else robot_of(robot)
+    found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
     if json:
         _print_json([_as_data(file, finding) for file, finding in found])
     else:
@@ -204,7 +215,9 @@ def schema(
     _print_json(profile_schema() if profile else json_schema())
 
 
-def _findings(file: Path, domain: Path | None, neighbours: Neighbours) -> list[Finding]:
+def _findings(
+    file: Path, domain: Path | None, neighbours: Neighbours, components: tuple[Component, ...] | None
+) -> list[Finding]:
     """What is wrong with one file; what cannot be read at all is one finding."""
     from dsc.errors import Finding
     from dsc.validation import review_plot, validate_plot
@@ -214,7 +227,9 @@ def _findings(file: Path, domain: Path | None, neighbours: Neighbours) -> list[F
     try:
         plot = _load(file)
         library, broken = neighbours.of(file, plot)
-        findings = validate_plot(plot, library, known) or review_plot(plot, library)
+        skills = None if components is None else [one for c in components for one in c.skills().values()]
+        declared = None if components is None else {c.name: c.declares for c in components}
+        findings = validate_plot(plot, library, known, skills, declared) or review_plot(plot, library)
     except InputError as error:
         return [Finding(error, "readable")]
     if any(finding.rule == UNKNOWN_PLOT for finding in findings):

@@ -31,6 +31,7 @@ from knowledge_base.journal.file import Durability
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.compatibility import require_extension
+from knowledge_base.world.schema import Schema
 from planning import entrance
 from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of
 from planning.collecting import settled
@@ -58,7 +59,8 @@ class Executive:
         plots: the plots; those with `implements` carry out the domain's planning actions. A `Library` is taken as it
             is, so that executives can share what was worked out for it; `achieve` is added if it has none.
         components: the skills.
-        knowledge: the world model; an empty one of the domain's schema if left out.
+        knowledge: the world model; an empty one of the domain's schema if left out. Plots may ask for all that its
+            schema declares.
         planner: finds plans; if left out, pyperplan in simulated time, so that a run can be repeated, and in real
             time the engines that suit a problem, in a race.
         parallel: whether steps of a plan that need not wait for each other are carried out side by side.
@@ -110,7 +112,8 @@ class Executive:
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
         declared = {PlanningComponent.name: PlanningComponent.declares, **{c.name: c.declares for c in self.components}}
-        _require_sound(self.library, self.domain, skills, declared)
+        schema = self.domain.schema if knowledge is None else knowledge.schema
+        _require_sound(self.library, self.domain, schema, skills, declared)
         if knowledge is not None:
             self.knowledge = knowledge
         else:  # at last, since what is opened has to be closed
@@ -332,15 +335,16 @@ _MOST_SOUND = 16
 def _require_sound(
     library: Library,
     domain: PlanningDomain,
+    schema: Schema,
     skills: Collection[SkillSignature],
     declared: Mapping[str, Mapping[str, Parameter]],
 ) -> None:
     """Raise `PlotError` for what the validator finds; what is the same as before is not looked through again."""
-    parts = (domain, *library, *skills, *declared, *declared.values())
+    parts = (domain, schema, *library, *skills, *declared, *declared.values())
     key = tuple(map(id, parts))
     if key in _sound:
         return
-    findings = validate_library(library, domain.schema, skills, declared)
+    findings = validate_library(library, schema, skills, declared)
     raise_findings([*findings, *check_implementations(library, domain)])
     if len(_sound) >= _MOST_SOUND:
         _sound.clear()

@@ -130,8 +130,7 @@ class Responses:
         return SubmachineState(use=do.use, arguments=arguments, entry=do.command, on=on, about=about)
 
     def _limit(self, rule: Rule, key: str) -> tuple[lang.Expression | None, dict[str, lang.Term]]:
-        bounded = rule.then == RETRY or (rule.then == REPLAN and not self._plot.generated)
-        limit = rule.do.limit or (DEFAULT_RETRIES if bounded else None)
+        limit = limit_of(rule, generated=self._plot.generated)
         if limit is None:
             return rule.when, {}
         counter = self._added.variable(f"tries_{key}", "number", 0)
@@ -147,6 +146,12 @@ class Responses:
                 place=self._plot.place(("rules", number, "do", "then")),
             )
         return list(state.on[event])
+
+
+def limit_of(rule: Rule, *, generated: bool = False) -> int | None:
+    """How often a rule answers for one state; `None` for as often as need be."""
+    bounded = rule.then == RETRY or (rule.then == REPLAN and not generated)
+    return rule.do.limit or (DEFAULT_RETRIES if bounded else None)
 
 
 def skipped(step: str) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Step
+from dsc.dynamic.steps import Step, concerns
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path, Scope, initial_of
+from dsc.model.rules import ENTER
 from dsc.model.states import AnyState, CompositeState, DynamicState, OrthogonalState, SubmachineState
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, SchemaError
@@ -35,9 +36,19 @@ def _unreached(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator
     responses = {rule.then for rule in plot.rules}  # the steps of plans may end with what no state here does
     for name in _unreached_in(expanded, (), ways, responses):
         if name in nesting.names:
-            place = plot.place(nesting.names[name])
-            error = SchemaError(f"nothing leads to the state '{name}'", place=place, found=name)
-            yield Finding(error, "reachable", "add a transition to it, or make it `initial`")
+            yield _nothing_leads_to(name, plot, library, nesting)
+
+
+def _nothing_leads_to(name: str, plot: ActionPlot, library: Library, nesting: Nesting) -> Finding:
+    state, place = plot.state(name), plot.place(nesting.names[name])
+    replacing = [rule for rule in plot.rules if rule.before and rule.when is None and rule.then != ENTER]
+    for rule in replacing:
+        if isinstance(state, Step) and concerns(rule, name, state, library):
+            message = f"the rule '{rule.label}' always takes the place of step '{name}', which is never entered"
+            error = SchemaError(message, place=place, found=name)
+            return Finding(error, "reachable", "say with `when` when the rule does so")
+    error = SchemaError(f"nothing leads to the state '{name}'", place=place, found=name)
+    return Finding(error, "reachable", "add a transition to it, or make it `initial`")
 
 
 def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]) -> Iterator[str]:

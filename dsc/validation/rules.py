@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import Step, contents_of
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import ENTER, RESPONSES, RETRY, Rule
@@ -27,17 +28,28 @@ def check_rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterato
         key = "of" if rule.on is not None else rule.place
         for position, name in enumerate(rule.steps):
             if name not in steps:
-                missing = UnknownNameError(
-                    f"there is no state '{name}', nor a plot that implements an action of that name",
-                    place=plot.place((*path, key, position)), found=name, valid=steps,
-                )  # fmt: skip
-                yield Finding(missing, "rule")
+                yield _no_step(plot, name, (*path, key, position), library, steps)
     for number, handler in enumerate(plot.handlers):
         path = ("handlers", number)
         yield from _used(plot, handler.do.use, path, library)
         if handler.interrupt and not handler.do.acts:
             error = SchemaError("a handler that only tells something interrupts nothing", place=plot.place(path))
             yield Finding(error, "handler", "leave `interrupt` out, or say what to `use`")
+
+
+def _no_step(plot: ActionPlot, name: str, path: Path, library: Library, steps: set[str]) -> Finding:
+    """The finding about a step that is not there: of a plot's name, with the names by which it is spoken of."""
+    place = plot.place(path)
+    if name not in library:
+        message = f"there is no state '{name}', nor a plot that implements an action of that name"
+        return Finding(UnknownNameError(message, place=place, found=name, valid=steps), "rule")
+    states = ((own, state) for own, state, _ in plot.walk() if isinstance(state, Step))
+    holding = [own for own, state in states if name in {used.name for used in contents_of(state, library)}]
+    action = library.plot(name).implements
+    names = [*(f"state '{own}'" for own in holding), *([f"planning action '{action}'"] if action else [])]
+    spoken = f", here {' or '.join(names)}" if names else ", and no state here holds it"
+    message = f"'{name}' is a plot; a rule names steps by their state or planning action{spoken}"
+    return Finding(SchemaError(message, place=place, found=name), "rule")
 
 
 def _response(plot: ActionPlot, rule: Rule, path: Path, names: set[str]) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.outcomes import answerable, outcomes_of
+from dsc.dynamic.responses import limit_of
 from dsc.dynamic.steps import Step, answers_in_plans, concerns
 from dsc.errors import Finding
 from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, TIMERS
@@ -124,13 +125,22 @@ def _outcomes(
         if handled.get(event):
             continue
         if event in handled:
-            message = f"state '{name}' may not handle its outcome '{event}': every transition has a guard"
-            fix = "add a last transition or rule without `when`"
+            why, fix = _not_always(plot, event)
+            message = f"state '{name}' may not handle its outcome '{event}': {why}"
         else:
             message = f"state '{name}' does not handle its outcome '{event}'"
             fix = f"add `{event}: STATE` under `on`, or a rule"
         error = SchemaError(message, place=plot.place((*path, "on", event)))
         yield Finding(error, "every outcome is wired", fix)
+
+
+def _not_always(plot: ActionPlot, event: str) -> tuple[str, str]:
+    """Why an outcome that is handled is not always handled, and what helps."""
+    answers = [rule for rule in plot.rules if rule.on == event and rule.when is None and limit_of(rule) is not None]
+    if not answers:
+        return "every transition has a guard", "add a last transition or rule without `when`"
+    often, then = limit_of(answers[-1]), answers[-1].then
+    return f"the rule that answers it with '{then}' does so {often} times", f"add a last rule that does not '{then}'"
 
 
 def _skills(

@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from dsc.cli import app
+from dsc.components.named import robot_of
 from dsc.text.plots import parse_plot
 from knowledge_base.errors import InputError
 
@@ -211,3 +212,65 @@ def test_help_is_light() -> None:
     code = f"import sys, dsc.cli; print([m for m in {heavy!r} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
+
+
+# -- with the components of a robot ----------------------------------------------------------------------------
+
+ROBOT = """
+from dsc import Component, Outcome, skill
+
+
+class Arm(Component):
+    name = "arm"
+
+    @skill(outcomes={"grasped": {}, "slipped": {}})
+    async def grasp(self, call):
+        return Outcome("grasped")
+
+
+def components():
+    return [Arm()]
+
+
+number = 7
+
+
+def broken():
+    raise RuntimeError("no arm today")
+"""
+GRASPS = "plot: grasps\nstates:\n  s: {entry: {trigger: arm.grasp}, on: {grasped: e}}\n  e: {final: true}\n"
+
+
+@pytest.fixture
+def robot(tmp_path, monkeypatch):
+    (tmp_path / "some_robot.py").write_text(ROBOT)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield written(tmp_path, grasps=GRASPS)
+    sys.modules.pop("some_robot", None)
+
+
+@pytest.mark.parametrize("name", ["components", "Arm"])
+def test_with_a_robot_skills_are_checked_too(robot, name):
+    assert run("check", robot).exit_code == 0
+    result = run("check", robot, "--robot", f"some_robot:{name}")
+    assert result.exit_code == 2
+    assert "state 's' does not handle its outcome 'slipped'" in result.output
+    robot.write_text(GRASPS.replace("arm.grasp", "arm.grsp"))
+    assert "no component offers the skill 'arm.grsp'" in run("check", robot, "--robot", f"some_robot:{name}").output
+
+
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [
+        ("some_robot", "a robot is named as MODULE:NAME, not 'some_robot'"),
+        ("some_robt:components", "the module 'some_robt' cannot be imported: ModuleNotFoundError"),
+        ("some_robot:componets", "there is no 'componets' in the module 'some_robot'; did you mean 'components'?"),
+        ("some_robot:number", "a component is an instance of a subclass of Component, not 7"),
+        ("some_robot:broken", "'some_robot:broken' gives no components: RuntimeError: no arm today"),
+    ],
+)
+def test_what_is_no_robot_is_named(robot, named, said):
+    with pytest.raises(InputError) as refused:
+        robot_of(named)
+    assert said in str(refused.value)

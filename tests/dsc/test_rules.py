@@ -88,6 +88,39 @@ def test_rules_that_read_variables_of_their_plot_pass_the_validator():
     assert validate_plot(holder, Library([holder, parse_plot(STEP), parse_plot(RECOVER)])) == []
 
 
+# -- messages that say what is meant ---------------------------------------------------------------------------
+
+
+def said_of(*rules):
+    holder = parse_plot(HOLDER.replace("fine:\n", "fine: {final: true}\n").replace("given_up:\n", "given_up: {final: true}\n").replace(
+        "      elsewhere:\n", ""
+    ) + "".join(f"      - {rule}\n" for rule in rules))
+    return [str(one) for one in validate_plot(holder, Library([holder, parse_plot(STEP), parse_plot(RECOVER)]))]
+
+
+@pytest.mark.parametrize(("rule", "often"), [("then: retry", 3), ("then: retry, limit: 5", 5), ("then: fine, limit: 2", 2)])
+def test_a_rule_that_answers_only_so_often_is_said_to(rule, often):
+    others = "{on: broken, do: {then: continue}}"
+    (said,) = said_of(f"{{on: failed, do: {{{rule}}}}}", others)
+    then = rule.split(",")[0].removeprefix("then: ")
+    assert f"'do_it' may not handle its outcome 'failed': the rule that answers it with '{then}' does so {often} times" in said
+    assert f"add a last rule that does not '{then}'" in said
+
+
+def test_a_step_that_a_rule_always_replaces_is_said_to_be():
+    ends = ("{on: failed, do: {then: continue}}", "{on: broken, do: {then: continue}}")
+    said, _ = said_of("{before: do_it, do: {use: recover, then: continue}}", *ends)
+    assert "the rule 'before do_it: recover, continue' always takes the place of step 'do_it', which is never entered" in said
+
+
+def test_a_rule_before_a_plot_is_told_how_steps_are_named():
+    ends = ("{on: failed, do: {then: continue}}", "{on: broken, do: {then: continue}}")
+    (said,) = said_of("{before: step, do: {use: recover}}", *ends)
+    assert "'step' is a plot; a rule names steps by their state or planning action, here state 'do_it'" in said
+    (said,) = said_of("{after: recover, do: {use: recover}}", *ends)
+    assert "'recover' is a plot; a rule names steps by their state or planning action, and no state here holds it" in said
+
+
 def generated(rules=(), on="done: finished"):
     indented = "".join(f"      - {rule}\n" for rule in rules)
     made = plot(f"""

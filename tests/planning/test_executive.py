@@ -5,10 +5,11 @@ from typing import ClassVar
 
 import pytest
 
-from dsc import Component, Event, Outcome, SkillCall, parse_plot, primitive_plot, skill
+from dsc import Component, Event, Library, Outcome, SkillCall, parse_plot, primitive_plot, skill
 from dsc.components.parameters import Parameter
 from dsc.errors import PlotError
-from knowledge_base import Delta, InputError, fact
+from dsc.models import MODELS, described
+from knowledge_base import Delta, InputError, KnowledgeBase, fact
 from planning import Executive, Plan, PlanningDomain, PlanStep
 from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
 
@@ -583,3 +584,26 @@ def test_a_component_whose_parameter_nobody_has_said_is_refused_before_anything_
     bound.parameters["port"] = "ttyS0"
     with pytest.raises(InputError, match=r"component 'laser' needs .<= .rate .most., but most is 20, rate is 30"):
         Executive("(define (domain d))", [], [bound])
+
+
+def test_plots_ask_for_rules_if_the_knowledge_has_the_design():
+    text = """
+    plot: p
+    states:
+      asked: {choice: [{when: (exists (?r - object) (stands-in ?r "plot:p")), to: known}, unknown]}
+      work: {use: part, on: {done: known}}
+      known: {after: {seconds: 2, to: over}}
+      unknown: {on: {done: work}}
+      over: {final: true}
+    rules: [{on: lost, do: {then: continue}}]
+    """
+    plots = [parse_plot(text), parse_plot("plot: part\nemits: {lost: }\nstates: {a: {after: {seconds: 1, to: e, emit: lost}}, e: {final: true}}")]
+    domain, library, seconds = PlanningDomain.parse("(define (domain d))"), Library(plots), []
+    with pytest.raises(PlotError, match="there is no predicate 'stands-in'"):
+        Executive(domain, library, [])
+    design = KnowledgeBase(domain.schema.merged(MODELS))
+    design.apply(described(library, []), author="design")
+    with Executive(domain, library, [], design) as robot:
+        robot.listen(lambda record: seconds.append(record.t))
+        assert robot.run("p").finished
+    assert seconds[-1] == 2.0
