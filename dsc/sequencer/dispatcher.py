@@ -153,7 +153,7 @@ class Dispatcher:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
 
-    def declared(self, message: Message) -> Declared:
+    def attributes_of(self, message: Message) -> Declared:
         """What the attributes of a skill's outcome are declared to be; nothing for any other message."""
         if not isinstance(message, SkillMessage) or not message.outcome.attributes:
             return {}

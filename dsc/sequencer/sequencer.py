@@ -277,7 +277,7 @@ class Sequencer:
         self._carry_out(output)
 
     def _take(self, message: Message) -> None:
-        message = self._reactor.believed(message, self.dispatcher.declared(message))
+        message = self._reactor.believed(message, self.dispatcher.attributes_of(message))
         if self.store is None:
             output = self._reactor.react(message)
         else:
