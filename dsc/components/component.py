@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 from collections.abc import Awaitable, Iterable, Mapping
 from pathlib import Path
@@ -10,15 +11,13 @@ from typing import Any, ClassVar, cast
 from dsc.calls import Ended, Outcome, SkillCall, Status
 from dsc.components.activations import Activations
 from dsc.components.declarations import check_declarations
-from dsc.components.life import Life, LifeCycle
+from dsc.components.life import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import Parameter, changed, check_relations, known, require_bound, unsaid
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import require_several, shown
 
-NEUTRAL = "neutral"
-"""The mode at rest."""
 ALWAYS = ""
 """Stands for every mode in `Component.needs`."""
 TAKES = "__dsc_takes__"
@@ -56,12 +55,20 @@ class Component:
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
-        self.mode = NEUTRAL
         self.parameters: dict[str, Any] = dict(unsaid(self.declares))
         self._judged = False  # the parameters that are being set are known to fit together
         self.life = LifeCycle()
         self._starting = False
         self.activations = Activations()
+
+    @property
+    def mode(self) -> str:
+        """The sub-state of Alive that it is in, `neutral` at rest; whom it needs may depend on it."""
+        return self.life.mode
+
+    @mode.setter
+    def mode(self, mode: str) -> None:
+        self.life.mode = mode
 
     def skills(self) -> dict[str, SkillSignature]:
         """The signatures of all decorated methods, by skill name."""
@@ -229,6 +236,11 @@ class Component:
     def needed(self) -> tuple[str, ...]:
         """Names of the components it needs in its present mode."""
         return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
+
+    async def reach(self, name: str) -> Component:  # noqa: ARG002
+        """Wait for a component that it needs and that is not deployed here; override where others can be found."""
+        never: asyncio.Future[Component] = asyncio.get_running_loop().create_future()
+        return await never
 
     async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
         """What became of an action that this process did not start; override to ask the robot.

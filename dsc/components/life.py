@@ -19,6 +19,8 @@ class Life(StrEnum):
     FATAL_ERROR = "fatal_error"
 
 
+NEUTRAL = "neutral"
+"""The mode at rest."""
 _NEXT = {
     Life.INIT: {Life.ALIVE, Life.SHUTDOWN, Life.FATAL_ERROR},
     Life.ALIVE: {Life.INIT, Life.SHUTDOWN, Life.FATAL_ERROR},
@@ -38,11 +40,22 @@ class LifeCycle:
     def __init__(self) -> None:
         self.state = Life.INIT
         self.reason = ""
+        self._mode = NEUTRAL
         self._listeners: set[Callable[[], None]] = set()
 
     def __getstate__(self) -> dict[str, object]:
         """What goes to another process: who listens here does not."""
-        return {"state": self.state, "reason": self.reason, "_listeners": set()}
+        return {"state": self.state, "reason": self.reason, "_mode": self._mode, "_listeners": set()}
+
+    @property
+    def mode(self) -> str:
+        """The sub-state of Alive that it is in, or would be."""
+        return self._mode
+
+    @mode.setter
+    def mode(self, mode: str) -> None:
+        self._mode = mode
+        self.announce()
 
     def become(self, state: Life, reason: str = "") -> None:
         """Enter a state; nothing happens if it is there.
@@ -54,6 +67,10 @@ class LifeCycle:
             raise InputError(f"a component in '{self.state}' cannot become '{state}'", found=state)
         self.reason = reason if state is Life.FATAL_ERROR else ""
         self.state = state
+        self.announce()
+
+    def announce(self) -> None:
+        """Call who listens: something is different that others rely on, e.g. whom it needs."""
         for listener in tuple(self._listeners):
             listener()
 

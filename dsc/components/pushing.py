@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections.abc import Callable
 from typing import Any
 
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
@@ -25,19 +26,22 @@ class Publisher:
         endpoint: whose port it is.
         port: its name.
         period: push the newest value every so many seconds (*push timed*); without, whenever there is a new one.
+
+    Attributes:
+        newest: the newest value as subscribers `take` it, with its number.
     """
 
     def __init__(self, endpoint: Endpoint, port: str, period: float | None = None) -> None:
         self._endpoint = endpoint
         self._kind = f"push {port}"
         self._period = period
-        self._newest: dict[str, Any] = {"life": endpoint.life, "n": 0, "value": None}
+        self.newest: dict[str, Any] = {"life": endpoint.life, "n": 0, "value": None}
         self._subscribers: dict[str, float] = {}
         endpoint.answer(f"subscribe {port}", self._subscribe)
 
     def put(self, value: Any) -> None:
         """A new value; raises `InputError` if it is no plain data."""
-        self._newest = {"life": self._endpoint.life, "n": self._newest["n"] + 1, "value": value}
+        self.newest = {"life": self._endpoint.life, "n": self.newest["n"] + 1, "value": value}
         if self._period is None:
             self._push()
 
@@ -45,29 +49,38 @@ class Publisher:
         """Push periodically until cancelled; only for *push timed*."""
         while True:
             await asyncio.sleep(self._period or math.inf)
-            if self._newest["n"]:
+            if self.newest["n"]:
                 self._push()
 
     def _push(self) -> None:
         now = asyncio.get_running_loop().time()
         self._subscribers = {who: until for who, until in self._subscribers.items() if until > now}
         for who in self._subscribers:
-            self._endpoint.push(who, self._kind, self._newest)
+            self._endpoint.push(who, self._kind, self.newest)
 
     async def _subscribe(self, sender: str, _: Any) -> dict[str, Any]:
         self._subscribers[sender] = asyncio.get_running_loop().time() + FORGOTTEN
-        return self._newest
+        return self.newest
 
 
 class Subscription:
     """The newest value of another component's push port; `run` keeps it so.
 
+    Args:
+        endpoint: who subscribes.
+        publisher: whose port it is.
+        port: its name.
+        heard: is told each value that is newer than those known.
+
     Attributes:
         value: the newest one that is known; `None` before the first.
     """
 
-    def __init__(self, endpoint: Endpoint, publisher: str, port: str) -> None:
+    def __init__(
+        self, endpoint: Endpoint, publisher: str, port: str, heard: Callable[[Any], None] | None = None
+    ) -> None:
         self.value: Any = None
+        self._tell = heard
         self._endpoint = endpoint
         self._publisher = publisher
         self._port = port
@@ -99,21 +112,24 @@ class Subscription:
         """Subscribe, and again whenever the publisher may have forgotten, until cancelled."""
         while True:
             try:
-                newest = await self._endpoint.call(self._publisher, f"subscribe {self._port}", within=RENEWED)
+                newest = await self._endpoint.call(self._publisher, f"subscribe {self._port}", within=FORGOTTEN)
             except (NoAnswerError, RefusedError):
                 pass  # not there yet, or not there any more: it may come
             else:
-                self._take(newest)
+                self.take(newest)
             await asyncio.sleep(RENEWED)
 
     def _heard(self, sender: str, newest: dict[str, Any]) -> None:
         if sender == self._publisher:
-            self._take(newest)
+            self.take(newest)
 
-    def _take(self, newest: dict[str, Any]) -> None:
+    def take(self, newest: dict[str, Any]) -> None:
+        """Hear what the publisher has said, `Publisher.newest`, on whatever way; nothing older than known is taken."""
         self._at = asyncio.get_running_loop().time()
         life, number = newest["life"], newest["n"]
         present = life not in self._numbers or next(reversed(self._numbers)) == life
         if present and number > self._numbers.setdefault(life, 0):
             self._numbers[life], self.value = number, newest["value"]
             self._news.set()
+            if self._tell is not None:
+                self._tell(self.value)

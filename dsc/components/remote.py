@@ -4,6 +4,8 @@ An action is started by its id: however often a frame arrives, whatever is asked
 end is there until it has been taken, so that a run which is resumed hears of it. While it
 runs the host is asked how it goes; one that is silent for `SILENCE` seconds is in FatalError as seen from here, which
 ends the action with `skill_error`, and the next action looks for it anew.
+
+The host says how its component is, and whom it needs, each time that changes: a push port like any other.
 """
 
 from __future__ import annotations
@@ -12,45 +14,25 @@ import asyncio
 import secrets
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any
 
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.component import Component
 from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError
 from dsc.components.heartbeats import Heart
+from dsc.components.hosted import HostedActions, outcome_of
 from dsc.components.life import Life
+from dsc.components.pushing import RENEWED, Publisher, Subscription
 from dsc.components.transport import Transport
 from dsc.skills import SkillSignature
-from knowledge_base.exchange.forms import delta_form, delta_of
 
 WATCH = 1.0
 """Seconds after which a host is asked how an action goes."""
 SILENCE = 3.0
-"""Seconds for its answer."""
-
-
-def outcome_form(outcome: Outcome) -> dict[str, Any]:
-    """An outcome as plain data."""
-    return {
-        "event": outcome.event,
-        "attributes": dict(outcome.attributes),
-        "observed": delta_form(outcome.observed),
-    }
-
-
-def outcome_of(form: Mapping[str, Any]) -> Outcome:
-    """The outcome that `outcome_form` made it from."""
-    return Outcome(form["event"], form["attributes"], delta_of(form["observed"]))
-
-
-@dataclass(slots=True)
-class _Action:
-    """An action on the host's side: who wants to know, and what it has said so far, its end last."""
-
-    user: str
-    task: asyncio.Task[None]
-    said: list[dict[str, Any]] = field(default_factory=list)
+"""Seconds for its answer, and for any sign of life."""
+CONDITION = "its condition"
+"""Where a host pushes life, mode and needs of its component; no port that is declared has a blank in its name."""
 
 
 class Host:
@@ -58,80 +40,49 @@ class Host:
 
     def __init__(self, component: Component, transport: Transport, clock: Clock) -> None:
         self._component = component
-        self._clock = clock
         self._endpoint = Endpoint(component.name, transport)
-        self._actions: dict[tuple[str, str], _Action] = {}
-        self._endpoint.answer("skills", self._skills)
+        self._condition = Publisher(self._endpoint, CONDITION)
+        self._actions = HostedActions(component, self._endpoint, clock)
+        self._endpoint.answer("hull", self._hull)
         self._endpoint.answer("come alive", self._come_alive)
-        self._endpoint.answer("start", self._start)
-        self._endpoint.answer("how", self._how)
-        self._endpoint.answer("stop", self._stop)
+        self._endpoint.answer("switch", self._switch)
         self._endpoint.answer("set", lambda _, said: component.configure(said["parameter"], said["value"]))
         self._endpoint.answer("set all", lambda _, said: component.configure_all(said))
-        self._endpoint.answer("switch", lambda _, said: component.change_mode(said["mode"]))
         self._endpoint.answer("take", lambda _, said: component.take(said["port"], said["message"]))
         self._endpoint.answer("diagnose", lambda _, __: component.diagnose())
         self._heart = Heart(self._endpoint, component.needed, component.activate)
         self._beating = asyncio.get_running_loop().create_task(self._heart.run())
+        self._changed()
+        component.life.listen(self._changed)
 
     async def close(self) -> None:
         """Stop everything, and answer no more: to the others it has died."""
+        self._component.life.leave(self._changed)
         await self._endpoint.close()
-        tasks = [self._beating, *(action.task for action in self._actions.values())]
+        tasks = [self._beating, *self._actions.tasks()]
         for task in tasks:
             task.cancel()
         await asyncio.wait(tasks)
 
-    async def _skills(self, _: str, __: Any) -> list[dict[str, Any]]:
-        return [asdict(signature) for signature in self._component.skills().values()]
+    def _changed(self) -> None:
+        life = self._component.life
+        needs = list(self._component.needed())
+        self._condition.put({"life": life.state, "reason": life.reason, "mode": life.mode, "needs": needs})
+        self._heart.stir()
 
-    async def _come_alive(self, _: str, __: Any) -> dict[str, str]:
+    async def _hull(self, _: str, __: Any) -> dict[str, Any]:
+        skills = [asdict(signature) for signature in self._component.skills().values()]
+        return {"skills": skills, "condition": self._condition.newest}
+
+    async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
         if self._component.life.state is Life.FATAL_ERROR:
             self._component.life.become(Life.INIT)
         await self._component.come_alive()
-        return {"life": self._component.life.state, "reason": self._component.life.reason}
+        return self._condition.newest
 
-    async def _start(self, sender: str, said: dict[str, Any]) -> None:
-        action = self._actions.get(_key(said))
-        if action is not None:  # whose user has been started anew
-            action.user = sender
-        else:
-            task = asyncio.get_running_loop().create_task(self._carry_out(said))
-            self._actions[_key(said)] = _Action(sender, task)
-
-    async def _carry_out(self, said: dict[str, Any]) -> None:
-        def tell(form: dict[str, Any]) -> None:
-            action.said.append(form)
-            self._endpoint.push(action.user, f"news {said['id']}", len(action.said))
-
-        await asyncio.sleep(0)  # until it is known under its id
-        action = self._actions[_key(said)]
-        seconds = {} if said["seconds"] is None else {"deadline": self._clock.now() + said["seconds"]}
-        call = SkillCall(said["id"], self._clock, lambda outcome: tell({"report": outcome_form(outcome)}), **seconds)
-        end: dict[str, Any]
-        try:
-            async with asyncio.timeout(said["seconds"]):
-                end = {"ended": outcome_form(await self._component.execute(said["skill"], call, said["arguments"]))}
-        except Exception as error:  # noqa: BLE001  # whatever it is, it is told
-            end = {"failed": f"{type(error).__name__}: {error}"}
-        tell(end)
-
-    async def _how(self, _: str, said: dict[str, Any]) -> list[dict[str, Any]] | None:
-        """What the action has said after so many answers; `None` if it is unknown."""
-        action = self._actions.get(_key(said))
-        return None if action is None else action.said[said["heard"] :]
-
-    async def _stop(self, _: str, said: dict[str, Any]) -> None:
-        """Cancel the action if it is still going on, and forget it."""
-        action = self._actions.get(_key(said))
-        if action is not None and not action.task.done():
-            action.task.cancel()
-            await asyncio.wait([action.task])
-        self._actions.pop(_key(said), None)
-
-
-def _key(said: Mapping[str, Any]) -> tuple[str, str]:
-    return said["run"], said["id"]
+    async def _switch(self, _: str, said: dict[str, Any]) -> dict[str, Any]:
+        await self._component.change_mode(said["mode"])
+        return self._condition.newest
 
 
 class RemoteComponent(Component):
@@ -140,11 +91,16 @@ class RemoteComponent(Component):
     The host outlives programs, whose action ids are alike: there, they stand behind a name for the program's run.
     """
 
-    def __init__(self, name: str, endpoint: Endpoint, skills: dict[str, SkillSignature]) -> None:
+    def __init__(
+        self, name: str, transport: Transport, endpoint: Endpoint, skills: dict[str, SkillSignature]
+    ) -> None:
         super().__init__(name)
+        self._transport = transport
         self._endpoint = endpoint
         self._skills = skills
         self._run = endpoint.life
+        self._there = Subscription(endpoint, name, CONDITION, self._heard)
+        self._watching: asyncio.Task[None] | None = None
 
     def remember(self) -> str:
         """What its actions are known by there."""
@@ -166,29 +122,70 @@ class RemoteComponent(Component):
         """
         life = secrets.token_hex(6)
         endpoint = Endpoint(f"for {name} {life}", transport, life)
-        forms = await endpoint.call(name, "skills", within=within)
-        return cls(name, endpoint, {form["name"]: SkillSignature(**form) for form in forms})
+        try:
+            said = await endpoint.call(name, "hull", within=within)
+        except NoAnswerError:
+            await endpoint.close()
+            raise
+        skills = {form["name"]: SkillSignature(**form) for form in said["skills"]}
+        remote = cls(name, transport, endpoint, skills)
+        remote._there.take(said["condition"])
+        return remote
 
     def skills(self) -> dict[str, SkillSignature]:
         """As they were when it was connected."""
         return dict(self._skills)
 
+    def needed(self) -> tuple[str, ...]:
+        """Whom it needs there, in its present mode, as far as it is known here."""
+        return tuple(self._there.value["needs"])
+
+    async def reach(self, name: str) -> Component:
+        """Wait for a component that it needs, on its own transport."""
+        while True:
+            with suppress(NoAnswerError):
+                return await RemoteComponent.connect(name, self._transport, WATCH)
+
     async def start(self) -> None:
-        """Bring it to life there.
+        """Bring it to life there, and watch how it is from then on.
 
         Raises:
             NoAnswerError: it is not there.
             RefusedError: it is there and cannot start.
         """
         said = await self._endpoint.call(self.name, "come alive")
-        if said["life"] != Life.ALIVE:
-            raise RefusedError(f"it is in '{said['life']}' there" + (f": {said['reason']}" if said["reason"] else ""))
+        self._there.take(said)
+        life, reason = said["value"]["life"], said["value"]["reason"]
+        if life != Life.ALIVE:
+            raise RefusedError(f"it is in '{life}' there" + (f": {reason}" if reason else ""))
+        if self._watching is None:
+            self._watching = asyncio.get_running_loop().create_task(self._watch())
 
     async def come_alive(self) -> None:
         """Start it; also if it was lost, since it may be back."""
         if self.life.state is Life.FATAL_ERROR:
             self.life.become(Life.INIT)
         await super().come_alive()
+
+    async def _watch(self) -> None:
+        renewing = asyncio.get_running_loop().create_task(self._there.run())
+        try:
+            while True:
+                await asyncio.sleep(WATCH)
+                if self._there.age > RENEWED + SILENCE and self.life.state is Life.ALIVE:
+                    self.life.become(Life.FATAL_ERROR, f"'{self.name}' has not answered for {SILENCE:g} s")
+        finally:
+            renewing.cancel()
+
+    def _heard(self, said: Mapping[str, Any]) -> None:
+        if self._watching is not None and not self._starting:
+            self._follow(Life(said["life"]), said["reason"])
+        self.life.mode = said["mode"]
+
+    def _follow(self, there: Life, reason: str) -> None:
+        if self.life.state is Life.SHUTDOWN and there is not Life.SHUTDOWN:
+            self.life.become(Life.INIT)
+        self.life.become(there, reason)
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
         """Have the skill carried out there.
@@ -205,8 +202,9 @@ class RemoteComponent(Component):
             await self._ask("start", {**self._key(call.action_id), **said})
             return await self._followed(call, news)
         except asyncio.CancelledError:
+            patience = WITHIN if self.life.state is Life.ALIVE else WATCH
             with suppress(NoAnswerError):  # it is gone, and so is what it did
-                await self._ask("stop", self._key(call.action_id), within=WITHIN)
+                await self._ask("stop", self._key(call.action_id), patience)
             raise
         finally:
             self._endpoint.deafen(f"news {call.action_id}")
@@ -264,7 +262,8 @@ class RemoteComponent(Component):
 
     async def change_mode(self, mode: str) -> None:
         """Enter a mode there; raises `NoAnswerError` or `RefusedError`."""
-        await self._ask("switch", {"mode": mode})
+        said = await self._ask("switch", {"mode": mode})
+        self._there.take(said)
 
     async def take(self, port: str, message: Mapping[str, Any]) -> None:
         """Send a message there; raises `NoAnswerError` or `RefusedError`."""

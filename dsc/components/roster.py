@@ -24,6 +24,7 @@ class Roster:
 
     def __init__(self, components: MutableMapping[str, Component]) -> None:
         self._components = components
+        self._reached: dict[str, Component] = {}
         self._deployed = asyncio.Event()
 
     def deploy(self, component: Component) -> None:
@@ -79,16 +80,29 @@ class Roster:
         if component.name in above:
             raise InputError(f"components need each other in a circle: {' -> '.join((*above, component.name))}")
         for name in component.needed():
-            needed = found[name] = await self._find(name)
+            needed = found[name] = await self._find(name, component)
             await self._needed(needed, found, (*above, component.name))
             await needed.come_alive()
             await needed.life.until(lambda life: life is Life.ALIVE)
 
-    async def _find(self, name: str) -> Component:
+    async def _find(self, name: str, needing: Component) -> Component:
+        """The component of that name: deployed here, maybe late, or where the one who needs it can reach it."""
+        if name not in self._components and name not in self._reached:
+            loop = asyncio.get_running_loop()
+            here, there = loop.create_task(self._until_deployed(name)), loop.create_task(needing.reach(name))
+            try:
+                await asyncio.wait((here, there), return_when=asyncio.FIRST_COMPLETED)
+                if there.done():
+                    self._reached[name] = there.result()
+            finally:
+                here.cancel()
+                there.cancel()
+        return self._components.get(name) or self._reached[name]
+
+    async def _until_deployed(self, name: str) -> None:
         while name not in self._components:
             self._deployed.clear()
             await self._deployed.wait()
-        return self._components[name]
 
 
 def _is_not_alive(component: Component) -> bool:

@@ -13,9 +13,9 @@ transport may lose, double, delay and reorder frames.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager, suppress
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -27,6 +27,7 @@ from dsc.components.life import Life
 from dsc.components.ports import event, query, takes
 from dsc.components.pushing import Publisher, Subscription
 from dsc.components.remote import Host, RemoteComponent
+from dsc.components.roster import NotAliveError, Roster
 from dsc.components.transport import Transport
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
@@ -41,6 +42,8 @@ class Robot(Component):
     """Has every port there is."""
 
     name = "robot"
+    modes = ("scanning", "resting")
+    needs: ClassVar[Mapping[str, tuple[str, ...]]] = {"scanning": ("power", "light"), "resting": ()}
 
     def __init__(self) -> None:
         super().__init__()
@@ -366,8 +369,52 @@ class TransportSuite:
                 robot.log.clear()
                 await remote.configure_all({"speed": 3, "gear": 2})
                 assert robot.log == [("speed", 3), ("gear", 2)]
-                await remote.change_mode("fast")
-                assert (await remote.diagnose())["mode"] == "fast"
+                await remote.change_mode("resting")
+                assert (await remote.diagnose())["mode"] == "resting"
+
+        self.run(main())
+
+    def test_whom_a_component_needs_is_said_when_it_changes(self) -> None:
+        """Whoever has changed it: its user, or the component itself."""
+
+        async def main() -> None:
+            async with self._robot() as (robot, remote, _):
+                assert remote.needed() == ()
+                await remote.change_mode("scanning")
+                assert remote.needed() == ("power", "light")
+                robot.mode = "resting"
+                await until(lambda: remote.mode == "resting")
+                assert remote.needed() == ()
+
+        self.run(main())
+
+    def test_what_a_component_needs_is_waited_for_and_missed(self) -> None:
+        """Deployed here, or offered where the component is; late, lost without a word, and back again."""
+
+        async def main() -> None:
+            transport, robot, clock = self.transport(), Robot(), LoopClock()
+            robot.mode = "scanning"
+            host = Host(robot, transport, clock)
+            remote = await RemoteComponent.connect("robot", transport, PATIENCE)
+            roster = Roster({"robot": remote, "light": Component("light")})
+            waiting = asyncio.ensure_future(roster.ready(remote))
+            await asyncio.sleep(2.0)
+            assert not waiting.done()
+            for n in range(2):
+                power = Host(Component("power"), transport, clock)
+                support = await asyncio.wait_for(waiting, PATIENCE)
+                call = SkillCall(f"a7.{n}", clock, lambda _: None)
+                work = remote.execute("go", call, {"to": "kitchen", "steps": 1000})
+                working = asyncio.ensure_future(roster.with_support(remote, work, support))
+                await until(lambda n=n: len(robot.log) == 2 * n + 1)  # type: ignore[misc]
+                await power.close()
+                with pytest.raises(NotAliveError, match="it needs component 'power', which is in 'fatal_error'"):
+                    await asyncio.wait_for(working, PATIENCE)
+                assert robot.log[-1] == "cancelled"
+                assert remote.life.state == "alive"
+                waiting = asyncio.ensure_future(roster.ready(remote))
+            waiting.cancel()
+            await host.close()
 
         self.run(main())
 

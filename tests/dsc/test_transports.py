@@ -31,6 +31,7 @@ class TestLocalInRealTime(TransportSuite):
     test_a_silent_death_frees_what_the_dead_one_needed = None
     test_a_silent_death_is_noticed_and_a_return_too = None
     test_a_call_is_carried_out_once_and_answered = None
+    test_what_a_component_needs_is_waited_for_and_missed = None
 
 
 @pytest.mark.parametrize("seed", range(5))
