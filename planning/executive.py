@@ -12,6 +12,7 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from dsc.components.component import Component, require_instances
+from dsc.components.needs import require_deployed
 from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
@@ -93,6 +94,7 @@ class Executive:
         entrance.require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
         configure(self.components)
+        require_deployed(self.components, [PlanningComponent.name])
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
         if any(component.name == PlanningComponent.name for component in self.components):
             raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)

@@ -12,14 +12,13 @@ from dsc.calls import Ended, Outcome, SkillCall, Status
 from dsc.components.activations import Activations
 from dsc.components.declarations import check_declarations
 from dsc.components.life import NEUTRAL, Life, LifeCycle
+from dsc.components.needs import ALWAYS, require_declared
 from dsc.components.parameters import Parameter, changed, check_relations, known, require_bound, unsaid
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import require_several, shown
 
-ALWAYS = ""
-"""Stands for every mode in `Component.needs`."""
 TAKES = "__dsc_takes__"
 """Where `takes` notes what it declares."""
 
@@ -35,7 +34,7 @@ class Component:
         modes: the sub-states it has while Alive, besides `neutral`; if it names none, any may be asked for.
         declares: its parameters with type, range and who may change them; if it names none, any may be set.
         relations: conditions between its parameters that always hold.
-        needs: mode -> names of the components it needs then; `ALWAYS`: in every mode.
+        needs: mode -> a tuple of names of the components it needs then; `ALWAYS`: in every mode.
         activations: who has activated its events.
         life: where it is in its life; `self.life.become(Life.FATAL_ERROR, "no power")` when the device is gone.
     """
@@ -199,21 +198,27 @@ class Component:
         """Somebody needs it from now on, or nobody any more: override to take resources and to free them (S4.1)."""
 
     async def come_alive(self) -> None:
-        """Start if it is in Init; who comes meanwhile waits for the same start."""
+        """Start if it is in Init, or anew if it is in FatalError; who comes meanwhile waits for the same start."""
+        while self._starting:  # if its start is broken off, somebody else has to begin it
+            await self.life.until(lambda _: not self._starting)
+            if self.life.state is not Life.INIT:
+                return
+        if self.life.state is Life.FATAL_ERROR:
+            self.life.become(Life.INIT)
         if self.life.state is not Life.INIT:
-            return
-        if self._starting:
-            await self.life.until(lambda life: life is not Life.INIT)
             return
         self._starting = True
         try:
             await self.start()
         except Exception as error:  # noqa: BLE001  # whatever it is, the component cannot work
-            self.life.become(Life.FATAL_ERROR, f"{type(error).__name__}: {error}")
+            became, reason = Life.FATAL_ERROR, f"{type(error).__name__}: {error}"
         else:
-            self.life.become(Life.ALIVE)
+            became, reason = Life.ALIVE, ""
         finally:
             self._starting = False
+            self.life.announce()
+        if self.life.state is Life.INIT:  # else somebody has shut it down meanwhile, or it says itself how it is
+            self.life.become(became, reason)
 
     async def change_mode(self, mode: str) -> None:
         """What `switch` in a chart does: a mode, or `init` (start anew) and `shutdown`.
@@ -236,6 +241,11 @@ class Component:
     def needed(self) -> tuple[str, ...]:
         """Names of the components it needs in its present mode."""
         return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
+
+    @property
+    def reaches_others(self) -> bool:
+        """Whether it can find components that are not deployed here."""
+        return type(self).reach is not Component.reach
 
     async def reach(self, name: str) -> Component:  # noqa: ARG002
         """Wait for a component that it needs and that is not deployed here; override where others can be found."""
@@ -296,7 +306,8 @@ def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
     """All of them, if these are components, each with a name of its own.
 
     Raises:
-        InputError: it is no list of them, or something in it is none, e.g. a class instead of its instance.
+        InputError: it is no list of them, something in it is none, e.g. a class instead of its instance, or what one
+            needs is not said rightly.
         SchemaError: two have one name.
     """
     require_several(components, "components")
@@ -308,5 +319,6 @@ def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
             raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
         if one.name in names:
             raise SchemaError(f"two components are named '{one.name}'", found=one.name)
+        require_declared(one)
         names.add(one.name)
     return components

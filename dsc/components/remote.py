@@ -75,8 +75,6 @@ class Host:
         return {"skills": skills, "condition": self._condition.newest}
 
     async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
-        if self._component.life.state is Life.FATAL_ERROR:
-            self._component.life.become(Life.INIT)
         await self._component.come_alive()
         return self._condition.newest
 
@@ -160,12 +158,6 @@ class RemoteComponent(Component):
             raise RefusedError(f"it is in '{life}' there" + (f": {reason}" if reason else ""))
         if self._watching is None:
             self._watching = asyncio.get_running_loop().create_task(self._watch())
-
-    async def come_alive(self) -> None:
-        """Start it; also if it was lost, since it may be back."""
-        if self.life.state is Life.FATAL_ERROR:
-            self.life.become(Life.INIT)
-        await super().come_alive()
 
     async def _watch(self) -> None:
         renewing = asyncio.get_running_loop().create_task(self._there.run())

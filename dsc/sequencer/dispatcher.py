@@ -19,6 +19,7 @@ from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.component import Component, require_instances
 from dsc.components.roster import Roster
 from dsc.components.stopping import GRACE, give_up
+from dsc.components.support import Support
 from dsc.engine.steps import (
     Cancel,
     Output,
@@ -278,10 +279,11 @@ class Dispatcher:
                 failed = said.event == SKILL_ERROR
                 self._post(SkillMessage(start, said, final=failed, goes_on=failed))
 
+        support = Support(self._roster, component)
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
         call = SkillCall(self._id(start), clock, report, clock.now() + within, self._given_up.append)
         try:
-            support = await self._ready(component, start)
+            await self._ready(component, start, support)
             if earlier is not None:
                 status = await asked_after(component, start, self._id(start))
                 if isinstance(status, Ended):
@@ -289,11 +291,10 @@ class Dispatcher:
                 if status is Status.RUNNING or not self._is_event(start):  # else it is activated anew
                     heard = earlier.reports
             work = component.execute(start.skill, call, encoded(start.arguments))
-            outcome = await self._roster.with_support(component, work, support)
-            return declared(component, start, outcome)
+            return declared(component, start, await support.carrying(work))
         except asyncio.CancelledError:
             if limit.has_cancelled():
-                return late(start, within)
+                return late(start, within, support.missing)
             if _cancelled_from_outside():
                 raise
             return broken(start, "CancelledError: it cancelled itself")
@@ -308,12 +309,12 @@ class Dispatcher:
             return late(start, within)
         return broken(start, f"{type(error).__name__}: {error}")
 
-    async def _ready(self, component: Component, start: Start) -> list[Component]:
-        """Wait until the skill can begin; gives what has to stay alive meanwhile."""
+    async def _ready(self, component: Component, start: Start, support: Support) -> None:
+        """Wait until the skill can begin."""
         if self._has_to_wait(start):
             await self._endings.over(component.name)
         await self.telling.taken(component)
-        return await self._roster.ready(component)
+        await support.ready()
 
     def _cancel(self, activation: int) -> None:
         for start in self.started():

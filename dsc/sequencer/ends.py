@@ -56,8 +56,8 @@ def broken(start: Start, reason: str) -> Outcome:
     return Outcome(SKILL_ERROR, {"skill": skill, "reason": f"{skill}: {' '.join(reason.split())}"})
 
 
-def late(start: Start, seconds: float) -> Outcome:
-    """How a skill ends that did not end within its time."""
+def late(start: Start, seconds: float, missing: str = "") -> Outcome:
+    """How a skill ends that did not end within its time; it did not even begin if what it waited for was `missing`."""
     skill = f"{start.component}.{start.skill}"
-    reason = f"{skill}: no outcome within {seconds:g} s"
+    reason = f"{skill}: no outcome within {seconds:g} s" + (f", it waited for {missing}" if missing else "")
     return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason})

@@ -28,6 +28,7 @@ from dsc.components.ports import event, query, takes
 from dsc.components.pushing import Publisher, Subscription
 from dsc.components.remote import Host, RemoteComponent
 from dsc.components.roster import NotAliveError, Roster
+from dsc.components.support import Support
 from dsc.components.transport import Transport
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
@@ -397,22 +398,24 @@ class TransportSuite:
             host = Host(robot, transport, clock)
             remote = await RemoteComponent.connect("robot", transport, PATIENCE)
             roster = Roster({"robot": remote, "light": Component("light")})
-            waiting = asyncio.ensure_future(roster.ready(remote))
+            support = Support(roster, remote)
+            waiting = asyncio.ensure_future(support.ready())
             await asyncio.sleep(2.0)
             assert not waiting.done()
             for n in range(2):
                 power = Host(Component("power"), transport, clock)
-                support = await asyncio.wait_for(waiting, PATIENCE)
+                await asyncio.wait_for(waiting, PATIENCE)
                 call = SkillCall(f"a7.{n}", clock, lambda _: None)
                 work = remote.execute("go", call, {"to": "kitchen", "steps": 1000})
-                working = asyncio.ensure_future(roster.with_support(remote, work, support))
+                working = asyncio.ensure_future(support.carrying(work))
                 await until(lambda n=n: len(robot.log) == 2 * n + 1)  # type: ignore[misc]
                 await power.close()
                 with pytest.raises(NotAliveError, match="it needs component 'power', which is in 'fatal_error'"):
                     await asyncio.wait_for(working, PATIENCE)
                 assert robot.log[-1] == "cancelled"
                 assert remote.life.state == "alive"
-                waiting = asyncio.ensure_future(roster.ready(remote))
+                support = Support(roster, remote)
+                waiting = asyncio.ensure_future(support.ready())
             waiting.cancel()
             await host.close()
 

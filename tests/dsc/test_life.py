@@ -153,6 +153,7 @@ def test_what_is_lost_ends_the_skill_and_is_back_for_the_next():
 
     async def unplug(_):
         await asyncio.sleep(2)
+        base.broken = True
         base.life.become(Life.FATAL_ERROR, "unplugged")
         await asyncio.sleep(3)
         base.life.become(Life.ALIVE)
@@ -174,6 +175,105 @@ def test_what_is_lost_ends_the_skill_and_is_back_for_the_next():
     assert end.finished
     assert at == pytest.approx(10)
     assert "it needs component 'base', which is in 'fatal_error': unplugged" in reasons[0].attributes["reason"]
+
+
+def test_what_is_missing_is_named_when_the_time_is_over():
+    text = DRIVE.replace("timed_out: e", "timed_out: {to: e, emit: broken, with: {why: ?event.reason}}")
+    bass = Base()
+    bass.name = "bass"
+    end, _ = drive("laser", Laser(), bass, mode="scanning", text=text)
+    assert why(end) == (
+        "laser.drive: no outcome within 300 s, it waited for component 'base', which is not there; did you mean 'bass'?"
+    )
+    end, at = drive("laser", Laser(), Base(broken=True), mode="scanning", text=text)
+    assert "it waited for component 'base', which is in 'fatal_error': OSError: no such device" in why(end)
+    assert at == pytest.approx(300)
+
+
+class Moody(Base):
+    """Cannot start so many times."""
+
+    def __init__(self, times):
+        super().__init__()
+        self.times = times
+
+    async def start(self):
+        self.log.append(asyncio.get_running_loop().time())
+        self.times -= 1
+        if self.times >= 0:
+            raise OSError("port busy")
+
+
+def test_what_cannot_start_is_started_anew_after_longer_and_longer_pauses():
+    base = Moody(8)
+    end, at = drive("laser", Laser(), base, mode="scanning")
+    assert end.finished
+    assert base.log == pytest.approx([0, 1, 3, 7, 15, 31, 61, 91, 121])
+    assert at == pytest.approx(126)
+
+
+def test_what_crashes_is_started_anew_for_the_next_skill():
+    base, laser = Moody(0), Laser()
+
+    async def crash(_):
+        for one, at in ((base, 2), (laser, 4)):
+            await asyncio.sleep(at)
+            one.life.become(Life.FATAL_ERROR, "crashed")
+
+    text = DRIVE.replace("skill_error: {to: e, emit: broken, with: {why: ?event.reason}}", "skill_error: a")
+    end, at = drive("laser", laser, base, mode="scanning", meanwhile=crash, text=text)
+    assert end.finished
+    assert base.log == pytest.approx([0, 2])
+    assert laser.log == ["start", "start"]
+    assert at == pytest.approx(11)
+
+
+def test_what_is_shut_down_is_not_started_by_who_needs_it():
+    base = Base()
+    base.life.become(Life.SHUTDOWN)
+
+    async def begin(_):
+        await asyncio.sleep(50)
+        await base.change_mode("init")
+
+    end, at = drive("laser", Laser(), base, mode="scanning", meanwhile=begin)
+    assert end.finished
+    assert base.log == ["start"]
+    assert at == pytest.approx(55)
+
+
+def test_a_start_that_was_broken_off_is_begun_by_who_waits_for_it():
+    base = Base(starting=3)
+
+    async def main():
+        first = asyncio.ensure_future(base.come_alive())
+        second = asyncio.ensure_future(base.come_alive())
+        await asyncio.sleep(1)
+        first.cancel()
+        await asyncio.wait_for(second, 10)
+        return asyncio.get_running_loop().time()
+
+    assert run_simulated(main()) == pytest.approx(4)
+    assert base.life.state is Life.ALIVE
+
+
+@pytest.mark.parametrize(
+    ("needs", "said"),
+    [
+        ({"scanning": "base"}, "in its mode 'scanning' is a tuple, as in needs = {'scanning': ('power',)}, not 'base'"),
+        ({ALWAYS: [1]}, "needs always is a tuple"),
+        (("base",), "is said for each mode, as in needs = {'scanning': ('power',)}, not"),
+        ({"scaning": ("base",)}, "in its mode 'scaning', which it does not have; did you mean 'scanning'?"),
+    ],
+)
+def test_needs_that_are_said_wrongly_are_refused(needs, said):
+    class Wrong(Laser):
+        pass
+
+    Wrong.needs = needs
+    with pytest.raises(InputError) as refused:
+        drive("laser", Wrong(), Base())
+    assert said in str(refused.value)
 
 
 def test_components_that_need_each_other_are_refused():

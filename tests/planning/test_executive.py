@@ -607,3 +607,13 @@ def test_plots_ask_for_rules_if_the_knowledge_has_the_design():
         robot.listen(lambda record: seconds.append(record.t))
         assert robot.run("p").finished
     assert seconds[-1] == 2.0
+
+
+def test_needs_that_nobody_can_fulfil_are_refused():
+    class Dimmer(Component):
+        name = "dimmer"
+        modes = ("evening",)
+        needs: ClassVar = {"evening": ("lamp",)}
+
+    with pytest.raises(InputError, match=r"component 'dimmer' needs a component 'lamp', .* did you mean 'lamps'"):
+        Executive(DOMAIN, [HOLDER], [Lamps(), Dimmer()])
