@@ -58,6 +58,7 @@ class Component:
         self._judged = False  # the parameters that are being set are known to fit together
         self.life = LifeCycle()
         self._starting = False
+        self._activators: set[int] = set()
         self.activations = Activations()
 
     @property
@@ -195,7 +196,12 @@ class Component:
         """To Shutdown: override to close devices."""
 
     async def activate(self, active: bool) -> None:  # noqa: FBT001
-        """Somebody needs it from now on, or nobody any more: override to take resources and to free them (S4.1)."""
+        """A state or somebody active needs it from now on, or nobody any more (S1.9, S4.1).
+
+        Override it to take resources and to free them. It is called between `start` and the first skill, again with
+        `True` if it was started anew meanwhile, and with `False` only if it was with `True`; what it raises means
+        FatalError.
+        """
 
     async def come_alive(self) -> None:
         """Start if it is in Init, or anew if it is in FatalError; who comes meanwhile waits for the same start."""
@@ -219,6 +225,25 @@ class Component:
             self.life.announce()
         if self.life.state is Life.INIT:  # else somebody has shut it down meanwhile, or it says itself how it is
             self.life.become(became, reason)
+
+    async def become_active(self, activator: int, *, active: bool) -> None:
+        """One activator needs it from now on, or no more; `activate` is called when it is the first or the last."""
+        others = self._activators - {activator}
+        again = activator in self._activators
+        self._activators = others | {activator} if active else others
+        if others or not (active or again):
+            return
+        try:
+            await self.activate(active)
+        except Exception as error:  # noqa: BLE001  # whatever it is, it has not what it needs
+            if self.life.state is not Life.SHUTDOWN:
+                self.life.become(Life.FATAL_ERROR, f"{type(error).__name__}: {error}")
+
+    @property
+    def takes_part(self) -> bool:
+        """Whether anything is to be done when it is used, and when it is not any more."""
+        kind = type(self)
+        return bool(self.needs) or kind.needed is not Component.needed or kind.activate is not Component.activate
 
     async def change_mode(self, mode: str) -> None:
         """What `switch` in a chart does: a mode, or `init` (start anew) and `shutdown`.
@@ -296,6 +321,7 @@ class Component:
             "life": str(self.life.state),
             "reason": self.life.reason,
             "mode": self.mode,
+            "active": bool(self._activators),
             "parameters": dict(self.parameters),
             "needs": list(self.needed()),
             "skills": sorted(self.skills()),

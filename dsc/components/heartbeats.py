@@ -86,6 +86,10 @@ class Heart:
             self._endpoint.broadcast("heartbeat", {"needs": []})
         await self._changed(active)
 
+    def need(self, sender: str) -> None:
+        """Somebody says, otherwise than by a heartbeat, that it is active and needs this component."""
+        self._heard(sender, {"needs": [self._endpoint.address]})
+
     def _heard(self, sender: str, said: Any) -> None:
         self._heard_at[sender] = _now()
         needed = self._endpoint.address in said["needs"]

@@ -45,12 +45,14 @@ class Host:
         self._actions = HostedActions(component, self._endpoint, clock)
         self._endpoint.answer("hull", self._hull)
         self._endpoint.answer("come alive", self._come_alive)
+        self._endpoint.answer("be active", self._be_active)
         self._endpoint.answer("switch", self._switch)
         self._endpoint.answer("set", lambda _, said: component.configure(said["parameter"], said["value"]))
         self._endpoint.answer("set all", lambda _, said: component.configure_all(said))
         self._endpoint.answer("take", lambda _, said: component.take(said["port"], said["message"]))
         self._endpoint.answer("diagnose", lambda _, __: component.diagnose())
-        self._heart = Heart(self._endpoint, component.needed, component.activate)
+        self._is_active = asyncio.Event()
+        self._heart = Heart(self._endpoint, component.needed, self._activated)
         self._beating = asyncio.get_running_loop().create_task(self._heart.run())
         self._changed()
         component.life.listen(self._changed)
@@ -75,8 +77,23 @@ class Host:
         return {"skills": skills, "condition": self._condition.newest}
 
     async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
+        before = self._component.life.state
         await self._component.come_alive()
+        if before is not Life.ALIVE and self._is_active.is_set():  # it was started anew
+            await self._component.become_active(id(self), active=True)
         return self._condition.newest
+
+    async def _be_active(self, sender: str, _: Any) -> dict[str, Any]:
+        """As a heartbeat of somebody who needs it, and answered when it is active."""
+        self._heart.need(sender)
+        await self._is_active.wait()
+        return self._condition.newest
+
+    async def _activated(self, active: bool) -> None:  # noqa: FBT001
+        if active:
+            await self._component.come_alive()
+        await self._component.become_active(id(self), active=active)
+        (self._is_active.set if active else self._is_active.clear)()
 
     async def _switch(self, _: str, said: dict[str, Any]) -> dict[str, Any]:
         await self._component.change_mode(said["mode"])
@@ -98,7 +115,8 @@ class RemoteComponent(Component):
         self._skills = skills
         self._run = endpoint.life
         self._there = Subscription(endpoint, name, CONDITION, self._heard)
-        self._watching: asyncio.Task[None] | None = None
+        self._heart = Heart(endpoint, lambda: [name], _unmoved, root=True)
+        self._working: tuple[asyncio.Task[None], ...] = ()
 
     def remember(self) -> str:
         """What its actions are known by there."""
@@ -145,19 +163,36 @@ class RemoteComponent(Component):
                 return await RemoteComponent.connect(name, self._transport, WATCH)
 
     async def start(self) -> None:
-        """Bring it to life there, and watch how it is from then on.
+        """Bring it to life there.
 
         Raises:
             NoAnswerError: it is not there.
             RefusedError: it is there and cannot start.
         """
-        said = await self._endpoint.call(self.name, "come alive")
+        self._require_alive(await self._endpoint.call(self.name, "come alive"))
+
+    async def activate(self, active: bool) -> None:  # noqa: FBT001
+        """Have it active there, and watch how it is as long as it is.
+
+        Raises:
+            NoAnswerError: it is not there.
+            RefusedError: it is there and cannot be active.
+        """
+        loop = asyncio.get_running_loop()
+        if active:
+            self._working = self._working or (loop.create_task(self._watch()), loop.create_task(self._heart.run()))
+            self._require_alive(await self._endpoint.call(self.name, "be active"))
+        elif self._working:
+            working, self._working = self._working, ()
+            for task in working:
+                task.cancel()
+            await asyncio.wait(working)
+
+    def _require_alive(self, said: dict[str, Any]) -> None:
         self._there.take(said)
         life, reason = said["value"]["life"], said["value"]["reason"]
         if life != Life.ALIVE:
             raise RefusedError(f"it is in '{life}' there" + (f": {reason}" if reason else ""))
-        if self._watching is None:
-            self._watching = asyncio.get_running_loop().create_task(self._watch())
 
     async def _watch(self) -> None:
         renewing = asyncio.get_running_loop().create_task(self._there.run())
@@ -170,7 +205,7 @@ class RemoteComponent(Component):
             renewing.cancel()
 
     def _heard(self, said: Mapping[str, Any]) -> None:
-        if self._watching is not None and not self._starting:
+        if self._working and not self._starting:
             self._follow(Life(said["life"]), said["reason"])
         self.life.mode = said["mode"]
 
@@ -265,3 +300,7 @@ class RemoteComponent(Component):
         """How it is there; raises `NoAnswerError` or `RefusedError`."""
         said: dict[str, Any] = await self._endpoint.call(self.name, "diagnose")
         return said
+
+
+async def _unmoved(_: bool) -> None:  # noqa: FBT001
+    """Who needs somebody elsewhere has nothing else to do for it."""

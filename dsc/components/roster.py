@@ -3,47 +3,38 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping, MutableMapping
-from contextlib import suppress
+from collections.abc import MutableMapping
 from typing import TYPE_CHECKING
 
-from dsc.components.life import Life
 from knowledge_base.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from dsc.components.component import Component
-
-PAUSE = 1.0
-"""Seconds after which a component that could not start is started anew; twice as many each time it cannot."""
-LONGEST = 30.0
-"""Seconds between two attempts at most."""
-
 
 class NotAliveError(Exception):
     """A component that is needed is not alive, and why."""
 
 
 class Roster:
-    """The deployed components by name, and those elsewhere that these need."""
+    """Who is deployed, and who was reached elsewhere because these need them.
+
+    Attributes:
+        components: the deployed ones, by name.
+    """
 
     def __init__(self, components: MutableMapping[str, Component]) -> None:
-        self._components = components
+        self.components = components
         self._reached: dict[str, Component] = {}
         self._deployed = asyncio.Event()
 
-    @property
-    def components(self) -> Mapping[str, Component]:
-        """Those that are deployed, by name."""
-        return self._components
-
     def deploy(self, component: Component) -> None:
         """Add a component, maybe late; it replaces one of the same name."""
-        self._components[component.name] = component
+        self.components[component.name] = component
         self._deployed.set()
 
     def known(self, name: str) -> Component | None:
         """The component of that name, if it is here or has been reached."""
-        return self._components.get(name) or self._reached.get(name)
+        return self.components.get(name) or self._reached.get(name)
 
     async def find(self, name: str, needing: Component) -> Component:
         """The component of that name: deployed here, maybe late, or where the one who needs it can reach it."""
@@ -59,10 +50,10 @@ class Roster:
         finally:
             here.cancel()
             there.cancel()
-        return self._components.get(name) or self._reached[name]
+        return self.components.get(name) or self._reached[name]
 
     async def _until_deployed(self, name: str) -> None:
-        while name not in self._components:
+        while name not in self.components:
             self._deployed.clear()
             await self._deployed.wait()
 
@@ -70,20 +61,6 @@ class Roster:
         """How a component is, in words."""
         component = self.known(name)
         if component is None:
-            return str(UnknownNameError(f"component '{name}', which is not there", found=name, valid=self._components))
+            return str(UnknownNameError(f"component '{name}', which is not there", found=name, valid=self.components))
         why = f": {component.life.reason}" if component.life.reason else ""
         return f"component '{name}', which is in '{component.life.state}'{why}"
-
-
-async def kept_trying(component: Component) -> None:
-    """Bring a component to life: start it, and again after a pause if it cannot start; wait if it is shut down."""
-    pause = PAUSE
-    while True:
-        await component.come_alive()
-        if component.life.state is Life.ALIVE:
-            return
-        before = component.life.state
-        with suppress(TimeoutError):
-            async with asyncio.timeout(None if before is Life.SHUTDOWN else pause):
-                await component.life.until(lambda life, before=before: life is not before)  # type: ignore[misc]
-        pause = min(2 * pause, LONGEST)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable
+from contextlib import suppress
 from typing import TYPE_CHECKING, TypeVar
 
+from dsc.components.activity import Activity
 from dsc.components.life import Life
-from dsc.components.roster import NotAliveError, Roster, kept_trying
+from dsc.components.roster import NotAliveError, Roster
 from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,21 +19,25 @@ _Result = TypeVar("_Result")
 
 
 class Support:
-    """For one skill of a component."""
+    """For one skill of a component, which counts as used."""
 
-    def __init__(self, roster: Roster, component: Component) -> None:
+    def __init__(self, roster: Roster, activity: Activity, component: Component) -> None:
         self._roster = roster
+        self._activity = activity
         self._component = component
-        self._awaited: str | None = None
-        self._found: dict[str, Component] = {}
+        self._concerned = activity.concerns(component)
+        self._waits = False
 
     @property
     def missing(self) -> str:
         """What is being waited for, in words; empty if nothing is."""
-        return "" if self._awaited is None else self._roster.state_of(self._awaited)
+        if not self._waits:
+            return ""
+        name = next((one.name for one in self._activity.resting_on(self._component) if not one.on), "")
+        return name and self._roster.state_of(name)
 
     async def ready(self) -> None:
-        """Wait until all that the component needs in its present mode is alive, then bring it to life itself.
+        """Wait until all that the component needs in its present mode is alive and switched on, and it is itself.
 
         What it needs is started, and started anew after a crash; so is the component, once.
 
@@ -39,49 +45,63 @@ class Support:
             NotAliveError: the component itself cannot start, or is in Shutdown; what it needs is waited for instead.
             InputError: components need each other in a circle.
         """
-        await self._needed(self._component, ())
-        await self._component.come_alive()
+        if self._concerned:
+            await self._kept()
+        elif self._component.life.state is not Life.ALIVE:
+            await self._component.come_alive()
         if self._component.life.state is not Life.ALIVE:
             raise NotAliveError(self._roster.state_of(self._component.name))
 
-    async def _needed(self, component: Component, above: tuple[str, ...]) -> None:
-        if component.name in above:
-            raise InputError(f"components need each other in a circle: {' -> '.join((*above, component.name))}")
-        for name in component.needed():
-            self._awaited = name
-            needed = self._found[name] = await self._roster.find(name, component)
-            await self._needed(needed, (*above, component.name))
-            self._awaited = name
-            await kept_trying(needed)
-            self._awaited = None
+    async def _kept(self) -> None:
+        keeper = self._activity.keeper(self._component)
+        before = keeper.failures
+
+        def settled() -> bool:
+            keepers = list(self._activity.resting_on(self._component))
+            for one in keepers:
+                if one.problem is not None:
+                    raise one.problem
+            return all(one.on for one in keepers) or keeper.failures > before
+
+        self._waits = True
+        await self._activity.until(settled)
+        self._waits = False
 
     async def carrying(self, work: Awaitable[_Result]) -> _Result:
-        """Do the skill's work as long as everything is alive that it rests on.
+        """Do the skill's work as long as everything is alive that it rests on, in whatever mode it is.
 
         Raises:
             NotAliveError: something was lost; the work has been cancelled.
         """
-        me, support = asyncio.current_task(), (self._component, *self._found.values())
-        lost: list[Component] = []
+        me = asyncio.current_task()
+        lost: list[str] = []
 
-        def changed() -> None:
-            if not lost and me is not None and (dead := next(filter(_is_not_alive, support), None)) is not None:
-                lost.append(dead)
+        def look() -> None:
+            name = self._lost()
+            if name is not None and not lost and me is not None:
+                said = self._roster.state_of(name)  # as it is now: it may be started anew before we are heard
+                lost.append(said if name == self._component.name else f"it needs {said}")
                 me.cancel()
 
-        for one in support:
-            one.life.listen(changed)
+        self._component.life.listen(look)
+        if self._concerned:
+            self._activity.listen(look)
+        look()
         try:
             return await work
         except asyncio.CancelledError:
             if not lost or me is None or me.uncancel() > 0:  # or the state was left, too
                 raise
-            said = self._roster.state_of(lost[0].name)
-            raise NotAliveError(said if lost[0] is self._component else f"it needs {said}") from None
+            raise NotAliveError(lost[0]) from None
         finally:
-            for one in support:
-                one.life.leave(changed)
+            self._component.life.leave(look)
+            self._activity.leave(look)
 
-
-def _is_not_alive(component: Component) -> bool:
-    return component.life.state is not Life.ALIVE
+    def _lost(self) -> str | None:
+        if self._component.life.state is not Life.ALIVE:
+            return self._component.name
+        if not self._concerned:
+            return None
+        with suppress(InputError):  # of a mode that makes a circle, the next skill hears
+            return next((one.name for one in self._activity.resting_on(self._component) if one.lost), None)
+        return None

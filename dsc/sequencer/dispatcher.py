@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
+from dsc.components.activity import Activity
 from dsc.components.component import Component, require_instances
 from dsc.components.roster import Roster
 from dsc.components.stopping import GRACE, give_up
@@ -58,6 +59,7 @@ class Dispatcher:
         part_of: stands before the action ids that components see.
 
     Attributes:
+        activity: who is switched on.
         telling: what components are told.
         timers: what is due later.
     """
@@ -72,18 +74,20 @@ class Dispatcher:
         self._part_of = part_of
         self._components = {component.name: component for component in require_instances(components)}
         self._roster = Roster(self._components)
+        self.activity = Activity(self._roster, self._at_work)
         self._given_up: list[str] = []
         self._answered_for: set[str] = set()
         self._clock = clock
         self._post = post
         self._running: dict[str, _Running] = {}
-        self._endings = Endings()
+        self._endings = Endings(self.activity.look)
         self._forgetting: set[asyncio.Task[None]] = set()
         self.telling = Telling()
         self.timers = Timers(clock, post)
 
     def deploy(self, component: Component) -> None:
         """Add a component; it replaces one of the same name. Who has waited for it goes on."""
+        self.activity.deployed(component)
         self._roster.deploy(component)
 
     def started(self) -> tuple[Start, ...]:
@@ -94,6 +98,10 @@ class Dispatcher:
     def in_use(self) -> frozenset[str]:
         """Names of the components that carry out something, the root's needs in an activation tree."""
         return frozenset(start.component for start in self.started())
+
+    def _at_work(self) -> Iterable[str]:
+        """The components that carry out something, or still put things in order after what was cancelled."""
+        return (*self.in_use, *self._endings.components())
 
     @property
     def waiting(self) -> bool:
@@ -141,6 +149,8 @@ class Dispatcher:
             self.timers.revoke(output)
         elif isinstance(output, SetParameter | SwitchMode | SendMessage):
             self.telling.tell(self.component(output.component), output)
+            if isinstance(output, SwitchMode):
+                self.activity.switched(output.component, output.mode)
         # What is left is a note, which the trace has.
 
     @property
@@ -171,6 +181,7 @@ class Dispatcher:
     def settle(self, start: Start) -> None:
         """The final answer of a skill has been taken; until then its component counts as busy."""
         self._running.pop(start.action_id, None)
+        self.activity.look(start.component)
         component = self._components.get(start.component)
         if component is not None and type(component).forget is not Component.forget:
             task = asyncio.get_running_loop().create_task(_forgotten(component, self._id(start)))
@@ -194,6 +205,9 @@ class Dispatcher:
     def tell_again(self, component: str, in_force: Sequence[SetParameter | SwitchMode]) -> None:
         """Put in force what was before a restart; raises `UnknownNameError`."""
         self.telling.tell_again(self.component(component), in_force)
+        for told in in_force:
+            if isinstance(told, SwitchMode):
+                self.activity.switched(component, told.mode)
 
     def take_up(self, start: Start, earlier: Earlier) -> None:
         """Go on with a skill that was under way before a restart; raises `UnknownNameError`."""
@@ -232,6 +246,7 @@ class Dispatcher:
                 give_up(task)
             for task in stopped:
                 failure(task)  # of a skill that was cancelled, nobody wants to hear it
+        await self.activity.close()
         return [*self.telling.untaken(), *self._given_up]
 
     def _start(self, start: Start, earlier: Earlier | None = None) -> None:
@@ -241,6 +256,7 @@ class Dispatcher:
         work = self._execute(component, start, within, limit, earlier)
         task = asyncio.get_running_loop().create_task(work)
         self._running[start.action_id] = _Running(start, task, within, limit)
+        self.activity.look(start.component)
         limit.begin(task, self._clock, within + (self._clock.now() if earlier is None else earlier.began))
 
     def _overdue(self, start: Start, within: float) -> None:
@@ -279,7 +295,7 @@ class Dispatcher:
                 failed = said.event == SKILL_ERROR
                 self._post(SkillMessage(start, said, final=failed, goes_on=failed))
 
-        support = Support(self._roster, component)
+        support = Support(self._roster, self.activity, component)
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
         call = SkillCall(self._id(start), clock, report, clock.now() + within, self._given_up.append)
         try:

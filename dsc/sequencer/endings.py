@@ -9,9 +9,14 @@ from dsc.components.stopping import GRACE, give_up_after
 
 
 class Endings:
-    """What was cancelled, until it has stopped or was given up after `GRACE` seconds: nobody waits for longer."""
+    """What was cancelled, until it has stopped or was given up after `GRACE` seconds: nobody waits for longer.
 
-    def __init__(self) -> None:
+    Args:
+        say: is told the component of which something has stopped, or was given up.
+    """
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
         self._ending: dict[str, dict[asyncio.Task[None], asyncio.Future[None]]] = {}
 
     def add(self, component: str, task: asyncio.Task[None], say: Callable[[], None]) -> None:
@@ -23,6 +28,7 @@ class Endings:
         def end(_: asyncio.Task[None]) -> None:
             if of_component.pop(task, None) is not None:
                 over.set_result(None)
+                self._say(component)
 
         def give_up() -> None:
             end(task)
@@ -30,6 +36,10 @@ class Endings:
 
         task.add_done_callback(end)
         give_up_after(task, GRACE, give_up)
+
+    def components(self) -> Iterable[str]:
+        """Those of which something is still ending."""
+        return [component for component, ending in self._ending.items() if ending]
 
     def of(self, component: str) -> bool:
         """Whether anything of the component is still ending."""

@@ -128,6 +128,7 @@ class Sequencer:
             "active": list(self.machine.state.configuration()),
             "working": [f"{start.component}.{start.skill}" for start in self.dispatcher.started()],
             "in_use": sorted(self.dispatcher.in_use),
+            "switched_on": sorted(self.dispatcher.activity.on),
             "waiting": len(self._inbox),
             "knowledge_version": self.knowledge.version,
         }

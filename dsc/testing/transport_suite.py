@@ -20,6 +20,7 @@ from typing import Any, ClassVar
 import pytest
 
 from dsc.calls import Outcome, SkillCall
+from dsc.components.activity import Activity
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
 from dsc.components.heartbeats import BEAT, SILENCE, Heart
@@ -383,9 +384,11 @@ class TransportSuite:
                 assert remote.needed() == ()
                 await remote.change_mode("scanning")
                 assert remote.needed() == ("power", "light")
+                await remote.become_active(1, active=True)  # else nobody watches it
                 robot.mode = "resting"
                 await until(lambda: remote.mode == "resting")
                 assert remote.needed() == ()
+                await remote.become_active(1, active=False)
 
         self.run(main())
 
@@ -398,7 +401,8 @@ class TransportSuite:
             host = Host(robot, transport, clock)
             remote = await RemoteComponent.connect("robot", transport, PATIENCE)
             roster = Roster({"robot": remote, "light": Component("light")})
-            support = Support(roster, remote)
+            activity = Activity(roster, lambda: {"robot"})
+            support = Support(roster, activity, remote)
             waiting = asyncio.ensure_future(support.ready())
             await asyncio.sleep(2.0)
             assert not waiting.done()
@@ -414,7 +418,7 @@ class TransportSuite:
                     await asyncio.wait_for(working, PATIENCE)
                 assert robot.log[-1] == "cancelled"
                 assert remote.life.state == "alive"
-                support = Support(roster, remote)
+                support = Support(roster, activity, remote)
                 waiting = asyncio.ensure_future(support.ready())
             waiting.cancel()
             await host.close()

@@ -1,0 +1,199 @@
+"""Who is switched on: those that a state uses, and whom these need; the others are off (S1.9, S4.1).
+
+A component is used while it carries out something for a state, and as long as it is in a mode, other than `neutral`,
+that a state has put it in. This is the activation tree of one process; `heartbeats` has the one between processes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection, Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from dsc.components.keeper import Keeper
+from dsc.components.life import NEUTRAL, Life
+from dsc.components.roster import Roster
+from dsc.components.stopping import GRACE, give_up
+from knowledge_base.errors import InputError
+
+if TYPE_CHECKING:
+    from dsc.components.component import Component
+
+
+class Activity:
+    """Sees to it that who is needed is kept going.
+
+    What a component does that takes no resources and needs nobody is no affair of ours, unless somebody needs it.
+
+    Args:
+        roster: who is there.
+        used: names of those that carry out something, or put things in order after it.
+    """
+
+    def __init__(self, roster: Roster, used: Callable[[], Iterable[str]]) -> None:
+        self._roster = roster
+        self._used = used
+        self._concerned: set[str] = set()
+        self._in_mode: dict[str, None] = {}
+        self._kept: dict[str, Keeper] = {}
+        self._let_go: dict[str, asyncio.Task[None]] = {}
+        self._listeners: set[Callable[[], None]] = set()
+        self._looking = False
+        self._closed = False
+        for component in roster.components.values():
+            self.deployed(component)
+
+    @property
+    def on(self) -> frozenset[str]:
+        """Names of those that are alive and switched on."""
+        return frozenset(keeper.name for keeper in self._kept.values() if keeper.on)
+
+    def concerns(self, component: Component) -> bool:
+        """Whether it matters to anybody if this component is used."""
+        return component.name in self._concerned
+
+    def deployed(self, component: Component) -> None:
+        """A component is about to be there, maybe in place of another one."""
+        before = self._roster.components.get(component.name, component)
+        if before is not component:
+            before.life.leave(self._look)
+            if component.name in self._kept:
+                self._end(self._kept[component.name], ())
+                self._look()
+        if component.takes_part:
+            self._concerned.add(component.name)
+            component.life.listen(self._look)
+        else:
+            self._concerned.discard(component.name)
+
+    def look(self, name: str) -> None:
+        """A component is used, or is not any more; who is needed is seen to soon, once for all of one moment."""
+        if name in self._concerned:
+            self._look()
+
+    def switched(self, name: str, mode: str) -> None:
+        """A state puts a component in a mode."""
+        if mode in {NEUTRAL, Life.SHUTDOWN}:
+            self._in_mode.pop(name, None)
+        elif mode != Life.INIT:
+            self._in_mode[name] = None
+        self.look(name)
+
+    async def close(self) -> None:
+        """Switch everything off, and wait for that, though not for ever."""
+        self._closed = True
+        for component in self._roster.components.values():
+            component.life.leave(self._look)
+        self._keep_only({})
+        if self._let_go:
+            _, others = await asyncio.wait(self._let_go.values(), timeout=2 * GRACE)  # one after the other
+            for task in others:
+                task.cancel()
+                give_up(task)
+
+    # -- for skills and keepers ---------------------------------------------------------------------------
+
+    def keeper(self, component: Component) -> Keeper:
+        """Who keeps a component going that is used; from now on, whom it needs is kept going, too."""
+        if self._looking or component.name not in self._kept:
+            self._see()
+        return self._kept[component.name]
+
+    def resting_on(self, component: Component) -> Iterator[Keeper]:
+        """The keepers of all that a component needs in its present mode, what these need before them; then its own.
+
+        Raises:
+            InputError: components need each other in a circle.
+        """
+        for name in self._closure(component.name, {}, ()):
+            if name in self._kept:
+                yield self._kept[name]
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call the listener whenever something about a component is different."""
+        self._listeners.add(listener)
+
+    def leave(self, listener: Callable[[], None]) -> None:
+        """Call it no longer."""
+        self._listeners.discard(listener)
+
+    def announce(self) -> None:
+        """Something about a component is different: who is needed is looked for, and who listens is told."""
+        self._look()
+        for listener in tuple(self._listeners):
+            listener()
+
+    async def until(self, holds: Callable[[], bool]) -> None:
+        """Wait until something holds that is asked anew whenever something about a component is different."""
+        changed = asyncio.Event()
+        self.listen(changed.set)
+        try:
+            while not holds():
+                changed.clear()
+                await changed.wait()
+        finally:
+            self.leave(changed.set)
+
+    async def find(self, name: str, needing: Component | None) -> Component:
+        """The component of that name, which may be deployed late."""
+        return self._roster.components[name] if needing is None else await self._roster.find(name, needing)
+
+    async def supported(self, component: Component) -> None:
+        """Wait until all that the component needs in its present mode is on."""
+        await self.until(lambda: all(name in self._kept and self._kept[name].on for name in component.needed()))
+
+    # -- who is needed ------------------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        if not self._looking and not self._closed:
+            self._looking = True
+            asyncio.get_running_loop().call_soon(self._see)
+
+    def _see(self) -> None:
+        self._looking = False
+        if self._closed:
+            return
+        needed: dict[str, Component | None] = {}
+        in_mode = [name for name in self._in_mode if self._roster.components[name].mode != NEUTRAL]
+        for name in (*sorted(self._used()), *in_mode):
+            if name in self._concerned:
+                self._add_needed(name, None, needed)
+        self._keep_only(needed)
+
+    def _add_needed(self, name: str, needing: Component | None, needed: dict[str, Component | None]) -> None:
+        """Who needs whom, those that need before those that are needed."""
+        if name not in needed:
+            needed[name] = needing
+            component = self._roster.known(name)
+            for other in () if component is None else component.needed():
+                self._add_needed(other, component, needed)
+
+    def _closure(self, name: str, found: dict[str, None], above: tuple[str, ...]) -> dict[str, None]:
+        if name in above:
+            raise InputError(f"components need each other in a circle: {' -> '.join((*above, name))}")
+        component = self._roster.known(name)
+        for other in () if component is None else component.needed():
+            self._closure(other, found, (*above, name))
+        found[name] = None
+        return found
+
+    def _keep_only(self, needed: dict[str, Component | None]) -> None:
+        ended: list[asyncio.Task[None]] = []
+        for keeper in [one for one in self._kept.values() if one.name not in needed]:
+            ended.append(self._end(keeper, tuple(ended)))
+        for name, needing in needed.items():
+            if name not in self._kept:
+                self._kept[name] = Keeper(name, needing, self)
+                self._kept[name].begin(self._let_go.get(name))
+
+    def _end(self, keeper: Keeper, after: Collection[asyncio.Task[None]]) -> asyncio.Task[None]:
+        del self._kept[keeper.name]
+        keeper.let_go(after)
+        assert keeper.task is not None  # noqa: S101
+        self._let_go[keeper.name] = keeper.task
+        keeper.task.add_done_callback(lambda task: self._over(keeper.name, task))
+        return keeper.task
+
+    def _over(self, name: str, task: asyncio.Task[None]) -> None:
+        if self._let_go.get(name) is task:
+            del self._let_go[name]
