@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from dsc.components.ports import event as event
     from dsc.components.ports import query as query
     from dsc.components.ports import takes as takes
+    from dsc.components.streams import Push as Push
+    from dsc.components.streams import Stream as Stream
     from dsc.dynamic.library import Library as Library
     from dsc.engine.machine import Machine as Machine
     from dsc.events import Event as Event
@@ -38,10 +40,12 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Library": "dynamic.library",
         "Machine": "engine.machine",
         "Outcome": "calls",
+        "Push": "components.streams",
         "Record": "trace",
         "RunEnd": "sequencer.sequencer",
         "Sequencer": "sequencer.sequencer",
         "SkillCall": "calls",
+        "Stream": "components.streams",
         "component_of": "components.functions",
         "event": "components.ports",
         "load_library": "text.plots",

@@ -11,9 +11,11 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
-from dsc.components.component import Component, require_instances
+from dsc.components.component import Component
 from dsc.components.needs import require_deployed
 from dsc.components.parameters import Parameter
+from dsc.components.roster import require_instances
+from dsc.components.wiring import require_wired
 from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
@@ -95,6 +97,7 @@ class Executive:
         self.components = require_instances(components)
         configure(self.components)
         require_deployed(self.components, [PlanningComponent.name])
+        require_wired(self.components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
         if any(component.name == PlanningComponent.name for component in self.components):
             raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)

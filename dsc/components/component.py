@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-from collections.abc import Awaitable, Iterable, Mapping
+from collections.abc import Awaitable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
@@ -12,12 +12,12 @@ from dsc.calls import Ended, Outcome, SkillCall, Status
 from dsc.components.activations import Activations
 from dsc.components.declarations import check_declarations
 from dsc.components.life import NEUTRAL, Life, LifeCycle
-from dsc.components.needs import ALWAYS, require_declared
+from dsc.components.needs import ALWAYS
 from dsc.components.parameters import Parameter, changed, check_relations, known, require_bound, unsaid
+from dsc.components.streams import Push, Stream
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.inputs import require_several, shown
+from knowledge_base.errors import UnknownNameError
 
 TAKES = "__dsc_takes__"
 """Where `takes` notes what it declares."""
@@ -36,6 +36,7 @@ class Component:
         relations: conditions between its parameters that always hold.
         needs: mode -> a tuple of names of the components it needs then; `ALWAYS`: in every mode.
         activations: who has activated its events.
+        pushes, streams: its push ports, and what it takes from those of others, by name; see `dsc.components.streams`.
         life: where it is in its life; `self.life.become(Life.FATAL_ERROR, "no power")` when the device is gone.
     """
 
@@ -47,10 +48,13 @@ class Component:
     relations: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
+    _ports: ClassVar[Mapping[str, Push | Stream]] = {}
+
     def __init_subclass__(cls, **named: Any) -> None:
-        """Check what its builder declares; raises `InputError`."""
+        """Check what its builder declares of parameters, and find the ports; raises `InputError`."""
         super().__init_subclass__(**named)
         check_declarations(cls.name or cls.__name__.lower(), cls.declares, cls.relations, cls.__module__)
+        cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Stream)}
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
@@ -60,6 +64,15 @@ class Component:
         self._starting = False
         self._activators: set[int] = set()
         self.activations = Activations()
+        self.pushes: dict[str, Push] = {}
+        self.streams: dict[str, Stream] = {}
+        for port, declared in self._ports.items():
+            if isinstance(declared, Push):
+                self.pushes[port] = declared.of(self, port)
+                setattr(self, port, self.pushes[port])
+            else:
+                self.streams[port] = declared.of()
+                setattr(self, port, self.streams[port])
 
     @property
     def mode(self) -> str:
@@ -325,26 +338,6 @@ class Component:
             "parameters": dict(self.parameters),
             "needs": list(self.needed()),
             "skills": sorted(self.skills()),
+            "pushes": sorted(self.pushes),
+            "streams": {name: stream.source for name, stream in self.streams.items()},
         }
-
-
-def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
-    """All of them, if these are components, each with a name of its own.
-
-    Raises:
-        InputError: it is no list of them, something in it is none, e.g. a class instead of its instance, or what one
-            needs is not said rightly.
-        SchemaError: two have one name.
-    """
-    require_several(components, "components")
-    components = tuple(components)
-    names = set()
-    for one in components:
-        if not isinstance(one, Component):
-            hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
-            raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
-        if one.name in names:
-            raise SchemaError(f"two components are named '{one.name}'", found=one.name)
-        require_declared(one)
-        names.add(one.name)
-    return components

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 
-from dsc.components.component import Component, require_instances
+from dsc.components.component import Component
+from dsc.components.roster import require_instances
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.inputs import shown
 

@@ -1,4 +1,4 @@
-"""*Push newest* and *push timed*: one component hands values on to many, none older than the last (S1.1, S1.15).
+"""Pushing over a transport: one component hands values on to many, none older than the last (S1.1).
 
 A subscriber asks for the value again and again, so that it has the newest even if a push was lost, and a publisher
 that came late or came back finds its subscribers; a publisher forgets who has not asked for a while.
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
+from dsc.components.streams import Values, require_fitting
 
 RENEWED = 1.0
 """Seconds after which a subscriber asks again."""
@@ -20,45 +21,39 @@ FORGOTTEN = 5.0
 
 
 class Publisher:
-    """A push port.
+    """Pushes at an endpoint.
 
     Args:
         endpoint: whose port it is.
         port: its name.
-        period: push the newest value every so many seconds (*push timed*); without, whenever there is a new one.
+        values: what is pushed, by name with types; if it is said, who wants something else is refused.
 
     Attributes:
         newest: the newest value as subscribers `take` it, with its number.
     """
 
-    def __init__(self, endpoint: Endpoint, port: str, period: float | None = None) -> None:
+    def __init__(self, endpoint: Endpoint, port: str, values: Values | None = None) -> None:
         self._endpoint = endpoint
-        self._kind = f"push {port}"
-        self._period = period
+        self._port = port
+        self._values = values
         self.newest: dict[str, Any] = {"life": endpoint.life, "n": 0, "value": None}
         self._subscribers: dict[str, float] = {}
         endpoint.answer(f"subscribe {port}", self._subscribe)
 
     def put(self, value: Any) -> None:
-        """A new value; raises `InputError` if it is no plain data."""
+        """A new value, pushed to all who have subscribed; raises `InputError` if it is no plain data."""
         self.newest = {"life": self._endpoint.life, "n": self.newest["n"] + 1, "value": value}
-        if self._period is None:
-            self._push()
-
-    async def run(self) -> None:
-        """Push periodically until cancelled; only for *push timed*."""
-        while True:
-            await asyncio.sleep(self._period or math.inf)
-            if self.newest["n"]:
-                self._push()
+        self._push()
 
     def _push(self) -> None:
         now = asyncio.get_running_loop().time()
         self._subscribers = {who: until for who, until in self._subscribers.items() if until > now}
         for who in self._subscribers:
-            self._endpoint.push(who, self._kind, self.newest)
+            self._endpoint.push(who, _kind(self._endpoint.address, self._port), self.newest)
 
-    async def _subscribe(self, sender: str, _: Any) -> dict[str, Any]:
+    async def _subscribe(self, sender: str, wanted: Values | None) -> dict[str, Any]:
+        if self._values is not None and wanted is not None:
+            require_fitting(f"{self._endpoint.address}.{self._port}", wanted, self._values)
         self._subscribers[sender] = asyncio.get_running_loop().time() + FORGOTTEN
         return self.newest
 
@@ -71,23 +66,32 @@ class Subscription:
         publisher: whose port it is.
         port: its name.
         heard: is told each value that is newer than those known.
+        wanted: what it has to push at least, and of which types.
 
     Attributes:
         value: the newest one that is known; `None` before the first.
+        problem: why the publisher has refused, if it has.
     """
 
     def __init__(
-        self, endpoint: Endpoint, publisher: str, port: str, heard: Callable[[Any], None] | None = None
+        self,
+        endpoint: Endpoint,
+        publisher: str,
+        port: str,
+        heard: Callable[[Any], None] | None = None,
+        wanted: Values | None = None,
     ) -> None:
         self.value: Any = None
+        self.problem: str | None = None
         self._tell = heard
+        self._wanted = wanted
         self._endpoint = endpoint
         self._publisher = publisher
         self._port = port
         self._numbers: dict[str, int] = {}  # the newest number of each life of the publisher, the present one last
         self._at = -math.inf
         self._news = asyncio.Event()
-        endpoint.hear(f"push {port}", self._heard)
+        endpoint.hear(_kind(publisher, port), self._heard)
 
     @property
     def age(self) -> float:
@@ -112,10 +116,14 @@ class Subscription:
         """Subscribe, and again whenever the publisher may have forgotten, until cancelled."""
         while True:
             try:
-                newest = await self._endpoint.call(self._publisher, f"subscribe {self._port}", within=FORGOTTEN)
-            except (NoAnswerError, RefusedError):
+                kind = f"subscribe {self._port}"
+                newest = await self._endpoint.call(self._publisher, kind, self._wanted, FORGOTTEN)
+            except NoAnswerError:
                 pass  # not there yet, or not there any more: it may come
+            except RefusedError as refused:  # so may another one
+                self.problem = str(refused)
             else:
+                self.problem = None
                 self.take(newest)
             await asyncio.sleep(RENEWED)
 
@@ -133,3 +141,8 @@ class Subscription:
             self._news.set()
             if self._tell is not None:
                 self._tell(self.value)
+
+
+def _kind(publisher: str, port: str) -> str:
+    """Ports of two publishers may have one name."""
+    return f"push {publisher}.{port}"

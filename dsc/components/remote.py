@@ -24,6 +24,7 @@ from dsc.components.heartbeats import Heart
 from dsc.components.hosted import HostedActions, outcome_of
 from dsc.components.life import Life
 from dsc.components.pushing import RENEWED, Publisher, Subscription
+from dsc.components.remote_streams import HostedStreams, ports_form, ports_of
 from dsc.components.transport import Transport
 from dsc.skills import SkillSignature
 
@@ -36,23 +37,28 @@ CONDITION = "its condition"
 
 
 class Host:
-    """Offers a component on a transport until it is closed; there it is part of the activation tree, too."""
+    """Offers a component on a transport until it is closed; there it is part of the activation tree, too.
+
+    Attributes:
+        endpoint: the component's address; whatever else it does on the transport shares it.
+    """
 
     def __init__(self, component: Component, transport: Transport, clock: Clock) -> None:
         self._component = component
-        self._endpoint = Endpoint(component.name, transport)
-        self._condition = Publisher(self._endpoint, CONDITION)
-        self._actions = HostedActions(component, self._endpoint, clock)
-        self._endpoint.answer("hull", self._hull)
-        self._endpoint.answer("come alive", self._come_alive)
-        self._endpoint.answer("be active", self._be_active)
-        self._endpoint.answer("switch", self._switch)
-        self._endpoint.answer("set", lambda _, said: component.configure(said["parameter"], said["value"]))
-        self._endpoint.answer("set all", lambda _, said: component.configure_all(said))
-        self._endpoint.answer("take", lambda _, said: component.take(said["port"], said["message"]))
-        self._endpoint.answer("diagnose", lambda _, __: component.diagnose())
+        self.endpoint = Endpoint(component.name, transport)
+        self._condition = Publisher(self.endpoint, CONDITION)
+        self._actions = HostedActions(component, self.endpoint, clock)
+        self._streams = HostedStreams(component, self.endpoint)
+        self.endpoint.answer("hull", self._hull)
+        self.endpoint.answer("come alive", self._come_alive)
+        self.endpoint.answer("be active", self._be_active)
+        self.endpoint.answer("switch", self._switch)
+        self.endpoint.answer("set", lambda _, said: component.configure(said["parameter"], said["value"]))
+        self.endpoint.answer("set all", lambda _, said: component.configure_all(said))
+        self.endpoint.answer("take", lambda _, said: component.take(said["port"], said["message"]))
+        self.endpoint.answer("diagnose", lambda _, __: component.diagnose())
         self._is_active = asyncio.Event()
-        self._heart = Heart(self._endpoint, component.needed, self._activated)
+        self._heart = Heart(self.endpoint, component.needed, self._activated)
         self._beating = asyncio.get_running_loop().create_task(self._heart.run())
         self._changed()
         component.life.listen(self._changed)
@@ -60,8 +66,8 @@ class Host:
     async def close(self) -> None:
         """Stop everything, and answer no more: to the others it has died."""
         self._component.life.leave(self._changed)
-        await self._endpoint.close()
-        tasks = [self._beating, *self._actions.tasks()]
+        await self.endpoint.close()
+        tasks = [self._beating, *self._actions.tasks(), *self._streams.close()]
         for task in tasks:
             task.cancel()
         await asyncio.wait(tasks)
@@ -74,7 +80,7 @@ class Host:
 
     async def _hull(self, _: str, __: Any) -> dict[str, Any]:
         skills = [asdict(signature) for signature in self._component.skills().values()]
-        return {"skills": skills, "condition": self._condition.newest}
+        return {"skills": skills, "pushes": ports_form(self._component), "condition": self._condition.newest}
 
     async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
         before = self._component.life.state
@@ -145,6 +151,7 @@ class RemoteComponent(Component):
             raise
         skills = {form["name"]: SkillSignature(**form) for form in said["skills"]}
         remote = cls(name, transport, endpoint, skills)
+        remote.pushes = ports_of(said["pushes"], remote, endpoint)
         remote._there.take(said["condition"])
         return remote
 

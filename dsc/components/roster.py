@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import MutableMapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, MutableMapping
 
-from knowledge_base.errors import UnknownNameError
+from dsc.components.component import Component
+from dsc.components.needs import require_declared
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.inputs import require_several, shown
 
-if TYPE_CHECKING:
-    from dsc.components.component import Component
 
 class NotAliveError(Exception):
     """A component that is needed is not alive, and why."""
@@ -64,3 +64,25 @@ class Roster:
             return str(UnknownNameError(f"component '{name}', which is not there", found=name, valid=self.components))
         why = f": {component.life.reason}" if component.life.reason else ""
         return f"component '{name}', which is in '{component.life.state}'{why}"
+
+
+def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
+    """All of them, if these are components, each with a name of its own.
+
+    Raises:
+        InputError: it is no list of them, something in it is none, e.g. a class instead of its instance, or what one
+            needs is not said rightly.
+        SchemaError: two have one name.
+    """
+    require_several(components, "components")
+    components = tuple(components)
+    names = set()
+    for one in components:
+        if not isinstance(one, Component):
+            hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
+            raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
+        if one.name in names:
+            raise SchemaError(f"two components are named '{one.name}'", found=one.name)
+        require_declared(one)
+        names.add(one.name)
+    return components

@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol
 
+from knowledge_base.errors import InputError
+
 Receive = Callable[[str, bytes], None]
 """Is given the sender's address and a frame."""
 EVERYBODY = "*"
@@ -16,7 +18,11 @@ class Transport(Protocol):
     """Carries frames, at its best; `dsc.testing.transport_suite` is what it has to pass."""
 
     def attach(self, address: str, receive: Receive) -> None:
-        """Hand frames for the address to `receive`, from the loop's own thread; it replaces who was there."""
+        """Hand frames for the address to `receive`, from the loop's own thread.
+
+        Raises:
+            InputError: somebody in this program has the address already; both would share its `Endpoint`.
+        """
         ...
 
     def detach(self, address: str) -> None:
@@ -35,7 +41,10 @@ class LocalTransport:
         self._attached: dict[str, Receive] = {}
 
     def attach(self, address: str, receive: Receive) -> None:
-        """Hand frames for the address to `receive`."""
+        """Hand frames for the address to `receive`; raises `InputError` if somebody else has it."""
+        if address in self._attached:
+            message = f"the address '{address}' is in use: share its endpoint (`host.endpoint`), or close it first"
+            raise InputError(message, found=address)
         self._attached[address] = receive
 
     def detach(self, address: str) -> None:

@@ -17,10 +17,11 @@ from typing import Any, NamedTuple
 from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.activity import Activity
-from dsc.components.component import Component, require_instances
-from dsc.components.roster import Roster
+from dsc.components.component import Component
+from dsc.components.roster import Roster, require_instances
 from dsc.components.stopping import GRACE, give_up
 from dsc.components.support import Support
+from dsc.components.wiring import Wiring
 from dsc.engine.steps import (
     Cancel,
     Output,
@@ -75,6 +76,7 @@ class Dispatcher:
         self._components = {component.name: component for component in require_instances(components)}
         self._roster = Roster(self._components)
         self.activity = Activity(self._roster, self._at_work)
+        self._wiring = Wiring(self._components)
         self._given_up: list[str] = []
         self._answered_for: set[str] = set()
         self._clock = clock
@@ -89,6 +91,7 @@ class Dispatcher:
         """Add a component; it replaces one of the same name. Who has waited for it goes on."""
         self.activity.deployed(component)
         self._roster.deploy(component)
+        self._wiring.deployed(component)
 
     def started(self) -> tuple[Start, ...]:
         """The skills that are being carried out, or whose answer has not been taken yet."""
@@ -247,6 +250,7 @@ class Dispatcher:
             for task in stopped:
                 failure(task)  # of a skill that was cancelled, nobody wants to hear it
         await self.activity.close()
+        self._wiring.close()
         return [*self.telling.untaken(), *self._given_up]
 
     def _start(self, start: Start, earlier: Earlier | None = None) -> None:

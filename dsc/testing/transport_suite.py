@@ -29,8 +29,10 @@ from dsc.components.ports import event, query, takes
 from dsc.components.pushing import Publisher, Subscription
 from dsc.components.remote import Host, RemoteComponent
 from dsc.components.roster import NotAliveError, Roster
+from dsc.components.streams import Push, Stream
 from dsc.components.support import Support
 from dsc.components.transport import Transport
+from dsc.components.wiring import Wiring
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from knowledge_base.errors import InputError
@@ -87,6 +89,27 @@ class Robot(Component):
     async def configure(self, parameter: str, value: object) -> None:
         """Remember it."""
         self.log.append((parameter, value))
+
+
+class Laser(Component):
+    """Pushes."""
+
+    name = "laser"
+    scan = Push({"metres": "number"})
+    heat = Push({"celsius": "number"}, period=0.1)
+
+    @query({"metres": "number"})
+    async def measure(self) -> dict[str, Any]:
+        """Ask for what is pushed."""
+        return {"metres": 9}
+
+
+class Mapper(Component):
+    """Takes what is pushed."""
+
+    name = "mapper"
+    scan = Stream("laser.scan", {"metres": "number"})
+    heat = Stream("laser.heat", {"celsius": "number"})
 
 
 async def until(holds: Callable[[], bool]) -> None:
@@ -245,23 +268,58 @@ class TransportSuite:
         self.run(main())
 
     def test_a_timed_push_comes_again_and_its_silence_is_noticed(self) -> None:
-        """*Push timed*."""
+        """*Push timed*, from one component to another."""
 
         async def main() -> None:
-            transport = self.transport()
-            mine, theirs = Endpoint("user", transport), Endpoint("laser", transport)
-            subscription, publisher = Subscription(mine, "laser", "scan"), Publisher(theirs, "scan", period=0.1)
-            async with running(subscription.run()):
-                async with running(publisher.run()):
-                    publisher.put(1)
-                    await until(lambda: subscription.value == 1)
-                    for _ in range(5):
-                        await asyncio.sleep(2.0)
-                        assert subscription.age < 2.0
-                await theirs.close()
-                with pytest.raises(NoAnswerError, match="'laser' has pushed no 'scan' within 4 s"):
-                    await subscription.next(4.0)
-                assert subscription.age > 3.0
+            transport, laser, mapper = self.transport(), Laser(), Mapper()
+            host, other = Host(laser, transport, LoopClock()), Host(mapper, transport, LoopClock())
+            laser.heat.put(celsius=20)
+            await until(lambda: mapper.heat.value == {"celsius": 20})
+            for _ in range(5):
+                await asyncio.sleep(2.0)
+                assert mapper.heat.age < 2.0
+            assert mapper.scan.value is None
+            await host.close()
+            await asyncio.sleep(2.0)  # what is still under way
+            with pytest.raises(NoAnswerError, match=r"nothing has come from 'laser\.heat' within 4 s"):
+                await mapper.heat.next(4.0)
+            assert mapper.heat.age > 3.0
+            await other.close()
+
+        self.run(main())
+
+    def test_a_component_that_pushes_is_one_like_any_other(self) -> None:
+        """Its ports share its address with its skills, and are known to its users."""
+
+        async def main() -> None:
+            transport, laser, mapper = self.transport(), Laser(), Mapper()
+            host, other = Host(laser, transport, LoopClock()), Host(mapper, transport, LoopClock())
+            remote = await RemoteComponent.connect("laser", transport, PATIENCE)
+            here = Mapper()
+            wiring = Wiring({"laser": remote, "mapper": here})
+            for n in range(10):
+                laser.scan.put(metres=n)
+                await asyncio.sleep(0.1)
+            await until(lambda: mapper.scan.value == here.scan.value == {"metres": 9})
+            call = SkillCall("a8.0", LoopClock(), lambda _: None)
+            assert await remote.execute("measure", call, {}) == Outcome("answered", {"metres": 9})
+            wiring.close()
+            await host.close()
+            await other.close()
+
+        self.run(main())
+
+    def test_a_stream_of_something_else_is_refused_with_the_reason(self) -> None:
+        """Where what is pushed is not what is wanted."""
+
+        async def main() -> None:
+            transport, mapper = self.transport(), Mapper()
+            mapper.scan = mapper.streams["scan"] = Stream("laser.scan", {"meters": "number"})
+            hosts = [Host(one, transport, LoopClock()) for one in (Laser(), mapper)]
+            with pytest.raises(NoAnswerError, match=r"'laser\.scan' pushes no 'meters'; did you mean 'metres'"):
+                await mapper.scan.next(PATIENCE / 2)
+            for host in hosts:
+                await host.close()
 
         self.run(main())
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import pytest
 
+from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint
+from dsc.components.pushing import Publisher
+from dsc.components.remote import Host
 from dsc.components.transport import LocalTransport
-from dsc.sequencer.clock import run_real, run_simulated
+from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.testing.lossy import LossyTransport
 from dsc.testing.transport_suite import TransportSuite
+from knowledge_base.errors import InputError
 
 
 class TestLocal(TransportSuite):
@@ -32,6 +36,8 @@ class TestLocalInRealTime(TransportSuite):
     test_a_silent_death_is_noticed_and_a_return_too = None
     test_a_call_is_carried_out_once_and_answered = None
     test_what_a_component_needs_is_waited_for_and_missed = None
+    test_a_stream_of_something_else_is_refused_with_the_reason = None
+    test_a_component_that_pushes_is_one_like_any_other = None
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -78,3 +84,16 @@ def test_answers_are_forgotten_when_nobody_waits_for_them():
         return len(peer.answers)
 
     assert run_simulated(main()) <= 1
+
+
+def test_an_address_is_not_taken_away_from_who_has_it():
+    async def main():
+        transport = LocalTransport()
+        host = Host(Component("laser"), transport, LoopClock())
+        with pytest.raises(InputError, match="'laser' is in use"):
+            Endpoint("laser", transport)
+        assert Publisher(host.endpoint, "scan").newest["n"] == 0
+        await host.close()
+        Endpoint("laser", transport)
+
+    run_simulated(main())

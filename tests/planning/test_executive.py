@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import pytest
 
-from dsc import Component, Event, Library, Outcome, SkillCall, parse_plot, primitive_plot, skill
+from dsc import Component, Event, Library, Outcome, SkillCall, Stream, parse_plot, primitive_plot, skill
 from dsc.components.parameters import Parameter
 from dsc.errors import PlotError
 from dsc.models import MODELS, described
@@ -617,3 +617,14 @@ def test_needs_that_nobody_can_fulfil_are_refused():
 
     with pytest.raises(InputError, match=r"component 'dimmer' needs a component 'lamp', .* did you mean 'lamps'"):
         Executive(DOMAIN, [HOLDER], [Lamps(), Dimmer()])
+
+
+def test_streams_that_have_no_port_are_refused():
+    class Meter(Component):
+        name = "meter"
+        level = Stream("lamps.level", {"lumen": "number"})
+
+    with pytest.raises(InputError, match="component 'lamps' has no push port 'level'"):
+        Executive(DOMAIN, [HOLDER], [Lamps(), Meter()])
+    with pytest.raises(InputError, match=r"component 'meter' takes 'lamps\.level', and there is no such component"):
+        Executive(DOMAIN, [HOLDER], [Meter()])

@@ -1,0 +1,219 @@
+"""Data between components, which passes the plots by: *push newest*, *push timed*, and who takes it (S1.1, S1.15).
+
+    class Laser(Component):
+        scan = Push({"metres": "number"})                     # push newest: whenever there is something new
+        heat = Push({"celsius": "number"}, period=0.5)        # push timed: the newest, every half second
+
+    class Mapper(Component):
+        needs = {ALWAYS: ("laser",)}
+        scan = Stream("laser.scan", {"metres": "number"})
+
+`self.scan.put(metres=2.0)` there is `self.scan.value == {"metres": 2.0}` here: in one process, where the run connects
+them, or over a transport, where the hosts do. What is put is encoded, so that nothing is shared by accident.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Self
+
+from dsc.components.endpoint import NoAnswerError, encoded
+from dsc.components.life import Life
+from dsc.model.ranges import Range
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.inputs import shown
+
+if TYPE_CHECKING:
+    from dsc.components.component import Component
+
+Values = Mapping[str, str | None]
+"""What is pushed, by name with types: `number`, `boolean`, a word of any other type, or `None`: any plain data."""
+Hears = Callable[[dict[str, Any]], None]
+"""Is given what was pushed, a copy of its own."""
+
+
+class Push:
+    """A push port of a component.
+
+    Args:
+        values: what is pushed.
+        period: push the newest every so many seconds (*push timed*); without, whenever there is something new.
+        component, name: whose port it is; said by the component itself when it is made.
+
+    Attributes:
+        values, period: as given.
+
+    Raises:
+        InputError: the period is no positive number of seconds, or the values are no names with types.
+    """
+
+    def __init__(
+        self, values: Values, period: float | None = None, component: Component | None = None, name: str = ""
+    ) -> None:
+        self.values = _checked(values, "a push port")
+        if period is not None and not (isinstance(period, int | float) and 0 < period < math.inf):
+            raise InputError(f"the period of a push port is a positive number of seconds, not {shown(period)}")
+        self.period = period
+        self._component = component
+        self._name = f"{component.name}.{name}" if component is not None else name
+        self._newest: bytes | None = None
+        self._listeners: dict[Hears, None] = {}
+        self._timer: asyncio.TimerHandle | None = None
+
+    def __getstate__(self) -> dict[str, object]:
+        """What goes to another process: who listens here does not."""
+        return {**self.__dict__, "_listeners": {}, "_timer": None}
+
+    def of(self, component: Component, name: str) -> Self:
+        """The port that this declares, for one component."""
+        return type(self)(self.values, self.period, component, name)
+
+    def put(self, **values: Any) -> None:
+        """Something new; from the loop's own thread.
+
+        Raises:
+            InputError: a value is missing, of another type, or no plain data.
+            UnknownNameError: a value is none of those that are declared.
+        """
+        for name in values:
+            if name not in self.values:
+                raise UnknownNameError(f"'{self._name}' has no value '{name}'", found=name, valid=self.values)
+        for name, kind in self.values.items():
+            if name not in values:
+                raise InputError(f"'{self._name}' needs its value '{name}'")
+            if kind is not None:
+                Range(kind).check(f"{self._name}.{name}", values[name])
+        self._newest = encoded(values)
+        if self.period is None:
+            self._tell()
+        else:
+            self._keep_time()
+
+    def listen(self, listener: Hears) -> None:
+        """Tell the listener what is pushed from now on, and the newest before that."""
+        self._listeners[listener] = None
+        if self._newest is not None:
+            listener(json.loads(self._newest))
+        self._keep_time()
+
+    def leave(self, listener: Hears) -> None:
+        """Tell it no more."""
+        self._listeners.pop(listener, None)
+
+    def _tell(self) -> None:
+        if self._newest is not None:
+            for listener in tuple(self._listeners):
+                listener(json.loads(self._newest))
+
+    def _keep_time(self) -> None:
+        if self.period is not None and self._timer is None and self._listeners and self._newest is not None:
+            self._timer = asyncio.get_running_loop().call_later(self.period, self._due)
+
+    def _due(self) -> None:
+        self._timer = None
+        if self._component is None or self._component.life.state not in {Life.FATAL_ERROR, Life.SHUTDOWN}:
+            self._tell()  # else its silence says that it is gone
+        self._keep_time()
+
+
+class Stream:
+    """What a component takes from a push port of another; it shall also be among its `needs`.
+
+    Args:
+        source: the port, `component.port`.
+        values: what it has to push at least, and of which types.
+
+    Attributes:
+        source, values: as given.
+        value: the newest that has come; `None` before the first.
+        problem: says why nothing can come, if that is known.
+
+    Raises:
+        InputError: the source is no `component.port`, or the values are no names with types.
+    """
+
+    def __init__(self, source: str, values: Values) -> None:
+        self.publisher, _, self.port = source.partition(".") if isinstance(source, str) else ("", "", "")
+        if not self.publisher or not self.port:
+            raise InputError(f"a stream comes from a port, as in 'laser.scan', not {shown(source)}")
+        self.source = source
+        self.values = _checked(values, "a stream")
+        self.value: dict[str, Any] | None = None
+        self.problem: Callable[[], str | None] = _none_known
+        self._at = -math.inf
+        self._waiting: set[asyncio.Future[None]] = set()
+
+    def __getstate__(self) -> dict[str, object]:
+        """What goes to another process: who waits here does not."""
+        return {**self.__dict__, "_waiting": set(), "problem": _none_known}
+
+    def of(self) -> Self:
+        """The stream that this declares, for one component."""
+        return type(self)(self.source, self.values)
+
+    @property
+    def age(self) -> float:
+        """Seconds since the value has come; infinite before the first. Far above the period, the port is silent."""
+        return asyncio.get_running_loop().time() - self._at
+
+    async def next(self, within: float) -> dict[str, Any]:
+        """Wait for what comes next.
+
+        Raises:
+            NoAnswerError: nothing has come within so many seconds.
+        """
+        coming: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiting.add(coming)
+        try:
+            async with asyncio.timeout(within):
+                await coming
+        except TimeoutError:
+            why = self.problem()
+            message = f"nothing has come from '{self.source}' within {within:g} s"
+            raise NoAnswerError(f"{message}: {why}" if why else message) from None
+        finally:
+            self._waiting.discard(coming)
+        assert self.value is not None  # noqa: S101
+        return self.value
+
+    def hear(self, value: dict[str, Any]) -> None:
+        """Something has been pushed."""
+        self.value = value
+        self._at = asyncio.get_running_loop().time()
+        for coming in self._waiting:
+            if not coming.done():
+                coming.set_result(None)
+
+
+def require_fitting(source: str, wanted: Values, offered: Values) -> None:
+    """Raise an error unless a port pushes what a stream wants.
+
+    Raises:
+        UnknownNameError: it has no such value.
+        SchemaError: the value is of another type.
+    """
+    for name, kind in wanted.items():
+        if name not in offered:
+            raise UnknownNameError(f"'{source}' pushes no '{name}'", found=name, valid=offered)
+        if kind is not None and offered[name] != kind:
+            said = offered[name] or "plain data of any type"
+            raise SchemaError(f"'{source}' pushes '{name}' as {said}, and {kind} is wanted", found=name)
+
+
+def _none_known() -> None:
+    """Nobody has been refused."""
+
+
+def _checked(values: object, what: str) -> Values:
+    if not isinstance(values, Mapping) or not all(
+        isinstance(name, str) and name.isidentifier() and (kind is None or isinstance(kind, str))
+        for name, kind in values.items()
+    ):
+        raise InputError(f"the values of {what} are names with types, as in {_EXAMPLE}, not {shown(values)}")
+    return dict(values)
+
+
+_EXAMPLE = "{'metres': 'number'}"
