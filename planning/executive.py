@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Coroutine, Iterable, Mapping
 from contextlib import nullcontext
 from functools import cache
 from importlib.resources import files
@@ -195,11 +195,10 @@ class Executive:
         """
         clock = LoopClock()
         store = self._run_store({**(header or {}), "simulated": clock.simulated, "open_ended": open_ended})
-        sequencer = self._sequencer(clock, 0, store, open_ended=open_ended)
+        sequencer, planning = self._wired(clock, 0, store, open_ended=open_ended)
         if prepare is not None:
             prepare(sequencer)
-        with nullcontext() if clock.simulated else settled():
-            return await sequencer.run(plot, arguments)
+        return await _to_its_end(sequencer.run(plot, arguments), planning, clock)
 
     def resume(self, *, prepare: Prepare | None = None) -> RunEnd:
         """Go on with the store's unfinished run where it was broken off, and run it to its end.
@@ -272,13 +271,14 @@ class Executive:
                 listener(record)
         clock = LoopClock(kept.time)
         open_ended = bool(kept.run.header["open_ended"])
-        sequencer = self._sequencer(clock, kept.last_record, store, open_ended=open_ended)
+        sequencer, planning = self._wired(clock, kept.last_record, store, open_ended=open_ended)
         if prepare is not None:
             prepare(sequencer)
-        with nullcontext() if clock.simulated else settled():
-            return await sequencer.resume(kept)
+        return await _to_its_end(sequencer.resume(kept), planning, clock)
 
-    def _sequencer(self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool) -> Sequencer:
+    def _wired(
+        self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool
+    ) -> tuple[Sequencer, PlanningComponent]:
         trace = Trace(clock.now, last)
         for listener in self._listeners:
             trace.listen(listener)
@@ -294,7 +294,7 @@ class Executive:
         )  # fmt: skip
         sequencer.listen(planning.note_choices)
         sequencer.dispatcher.deploy(planning)
-        return sequencer
+        return sequencer, planning
 
     def _run_store(self, header: Mapping[str, Any]) -> RunStore | None:
         if self._store is None:
@@ -323,6 +323,14 @@ class Executive:
     def __exit__(self, *_: object) -> None:
         """`close`."""
         self.close()
+
+
+async def _to_its_end(running: Coroutine[Any, Any, RunEnd], planning: PlanningComponent, clock: LoopClock) -> RunEnd:
+    with nullcontext() if clock.simulated else settled():
+        try:
+            return await running
+        finally:
+            await planning.over()
 
 
 @cache

@@ -88,6 +88,15 @@ class PlanningComponent(Component):
             self._derivation, self._plotting, self._plans, self._choices, self._search, self._telling
         )
         self._answers: dict[str, Outcome] = {}  # by action; of some it is not known yet whether they were heard
+        self._ending: set[asyncio.Task[None]] = set()  # searches that were told to stop
+
+    async def over(self) -> None:
+        """Wait until planners have stopped that were told to, as a program has to before its loop ends.
+
+        Those that do not stop are left behind after `bounds.STOPPING` seconds.
+        """
+        if self._ending:
+            await asyncio.wait(self._ending)
 
     def note_choices(self, step: Step) -> None:
         """Remember which plots were chosen to carry out planning actions; for the sequencer to call."""
@@ -187,7 +196,7 @@ class PlanningComponent(Component):
 
         watching = Watching(
             self._plans.required(plan), self._derivation, self._knowledge, self._search, self._telling, self._clock,
-            self._plans.new_name, is_own,
+            self._plans.new_name, is_own, self._ending,
         )  # fmt: skip
         outcome = await watching.watch()
         if outcome.event == "goal_holds":

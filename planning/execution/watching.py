@@ -39,6 +39,7 @@ class Watching:
         knowledge, search, telling, clock: as in the planning component.
         new_name: names a plan.
         is_own: whether a change by this author is the running step's own doing.
+        ending: is told who was told to stop and has not yet.
     """
 
     carried: Carried
@@ -49,6 +50,7 @@ class Watching:
     clock: LoopClock
     new_name: Callable[[], str]
     is_own: Callable[[str], bool]
+    ending: set[asyncio.Task[None]]
 
     async def watch(self) -> Outcome:
         """Watch until another plan shall take the place, or none; the outcomes are those of the skill `monitor`."""
@@ -115,7 +117,9 @@ class _Watch:
         self._carried.begun = None
         self._unsubscribe()
         for task in self._beside:
-            task.cancel()
+            if task.cancel():  # else it is over
+                self._about.ending.add(task)
+                task.add_done_callback(self._about.ending.discard)
         if self._monitor is not None:
             self._monitor.close()
 

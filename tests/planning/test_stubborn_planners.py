@@ -119,3 +119,43 @@ def test_a_planner_without_an_answer_that_cannot_be_closed_is_named(caplog):
     with caplog.at_level(logging.ERROR, "asyncio"):
         assert run(StubbornLater(EngineFailed("fake", "killed"), "ending")) == "fake: killed"
     assert "planner StubbornLater: it goes on although it was told to stop" in caplog.text
+
+
+class Tidy:
+    """Has something to do when it is told to stop, as who ends the processes of engines."""
+
+    def __init__(self):
+        self.begun, self.tidied_up = asyncio.Event(), False
+
+    async def solve(self, problem, seconds):
+        return FOUND
+
+    async def plans(self, problem, seconds):
+        try:
+            yield FOUND
+            self.begun.set()
+            await asyncio.get_running_loop().create_future()
+        finally:
+            await asyncio.sleep(0.01)
+            self.tidied_up = True
+
+
+def test_a_program_that_is_interrupted_ends_when_planners_have_stopped(monkeypatch, caplog):
+    monkeypatch.setattr("planning.execution.bounds.STOPPING", 5)
+    planner = Tidy()
+
+    async def interrupted(sequencer):
+        await planner.begun.wait()
+        await asyncio.sleep(0)
+        main.cancel()
+
+    def prepare(sequencer):
+        nonlocal main
+        main = asyncio.current_task()
+        going_on.append(asyncio.get_running_loop().create_task(interrupted(sequencer)))
+
+    main, going_on = None, []
+    with caplog.at_level(logging.ERROR, "asyncio"), pytest.raises(asyncio.CancelledError):
+        run(planner, prepare=prepare)
+    assert planner.tidied_up
+    assert caplog.text == ""
