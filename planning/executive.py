@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Coroutine, Iterable, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping
 from contextlib import nullcontext
 from functools import cache
 from importlib.resources import files
@@ -13,7 +13,6 @@ from pydantic import ValidationError
 
 from dsc.components.component import Component
 from dsc.components.needs import require_deployed
-from dsc.components.parameters import Parameter
 from dsc.components.roster import require_instances
 from dsc.components.wiring import require_wired
 from dsc.dynamic.library import Library
@@ -25,16 +24,14 @@ from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import RunEnd, Sequencer
-from dsc.skills import SkillSignature, signatures
+from dsc.skills import signatures
 from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
-from dsc.validation import raise_findings, validate_library
 from knowledge_base.errors import InputError, SchemaError, StoreError
 from knowledge_base.journal.file import Durability
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.compatibility import require_extension
-from knowledge_base.world.schema import Schema
 from planning import entrance
 from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of
 from planning.collecting import settled
@@ -45,8 +42,8 @@ from planning.engines.race import PlannerRace
 from planning.execution.component import PlanningComponent
 from planning.execution.foresight import Foresight
 from planning.fragments import shipped_by
-from planning.implementations import check_implementations
 from planning.posing.problem import check_goal
+from planning.soundness import require_sound
 
 Prepare = Callable[[Sequencer], None]
 """Called before a run starts, e.g. to post events or to keep the sequencer at hand."""
@@ -118,7 +115,7 @@ class Executive:
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
         declared = {PlanningComponent.name: PlanningComponent.declares, **{c.name: c.declares for c in self.components}}
         schema = self.domain.schema if knowledge is None else knowledge.schema
-        _require_sound(self.library, self.domain, schema, skills, declared)
+        require_sound(self.library, self.domain, schema, skills, declared)
         if knowledge is not None:
             self.knowledge = knowledge
         else:  # at last, since what is opened has to be closed
@@ -338,30 +335,6 @@ def achieve_plot() -> ActionPlot:
     """The plot that stands in where no designed candidate fits; read once, since plots never change."""
     resource = files("planning") / "plots" / "achieve.yaml"
     return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
-
-
-_sound: dict[tuple[int, ...], tuple[object, ...]] = {}
-"""What was found to be sound together, by identity, and kept alive so that no identity is ever another's."""
-_MOST_SOUND = 16
-
-
-def _require_sound(
-    library: Library,
-    domain: PlanningDomain,
-    schema: Schema,
-    skills: Collection[SkillSignature],
-    declared: Mapping[str, Mapping[str, Parameter]],
-) -> None:
-    """Raise `PlotError` for what the validator finds; what is the same as before is not looked through again."""
-    parts = (domain, schema, *library, *skills, *declared, *declared.values())
-    key = tuple(map(id, parts))
-    if key in _sound:
-        return
-    findings = validate_library(library, schema, skills, declared)
-    raise_findings([*findings, *check_implementations(library, domain)])
-    if len(_sound) >= _MOST_SOUND:
-        _sound.clear()
-    _sound[key] = parts
 
 
 def _budget(seconds: float, replans: int) -> Budget:
