@@ -76,12 +76,15 @@ class Rounds:
                 await self._more.wait()
                 self._more.clear()
                 self._woken = False
-                self._round()
-                await self._sleep(INTERVAL_S if self._log.live else 0)
+                await self._round()
         finally:
             forget()
 
-    def _round(self) -> None:
+    async def _round(self) -> None:
+        """One browser after the other, spread over the interval: all at once they would want every processor."""
+        served = tuple(self._served)
         status = {"type": "status", "live": self._log.live, **self._status()}
-        for one in tuple(self._served):
-            one.offer(status)
+        for one in served:
+            if one in self._served:  # else it has left meanwhile
+                one.offer(status)
+            await self._sleep(INTERVAL_S / len(served) if self._log.live else 0)
