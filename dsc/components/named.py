@@ -41,5 +41,4 @@ def robot_of(named: str) -> tuple[Component, ...]:
     except Exception as error:
         raise InputError(f"'{named}' gives no components: {type(error).__name__}: {error}") from error
     components = (made,) if isinstance(made, Component) or not isinstance(made, Iterable) else tuple(made)
-    require_instances(components)
-    return components
+    return require_instances(components)

@@ -6,16 +6,15 @@ been adapted since, is used in place of its original and not cloned again.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.selection import ACHIEVE
 from dsc.dynamic.substitution import require_stand_in
-from dsc.model.plot import ActionPlot, Path
+from dsc.model.plot import ActionPlot
 from dsc.model.profile import Profile
-from dsc.model.rules import Reaction
-from dsc.model.states import DynamicState, SubmachineState
+from dsc.model.states import DynamicState
 
 _ROLE = ("implements", "effects", "confirm")
 """What a plot is for plans."""
@@ -58,20 +57,6 @@ def cloned_profile(profile: Profile, prefix: str, names: Container[str]) -> Prof
     return profile.model_copy(update={"name": prefix + profile.name, "plots": plots})
 
 
-def references(plot: ActionPlot) -> Iterator[tuple[Path, str]]:
-    """Where a plot names another one, and which."""
-    for _, state, path in plot.walk():
-        if isinstance(state, SubmachineState) and not state.use.startswith("?"):
-            yield (*path, "use"), state.use
-        elif isinstance(state, DynamicState):
-            yield from (((*path, "dynamic", number), name) for number, name in enumerate(state.dynamic))
-    reactions: list[tuple[Path, Reaction]] = [(("rules", number), rule.do) for number, rule in enumerate(plot.rules)]
-    reactions += [(("handlers", number), one.do) for number, one in enumerate(plot.handlers)]
-    for place, do in reactions:
-        if do.use is not None:
-            yield (*place, "do", "use"), do.use
-
-
 def _dependencies(plot: ActionPlot, library: Library, *, plans: bool) -> Iterable[ActionPlot]:
     found: dict[str, ActionPlot] = {}
     waiting = [plot]
@@ -79,7 +64,7 @@ def _dependencies(plot: ActionPlot, library: Library, *, plans: bool) -> Iterabl
         one = waiting.pop(0)
         if one.name not in found:
             found[one.name] = one
-            waiting += [library.plot(name) for _, name in references(one) if name != ACHIEVE]
+            waiting += [library.plot(name) for _, name in one.references() if name != ACHIEVE]
             if plans and any(isinstance(state, DynamicState) and state.goal is not None for _, state, _ in one.walk()):
                 waiting += [other for other in library if other.implements]
     return found.values()
@@ -88,7 +73,7 @@ def _dependencies(plot: ActionPlot, library: Library, *, plans: bool) -> Iterabl
 def _renamed(plot: ActionPlot, names: Mapping[str, str], *, plans: bool) -> ActionPlot:
     form = plot.to_form()
     form["plot"] = names[plot.name]
-    for path, name in references(plot):
+    for path, name in plot.references():
         around: Any = form
         for key in path[:-1]:
             around = around[key]

@@ -147,3 +147,13 @@ def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalActio
         yield action
         if isinstance(action, Choose):
             yield from flat((*action.then, *action.otherwise))
+
+
+def component_of(action: ExternalAction | Internal) -> str | None:
+    """Name of the component that an action acts on, if it does."""
+    match action:
+        case Trigger(trigger=port) | Configure(set=port) | Send(send=port):
+            return port.partition(".")[0]
+        case Switch(switch=name):
+            return name
+    return None

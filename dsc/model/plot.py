@@ -14,7 +14,7 @@ from pydantic_core import PydanticCustomError
 from dsc.model.language import ConditionField, Frozen, Setting, TermField, constant
 from dsc.model.ranges import Range, Who, refuse_change
 from dsc.model.reading import LOCATED
-from dsc.model.rules import Handler, Reaction, Rule
+from dsc.model.rules import Handler, Rule
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -217,14 +217,19 @@ class ActionPlot(Frozen):
 
     def uses(self) -> frozenset[str]:
         """Names of the plots it refers to."""
-        reactions: list[Reaction] = [*(rule.do for rule in self.rules), *(one.do for one in self.handlers)]
-        named: set[str] = {one.use for one in reactions if one.use}
-        for _, state, _ in self.walk():
+        return frozenset(name for _, name in self.references())
+
+    def references(self) -> Iterator[tuple[Path, str]]:
+        """Where it refers to another plot, and to which."""
+        for _, state, path in self.walk():
             if isinstance(state, SubmachineState) and not state.use.startswith("?"):
-                named.add(state.use)
-            if isinstance(state, DynamicState):
-                named.update(state.dynamic)
-        return frozenset(named)
+                yield (*path, "use"), state.use
+            elif isinstance(state, DynamicState):
+                yield from (((*path, "dynamic", number), name) for number, name in enumerate(state.dynamic))
+        for group, reactions in (("rules", [r.do for r in self.rules]), ("handlers", [h.do for h in self.handlers])):
+            for number, do in enumerate(reactions):
+                if do.use is not None:
+                    yield (group, number, "do", "use"), do.use
 
     def to_form(self) -> dict[str, Any]:
         """The plot as plain data, in the form in which people write it; `ActionPlot.model_validate` reads it."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -12,6 +11,7 @@ from dsc.dynamic.library import Library
 from dsc.events import NO_ATTRIBUTES, RESERVED, Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.ends import encoded
 from dsc.sequencer.messages import KnowledgeMessage, ParameterMessage
 from dsc.sequencer.run_store import RunStore
 from dsc.trace import Trace
@@ -106,6 +106,6 @@ def require_seconds(after: object) -> None:
 
 def _plain(value: Any, what: str) -> Any:
     try:
-        return json.loads(json.dumps(value, allow_nan=False))
+        return encoded(value)
     except (TypeError, ValueError) as error:
         raise InputError(f"{what} no plain data: {error}") from None

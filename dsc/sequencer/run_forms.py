@@ -141,8 +141,8 @@ def _full(value: Any, form: Callable[[str], Any]) -> Any:
 def message_form(message: Message, short: Shortener) -> Form:
     """A message; a skill's refers to the action by its id."""
     match message:
-        case Event():
-            return {"event": _event_form(message, short)}
+        case Event() | KnowledgeMessage() | ParameterMessage():
+            return _outside_form(message, short)
         case SkillMessage():
             outcome = message.outcome
             form = {"action": message.start.action_id, "outcome": outcome.event, "final": message.final}
@@ -151,9 +151,7 @@ def message_form(message: Message, short: Shortener) -> Form:
             return {"timer": _plain(message.timer)}
         case LateMessage():
             return {"late": message.number, "message": _outside_form(message.message, short)}
-        case SendLater():
-            return {"sent": _later_form(message, short)}
-    return _outside_form(message, short)
+    return {"sent": _later_form(message, short)}
 
 
 def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Callable[[str], Any]) -> Message:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from dsc.dynamic.cloning import cloned, cloned_profile, references
+from dsc.dynamic.cloning import cloned, cloned_profile
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.plot import Path as FormPath
@@ -116,7 +116,7 @@ def _substituted(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
 
 def _written(plot: ActionPlot) -> Iterator[tuple[int, int, FormPath, str]]:
     """Line and column of each name of a plot, the path there, and the name."""
-    for path, name in ((("plot",), plot.name), *references(plot)):
+    for path, name in ((("plot",), plot.name), *plot.references()):
         place = plot.place(path)
         if place is not None and place.line is not None and place.column is not None:
             yield place.line, place.column, path, name

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 
 from dsc.components.parameters import Parameter, known
 from dsc.errors import Finding
-from dsc.model.actions import Configure, ExternalAction, Internal, Send, Switch, Trigger
+from dsc.model.actions import Configure, ExternalAction, Internal, Trigger, component_of, flat
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.ranges import Who, refuse_change
 from dsc.model.states import State
@@ -20,7 +20,7 @@ Components = Collection[str] | Mapping[str, Mapping[str, Parameter]]
 def check_components(plot: ActionPlot, components: Components) -> Iterator[Finding]:
     """Findings about `set`, `send` and `switch` actions towards components that are not there or do not take them."""
     for action, path, who in _actions(plot):
-        name = _addressed(action)
+        name = None if isinstance(action, Trigger) else component_of(action)  # triggers are checked with the skills
         if name is not None and name not in components:
             message = f"there is no component '{name}'"
             error = UnknownNameError(message, place=plot.place(path), found=name, valid=components)
@@ -31,12 +31,8 @@ def check_components(plot: ActionPlot, components: Components) -> Iterator[Findi
 
 def addressed_by(plot: ActionPlot) -> frozenset[str]:
     """Names of the components that a plot itself uses; a plot that uses none is abstract, else primitive (S0.9)."""
-    used = set()
-    for action, _, _ in _actions(plot):
-        name = action.trigger.partition(".")[0] if isinstance(action, Trigger) else _addressed(action)
-        if name is not None:
-            used.add(name)
-    return frozenset(used)
+    named = (component_of(one) for one in flat(action for action, _, _ in _actions(plot)))
+    return frozenset(name for name in named if name is not None)
 
 
 def _setting(
@@ -68,11 +64,3 @@ def _actions(plot: ActionPlot) -> Iterator[tuple[ExternalAction | Internal, Path
         for number, do in enumerate(reactions):
             here = (group, number, "do", "command")
             yield from ((command, (*here, position), "rules") for position, command in enumerate(do.command))
-
-
-def _addressed(action: ExternalAction | Internal) -> str | None:
-    if isinstance(action, Configure):
-        return action.set.split(".")[0]
-    if isinstance(action, Send):
-        return action.send.split(".")[0]
-    return action.switch if isinstance(action, Switch) else None

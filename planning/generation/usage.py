@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from dsc.dynamic.library import Library
 from dsc.events import FAILURES
-from dsc.model.actions import Configure, Switch, Trigger, flat
+from dsc.model.actions import Configure, Switch, Trigger, component_of, flat
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import Rule
 from dsc.model.states import DynamicState, State, SubmachineState
@@ -52,7 +52,7 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
             waiting += [library.plot(name) for name in sorted(plot.uses())]
     actions = [action for plot in found.values() for action in _actions(plot)]
     actions += [one for rule in applied for one in rule.do.command if isinstance(one, Configure | Switch)]
-    names = {_component(action) for action in actions}
+    names = {name for action in actions if (name := component_of(action)) is not None}
     limits = [action.within or DEFAULT_WITHIN for action in actions if isinstance(action, Trigger)]
     return Usage(frozenset(names), any(map(_is_open, found.values())), sum(limits))
 
@@ -87,14 +87,6 @@ def _actions(plot: ActionPlot) -> Iterable[Trigger | Configure | Switch]:
     blocks = [actions for _, state, _ in plot.walk() if isinstance(state, State) for _, actions in state.blocks()]
     found = (action for block in blocks for action in flat(block))
     return [action for action in found if isinstance(action, Trigger | Configure | Switch)]
-
-
-def _component(action: Trigger | Configure | Switch) -> str:
-    match action:
-        case Trigger(trigger=port) | Configure(set=port):
-            return port.partition(".")[0]
-        case Switch(switch=name):
-            return name
 
 
 def _is_open(plot: ActionPlot) -> bool:

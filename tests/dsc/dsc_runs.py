@@ -133,3 +133,20 @@ class Ran:
     @property
     def lines(self):
         return [record.to_line() for record in self.records]
+
+
+def ran(text, *components, meanwhile=None, prepare=None):
+    """How the plot `p` ended with these components while something else went on, and when."""
+
+    async def main():
+        clock = LoopClock()
+        sequencer = Sequencer(Library([plot(text)]), KnowledgeBase(Schema()), components, clock)
+        if prepare is not None:
+            prepare(sequencer)
+        busy = asyncio.ensure_future(meanwhile(sequencer)) if meanwhile else None
+        end = await sequencer.run("p")
+        if busy is not None:
+            await busy
+        return end, clock.now()
+
+    return run_simulated(main())

@@ -6,6 +6,7 @@ import asyncio
 
 import pytest
 from dsc_charts import plot
+from dsc_runs import ran
 
 from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
@@ -50,23 +51,6 @@ class Device(Component):
         self.note("looks")
         await call.clock.sleep(seconds)
         return Outcome("looked")
-
-
-def ran(text, *components, meanwhile=None, prepare=None):
-    """How the run ended, and when."""
-
-    async def main():
-        clock = LoopClock()
-        sequencer = Sequencer(Library([plot(text)]), KnowledgeBase(Schema()), components, clock)
-        if prepare is not None:
-            prepare(sequencer)
-        busy = asyncio.ensure_future(meanwhile(sequencer)) if meanwhile else None
-        end = await sequencer.run("p")
-        if busy is not None:
-            await busy
-        return end, clock.now()
-
-    return run_simulated(main())
 
 
 LOOK = """

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import pytest
 from dsc_charts import plot
+from dsc_runs import ran
 
 from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
@@ -64,17 +65,7 @@ DRIVE = """
 
 def drive(name, *components, mode="", meanwhile=None, text=DRIVE):
     text = text.replace("NAME", name).replace("MODE", f"{{switch: {name}, to: {mode}}}, " if mode else "")
-
-    async def main():
-        clock = LoopClock()
-        sequencer = Sequencer(Library([plot(text)]), KnowledgeBase(Schema()), components, clock)
-        busy = asyncio.ensure_future(meanwhile(sequencer)) if meanwhile else None
-        end = await sequencer.run("p")
-        if busy is not None:
-            await busy
-        return end, clock.now()
-
-    return run_simulated(main())
+    return ran(text, *components, meanwhile=meanwhile)
 
 
 def why(end):

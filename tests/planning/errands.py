@@ -1,5 +1,7 @@
 """Rooms, things and a robot that carries them: the domain of what goes wrong while a plan is carried out."""
 
+import asyncio
+
 from planning import PlanningDomain
 
 DOMAIN = PlanningDomain.parse("""
@@ -32,3 +34,16 @@ states:
 """
 ROOMS = ("a", "b", "c", "d")
 ROUND = ("a b", "b c", "c d", "d a", "b a", "c b", "d c", "a d")
+
+
+def when_asked(act):
+    """To prepare a run: let `act` go on with its sequencer as soon as a plan is asked for."""
+
+    def prepare(sequencer):
+        def look(record):
+            if record.type == "plan.asked":
+                asyncio.get_running_loop().create_task(act(sequencer))
+
+        sequencer.trace.listen(look)
+
+    return prepare

@@ -7,7 +7,7 @@ import time
 
 import pytest
 from breadth_first import BreadthFirst
-from errands import DOMAIN, HOLDER, ROOMS, ROUND
+from errands import DOMAIN, HOLDER, ROOMS, ROUND, when_asked
 from obedient_robot import FAILED, ObedientRobot, plots
 
 from dsc import Event, parse_plot
@@ -283,20 +283,13 @@ def test_a_stop_while_a_real_planner_process_hangs_leaves_no_process_behind(tmp_
     planner = PlannerProcess(command=(sys.executable, "-c", HANGING, str(asked)))
     alive = []
 
-    def prepare(sequencer):
-        def look(record):
-            if record.type == "plan.asked":
-                asyncio.get_running_loop().create_task(stop_when_it_works(sequencer))
-
-        sequencer.trace.listen(look)
-
     async def stop_when_it_works(sequencer):
         while not asked.exists():  # noqa: ASYNC110  a process that hangs tells nobody
             await asyncio.sleep(0)
         alive.append(planner._process._pid)
         sequencer.post(Event("stop"))
 
-    run = Run("(at c)", planner=planner, prepare=prepare)
+    run = Run("(at c)", planner=planner, prepare=when_asked(stop_when_it_works))
     assert run.how == "stopped"
     assert run.records[-1].t == 0.0
     given_up = time.monotonic() + 60

@@ -4,7 +4,7 @@ import asyncio
 import logging
 
 import pytest
-from errands import DOMAIN, HOLDER, ROOMS, ROUND
+from errands import DOMAIN, HOLDER, ROOMS, ROUND, when_asked
 from obedient_robot import ObedientRobot, plots
 
 from dsc import Event, parse_plot
@@ -84,19 +84,12 @@ def test_a_stop_does_not_wait_for_a_planner_that_cannot_be_cancelled(simulated, 
     monkeypatch.setattr("planning.execution.asking.PATIENCE", 3600)
     planner = Stubborn()
 
-    def prepare(sequencer):
-        def look(record):
-            if record.type == "plan.asked":
-                asyncio.get_running_loop().create_task(stop_when_it_works(sequencer))
-
-        sequencer.trace.listen(look)
-
     async def stop_when_it_works(sequencer):
         while not planner.asked:  # noqa: ASYNC110  it tells nobody
             await asyncio.sleep(0)
         sequencer.post(Event("stop"))
 
-    assert run(planner, simulated=simulated, prepare=prepare) == "stopped"
+    assert run(planner, simulated=simulated, prepare=when_asked(stop_when_it_works)) == "stopped"
     assert "planner Stubborn: it goes on although it was told to stop" in caplog.text
 
 
