@@ -6,7 +6,7 @@ BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb
-.PHONY: bench-startup bench-broken bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer test-viewer screenshots clean
+.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer test-viewer screenshots clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -73,6 +73,9 @@ bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare i
 
 bench-broken: $(VENV)/.run   ## how long the error in a broken plot takes, median and longest (RUNS=N)
 	$(BIN)/python benchmarks/broken_plots.py --runs $(or $(RUNS),3)
+
+bench-calls: $(VENV)/.run   ## Python calls, hops between files, and files on five main paths (WRITE=1 writes docs and counts)
+	$(BIN)/python benchmarks/calls.py $(if $(WRITE),--write)
 
 bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this engine, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/engine.py $(if $(WRITE),--write)

@@ -1,0 +1,379 @@
+"""`make bench-calls`: Python calls, hops between files, and files on the five main paths of the system.
+
+The counts are deterministic: simulated time, no store, and a planner that repeats the plans of an earlier run.
+Each flow begins and ends at the public interface (an event posted, a skill called), so that it survives every redesign
+behind that interface. A call is one that Python's profiler reports for a function of this project, comprehensions and
+resumed coroutines included; a hop is a call from one file of the project into another.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import os
+import statistics
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import CodeType, FrameType
+from typing import Any
+
+import set_table
+from page import put
+from peers.dsc import ready
+
+from dsc import ActionPlot, Component, Outcome, SkillCall, skill
+from dsc.dynamic.library import Library
+from dsc.engine.machine import Machine
+from dsc.events import Event
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.sequencer.sequencer import Sequencer
+from knowledge_base import Delta, KnowledgeBase, Schema
+from knowledge_base.language.printer import to_text
+from planning import Executive, PlanStep
+from planning.engines.planner import PlannerProcess
+from planning.plan import PlanningOutcome
+from planning.strips import Problem
+
+ROOT = Path(__file__).resolve().parent.parent
+ROOMS = tuple(str(ROOT / room) for room in ("knowledge_base", "dsc", "planning", "domains"))
+BEFORE = Path(__file__).with_name("calls.json")
+"""The counts that `tests/test_bench_calls.py` holds new ones against."""
+ITEMS = 3
+"""On the table that is planned for."""
+ROUNDS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """A flow's figures.
+
+    Attributes:
+        calls: of Python functions of the project.
+        hops: of these, from one file of the project to another.
+        files: of the project that were visited.
+        microseconds: the median of several rounds without the profiler.
+    """
+
+    calls: int
+    hops: int
+    files: int
+    microseconds: float
+
+
+class Counter:
+    """Counts between `start` and `stop`, in every thread that begins meanwhile and in the one that starts it."""
+
+    def __init__(self, *, profiled: bool) -> None:
+        self.calls = self.hops = 0
+        self.seconds = 0.0
+        self._files: set[str] = set()
+        self._ours: dict[CodeType, bool] = {}
+        self._profiled = profiled
+
+    @property
+    def files(self) -> int:
+        """How many of the project's files were visited."""
+        return len(self._files)
+
+    def start(self) -> None:
+        """Count from now on."""
+        self.seconds = -time.perf_counter()
+        if self._profiled:
+            threading.setprofile(self._hear)
+            sys.setprofile(self._hear)
+
+    def stop(self) -> None:
+        """Count no more; what `stop` itself costs does not count."""
+        sys.setprofile(None)
+        threading.setprofile(None)
+        self.seconds += time.perf_counter()
+
+    def _hear(self, frame: FrameType, kind: str, _: Any) -> None:
+        if kind != "call" or not self._is_ours(frame.f_code):
+            return
+        self.calls += 1
+        self._files.add(frame.f_code.co_filename)
+        caller = frame.f_back
+        while caller is not None and not self._is_ours(caller.f_code):  # through asyncio, pydantic, networkx
+            caller = caller.f_back
+        self.hops += caller is not None and caller.f_code.co_filename != frame.f_code.co_filename
+
+    def _is_ours(self, code: CodeType) -> bool:
+        known = self._ours.get(code)
+        if known is None:
+            known = self._ours[code] = code.co_filename.startswith((*ROOMS, "<")) and "frozen" not in code.co_filename
+        return known
+
+
+Flow = Callable[[Counter], None]
+
+
+def main() -> None:
+    """Print the table; `--json` gives plain data, `--write` the docs and the counts to hold new ones against."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--rounds", type=int, default=ROUNDS, help="timed runs of each flow; 0: only count")
+    chosen = parser.parse_args()
+    if os.environ.get("PYTHONHASHSEED") != "0":  # the order of sets decides some loops
+        os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, "PYTHONHASHSEED": "0"})  # noqa: S606
+    found = counts(chosen.rounds)
+    if chosen.json:
+        print(json.dumps({name: asdict(one) for name, one in found.items()}, indent=2))
+        return
+    print(table(found))
+    if chosen.write:
+        BEFORE.write_text(json.dumps({name: one.calls for name, one in found.items()}, indent=2) + "\n", "utf-8")
+        put(table(found), "calls")
+
+
+def counts(rounds: int = ROUNDS) -> dict[str, Count]:
+    """The figures of every flow by its name."""
+    return {name: _count(flow(), rounds) for name, flow in FLOWS.items()}
+
+
+def table(found: dict[str, Count]) -> str:
+    """A Markdown table."""
+    lines = ["| flow | calls | hops between files | files | µs |", "| --- | --- | --- | --- | --- |"]
+    lines += [f"| {name} | {one.calls:,} | {one.hops:,} | {one.files} | {one.microseconds:,.1f} |"
+              for name, one in found.items()]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _count(flow: Flow, rounds: int) -> Count:
+    for _ in range(2):  # tables, generated source and caches are made
+        flow(Counter(profiled=False))
+    counter = Counter(profiled=True)
+    flow(counter)
+    timed = [Counter(profiled=False) for _ in range(rounds)]
+    for one in timed:
+        flow(one)
+    microseconds = 1e6 * statistics.median(one.seconds for one in timed) if timed else 0.0
+    return Count(counter.calls, counter.hops, counter.files, microseconds)
+
+
+def event() -> Flow:
+    """An event to a machine whose tables are made: a guard, an assignment, exit, and an entry action."""
+    states = {
+        one: {
+            "entry": [{"set": "robot.speed", "to": 1}],
+            "on": {"ping": {"to": other, "when": "(> ?n 0)", "assign": {"n": "(+ ?n 1)"}}},
+        }
+        for one, other in ("ab", "ba")
+    }
+    variables = {"n": {"type": "number", "initial": 1}}
+    at = ready({"plot": "bench", "variables": variables, "receives": {"ping": None}, "states": states})
+    machine, ping = Machine(at.library), Event("ping")
+    machine.start(at.plot, {}, at.situation)
+
+    def flow(counter: Counter) -> None:
+        counter.start()
+        machine.send(ping, at.situation)
+        counter.stop()
+
+    return flow
+
+
+def skill_and_back() -> Flow:
+    """An event posted, the skill that it starts, its outcome, and the next state's skill called."""
+    plot = ActionPlot.model_validate({
+        "plot": "worker", "receives": {"ping": None},
+        "states": {
+            "rest": {"on": {"ping": "work"}},
+            "work": {"entry": [{"trigger": "robot.work"}], "on": {"did": "next"}},
+            "next": {"entry": [{"trigger": "robot.stop"}], "on": {"stopped": "rest"}},
+        },
+    })  # fmt: skip
+    return lambda counter: run_simulated(_worked(plot, counter))
+
+
+async def _worked(plot: ActionPlot, counter: Counter) -> None:
+    robot = _Worker(counter)
+    knowledge = KnowledgeBase(Schema.parse("(define (domain bench))"))
+    sequencer = Sequencer(Library([plot]), knowledge, [robot], LoopClock(), open_ended=True)
+    running = asyncio.create_task(sequencer.run("worker"))
+    for turn in range(4):
+        await asyncio.sleep(1)
+        robot.counting = turn == 3
+        if robot.counting:
+            counter.start()
+        sequencer.post(Event("ping"))
+    await asyncio.sleep(1)
+    running.cancel()
+    await asyncio.wait([running])
+
+
+class _Worker(Component):
+    name = "robot"
+
+    def __init__(self, counter: Counter) -> None:
+        super().__init__()
+        self.counting = False
+        self._counter = counter
+
+    @skill(outcomes={"did": {}})
+    async def work(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+        return Outcome("did")
+
+    @skill(outcomes={"stopped": {}})
+    async def stop(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+        if self.counting:
+            self._counter.stop()
+        return Outcome("stopped")
+
+
+def fired() -> Flow:
+    """A fact told in a transaction, and the installed condition that it makes true heard."""
+    schema = Schema.parse("(define (domain bench) (:types cup table) (:predicates (on ?c - cup ?t - table)))")
+    knowledge = KnowledgeBase(schema)
+    with knowledge.transaction(author="bench") as world:
+        world.add_node("cup1", "cup")
+        world.add_node("table1", "table")
+    present: list[Counter] = []
+    condition = knowledge.install("(exists (?c - cup) (on ?c table1))")
+    condition.subscribe(lambda _: present.pop().stop())
+
+    def flow(counter: Counter) -> None:
+        present.append(counter)
+        counter.start()
+        with knowledge.transaction(author="bench") as world:
+            world.tell("on", "cup1", "table1")
+        assert not present, "the condition has not fired"
+        with knowledge.transaction(author="bench") as world:
+            world.retract("on", "cup1", "table1")
+
+    return flow
+
+
+def planned() -> Flow:
+    """A skill answers, a dynamic state decides to plan, the plan is bound as a plot, and its first skill is called."""
+    return _Table(replanned=False).flow
+
+
+def replanned() -> Flow:
+    """A fact told by somebody else during a step, the plan found broken, the next one bound, its first skill called."""
+    return _Table(replanned=True).flow
+
+
+class _Recalled:
+    """A planner that answers as pyperplan did in the first run: the same calls each time, without its process."""
+
+    def __init__(self) -> None:
+        self._planner = PlannerProcess()
+        self._answers: list[PlanningOutcome] = []
+        self._next = 0
+
+    def rewind(self) -> None:
+        """Begin again with the first answer."""
+        self._next = 0
+
+    async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
+        """The answer of the run that came first."""
+        if self._next == len(self._answers):
+            self._answers.append(await self._planner.solve(problem, seconds))
+        self._next += 1
+        return self._answers[self._next - 1]
+
+
+CLEAR = ActionPlot.model_validate({
+    "plot": "clear",
+    "states": {
+        "begin": {"entry": [{"trigger": "robot.begin"}], "on": {"begun": "tidy"}},
+        "tidy": {
+            "dynamic": [], "goal": to_text(set_table.GOAL),
+            "on": {"done": "ended", "no_plan": "lost", "gave_up": "lost"},
+        },
+        "ended": {"final": True}, "lost": {"final": True},
+    },
+})  # fmt: skip
+
+
+class _Table:
+    """A table of `ITEMS` items; in the first step of its plan somebody takes away what the next one relies on."""
+
+    def __init__(self, *, replanned: bool) -> None:
+        self._domain = set_table.domain()
+        self._plots = [_plot(action) for action in self._domain.actions.values()]
+        self._library = Library([CLEAR, *self._plots])
+        self._planner = _Recalled()
+        self._replanned = replanned
+
+    def flow(self, counter: Counter) -> None:
+        """One run, counted where it is to be."""
+        world = set_table.world(ITEMS)
+        self._planner.rewind()
+        robot = _TableRobot(self._domain, world, counter, disturbed=self._replanned)
+        with Executive(self._domain, self._library, [robot], world, planner=self._planner) as program:
+            end = program.run("clear")
+        assert end.finished
+        assert robot.counted
+
+
+class _TableRobot(Component):
+    """Does each step at once; counts up to the first step, or from a disturbance to the step after it."""
+
+    name = "robot"
+
+    def __init__(self, domain: Any, world: KnowledgeBase, counter: Counter, *, disturbed: bool) -> None:
+        super().__init__()
+        self._domain, self._world, self._counter = domain, world, counter
+        self._disturbed = disturbed
+        self._steps = 0
+        self.counted = False
+
+    @skill(outcomes={"begun": {}})
+    async def begin(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+        if not self._disturbed:
+            self._counter.start()
+        return Outcome("begun")
+
+    @skill(outcomes={"did": {}})
+    async def act(
+        self, call: SkillCall, action: str, a: str = "", b: str = "", c: str = "", d: str = "", e: str = ""
+    ) -> Outcome:
+        self._steps += 1
+        if not self.counted and self._steps == (2 if self._disturbed else 1):
+            self._counter.stop()
+            self.counted = True
+        step = PlanStep(action, tuple(filter(None, (a, b, c, d, e))))
+        if self._disturbed and self._steps == 1:
+            await call.clock.sleep(1)
+            self._counter.start()
+            _disturb(self._world, step)
+            await call.clock.sleep(1)
+        return Outcome("did", observed=self._domain.effects(step, self._world))
+
+
+def _disturb(world: KnowledgeBase, step: PlanStep) -> None:
+    """Somebody takes away what the rest of the plan relies on: nothing fits into what is being picked up."""
+    item = step.args[0]
+    fits = [one for one in world.facts() if getattr(one, "predicate", "") == "fits" and item in one.args]
+    world.apply(Delta(removed=tuple(fits)), author="somebody")
+
+
+def _plot(action: Any) -> ActionPlot:
+    """The action as one call of the robot's skill."""
+    given = dict(zip("abcde", (f"?{parameter.name}" for parameter in action.parameters), strict=False))
+    act = {"entry": {"trigger": "robot.act", "with": {"action": action.name, **given}}, "on": {"did": "done"}}
+    return ActionPlot.model_validate({
+        "plot": action.name, "implements": action.name,
+        "parameters": {parameter.name: (parameter.types or ("object",))[0] for parameter in action.parameters},
+        "states": {"act": act, "done": {"final": True}},
+    })  # fmt: skip
+
+
+FLOWS: dict[str, Callable[[], Flow]] = {
+    "an event, warm, in the engine": event,
+    "an event to a skill, its outcome, the next state's skill": skill_and_back,
+    "a told fact to a fired condition": fired,
+    "a decision to plan to the first step's skill": planned,
+    "an external change to the first step's skill of the new plan": replanned,
+}
+
+if __name__ == "__main__":
+    main()
