@@ -16,16 +16,18 @@ class ObedientRobot(Component):
         script: for steps as text, one after the other what their calls observe instead: a `Delta`, or `FAILED`.
         failing_calls: the calls that fail, counted from 1.
         seconds: how long a call takes.
+        until: an event that a call waits for besides.
     """
 
     name = "robot"
 
-    def __init__(self, domain, script=None, failing_calls=(), seconds=1.0):
+    def __init__(self, domain, script=None, failing_calls=(), seconds=1.0, until=None):
         super().__init__()
         self.domain = domain
         self.script = {step: list(answers) for step, answers in (script or {}).items()}
         self.failing_calls = failing_calls
         self.seconds = seconds
+        self.until = until
         self.done = []
         self.knowledge = None
 
@@ -33,6 +35,8 @@ class ObedientRobot(Component):
     async def act(self, call: SkillCall, way: str, action: str, one: str = "", two: str = "", three: str = "") -> Outcome:
         """One planning action, done in one way."""
         await call.clock.sleep(self.seconds)
+        if self.until is not None:
+            await self.until.wait()
         step = PlanStep(action, tuple(filter(None, (one, two, three))))
         self.done.append(f"{step}" if way == action else f"{way}: {step}")
         answers = self.script.get(self.done[-1], [])

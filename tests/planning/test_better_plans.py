@@ -42,7 +42,7 @@ class Later:
 
     def __init__(self, first, second):
         self.first, self.second = first, second
-        self.begun = asyncio.Event()
+        self.begun, self.weighed = asyncio.Event(), asyncio.Event()
 
     async def solve(self, problem, seconds):
         return self.first
@@ -51,6 +51,7 @@ class Later:
         yield self.first
         await self.begun.wait()
         yield self.second
+        self.weighed.set()  # who asks for a third plan has decided about the second
 
     def hear(self, record):
         if record.data.get("skill") == "robot.act":
@@ -68,9 +69,9 @@ class Later:
 )
 def test_the_cheaper_plan_is_carried_out_and_without_costs_the_shorter_one(text, first, second, taken):
     domain, world = trip(text)
-    robot = ObedientRobot(domain, seconds=0.02)
-    robot.knowledge = world
     planner = Later(*(PlanFound(Plan(steps(one)), "fake", 0.0, 0.1) for one in (first, second)))
+    robot = ObedientRobot(domain, seconds=0.0, until=planner.weighed)
+    robot.knowledge = world
     program = Executive(domain, plots(domain), [robot], world, planner=planner)
     program.listen(planner.hear)
     end = program.achieve("(at c)", simulated=False)
