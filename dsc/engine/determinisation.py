@@ -17,7 +17,7 @@ from dsc.engine.selection import domain, left_by
 from dsc.engine.steps import Taken
 from dsc.engine.tables import CompiledPlot, Edge, Node
 from dsc.events import DONE
-from dsc.model.actions import Choose, Emit, Trigger
+from dsc.model.actions import Block, Choose, Emit, Trigger
 from dsc.model.states import FinalState, HistoryState, State
 
 _AnyAction = TypeVar("_AnyAction", bound=Action)
@@ -157,6 +157,8 @@ class _Work:
         for action in actions:
             if isinstance(action, Choose):
                 yield self._settled_choose(action)  # type: ignore[misc]  # a Choose for a Choose
+            elif isinstance(action, Block):
+                yield Block(block=tuple(self._settled(action.block)))  # type: ignore[misc]
             else:
                 yield action
 
@@ -184,15 +186,24 @@ class _Work:
             yield around.index
         region = around if around.state is None else nodes[around.parent]
         ends = around.index > 0 and (region is around or region.transparent)
-        if ends and all(map(self._is_finished, nodes[region.parent].children)):
+        while ends and all(map(self._is_finished, nodes[region.parent].children)):
             yield region.parent
+            # A parallel whose children are all in final states is itself in one (SCXML 3.4).
+            region = nodes[nodes[region.parent].parent]
+            ends = region.transparent
 
     def _is_finished(self, region: int) -> bool:
-        """Whether a final state is reached there; a transparent region is as finished as the state it stands for."""
+        """Whether a final state is reached there; a transparent region is as finished as the state it stands for.
+
+        SCXML appendix D: isInFinalState.
+        """
         nodes = self.compiled.nodes
         inside = nodes[region].children
-        if nodes[region].transparent and not nodes[inside[0]].orthogonal:
-            inside = [*inside, *nodes[inside[0]].children]
+        if nodes[region].transparent:
+            within = nodes[inside[0]]
+            if within.orthogonal:
+                return all(map(self._is_finished, within.children))
+            inside = [*inside, *within.children]
         return any(child in self.present and nodes[child].final for child in inside)
 
 

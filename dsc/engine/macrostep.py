@@ -14,10 +14,10 @@ from dsc.engine.reaction import Part, Reaction, report
 from dsc.engine.selection import Addressed, Enabled, Trigger, select
 from dsc.engine.situation import Situation
 from dsc.engine.state import FrameState, MachineState, at_rest
-from dsc.engine.steps import Step
+from dsc.engine.steps import Note, Step
 from dsc.engine.tables import Chart, Edge
 from dsc.errors import RunawayError
-from dsc.events import AT_LEAST, ERRORS, EVERY, Event, goes_outwards
+from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, Event, goes_outwards
 from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Expression
 
@@ -31,12 +31,13 @@ class Macrostep(Execution):
     What it can do is in layers, one a file, of one object: a step has no time for several.
     """
 
-    __slots__ = ("_broken_guards", "_root")
+    __slots__ = ("_broken_guards", "_root", "_turn")
 
     def __init__(self, chart: Chart, situation: Situation, state: MachineState) -> None:
         super().__init__(chart, situation, state.serials)
         self._root = thaw(state.root) if state.root else None
-        self._broken_guards: set[tuple[int, Edge]] = set()
+        self._broken_guards: set[tuple[int, Edge, int]] = set()
+        self._turn = 0
 
     def start(self, plot: str, arguments: Mapping[str, Any]) -> None:
         """Enter the outermost plot; raises `InputError` if there is none of that name or its arguments do not fit."""
@@ -57,8 +58,10 @@ class Macrostep(Execution):
         assert self._root is not None  # noqa: S101  # there is nothing to leave before the start
         self.leave_plot(self._root)
         self.end_microstep(None, ())
+        for event in self.internal:
+            if event.name in ERRORS:
+                self._unhandled(event)
         self._root = None
-        self.errors += [_reason(event) for event in self.internal if event.name in ERRORS]
 
     def finish(self, event: Event | None, *, handled: bool) -> Step:
         """The step as a value."""
@@ -86,13 +89,22 @@ class Macrostep(Execution):
                 return
             event = self.internal.popleft()
             if not self._take(event) and event.name in ERRORS:
-                self.errors.append(_reason(event))
+                self._unhandled(event)
+
+    def _unhandled(self, error: Event) -> None:
+        """An error that nobody takes ends a run, but in SCXML it is an event like others (SCXML 3.12, 5.10.1)."""
+        if error.name == EXECUTION_ERROR or any(one.compiled.scxml for one in self._that(_is_frame(error.frame))):
+            self.output.append(Note(error.name, _reason(error)))
+        else:
+            self.errors.append(_reason(error))
 
     # -- one event ---------------------------------------------------------------------------------------
 
     def _take(self, event: Event) -> bool:
         """One microstep, if anybody listens to the event and can take it; or somebody keeps it for later."""
         self.event = event
+        if event.name not in ERRORS:  # a guard that fails for its own error would go round without end
+            self._turn += 1
         if event.to is not None:
             return self._take_addressed(event, event.to)
         name, scope = event.name, event.frame
@@ -191,9 +203,12 @@ class Macrostep(Execution):
         try:
             return self.holds(frame, condition)
         except InputError as error:
-            # Once in a macrostep: a guard without trigger is looked at again after every microstep.
-            if (frame.serial, edge) not in self._broken_guards:
-                self._broken_guards.add((frame.serial, edge))
+            # Once in a macrostep: a guard without trigger is looked at again after every microstep. In SCXML one with
+            # a trigger fails for each event (SCXML 5.9.1).
+            each = frame.compiled.scxml and edge.place[0] == "on"
+            broken = (frame.serial, edge, self._turn if each else 0)
+            if broken not in self._broken_guards:
+                self._broken_guards.add(broken)
                 source = frame.prefix + frame.compiled.nodes[edge.source].name
                 self.fail(frame, f"guard of '{edge.trigger}' in {source}: {error}")
             return False
@@ -224,6 +239,10 @@ class Macrostep(Execution):
             node = frame.compiled.nodes[frame.compiled.index[state]]
             seconds = node.cycles[event.number].seconds
             self.start_timer(frame, node, event.to or 0, EVERY, event.number, seconds)
+
+
+def _is_frame(serial: int | None) -> Callable[[Frame | FrameState], bool]:
+    return lambda one: one.serial == serial
 
 
 def _is_spontaneous(one: Frame | FrameState) -> bool:

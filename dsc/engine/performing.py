@@ -13,7 +13,7 @@ from dsc.engine.situation import Situation
 from dsc.engine.steps import Note, Revoke, SendLater, StartTimer
 from dsc.engine.tables import Node
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, Event
-from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Tell, Withdraw
+from dsc.model.actions import Assign, Block, Choose, Emit, ExternalAction, Internal, Log, Tell, Withdraw
 from dsc.model.language import TermField
 from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Expression
@@ -67,12 +67,12 @@ class Performer(Record):
         """Carry out a block of actions of a state, numbered from `first` within its activation.
 
         What cannot be evaluated fires an error; the others are carried out, in profile `scxml` only those
-        before it (SCXML 4.9).
+        before it (SCXML 4.9). A condition of a branch that cannot be evaluated is false (SCXML 5.9.1).
         """
         for number, action in enumerate(actions, first):
             try:
                 if isinstance(action, Internal):
-                    self._perform(frame, action)
+                    self._perform(frame, state, action)
                 else:
                     value = partial(self.value, frame)
                     self.output.append(output_of(action, activation, number, value))
@@ -101,7 +101,7 @@ class Performer(Record):
         else:
             self.output.append(StartTimer(activation, index, delay, event))
 
-    def _perform(self, frame: Frame, action: Internal) -> None:
+    def _perform(self, frame: Frame, state: str, action: Internal) -> None:
         match action:
             case Assign(assign=terms):
                 frame.variables = {**frame.variables, **self.values(frame, terms)}
@@ -120,8 +120,17 @@ class Performer(Record):
                 text = "".join(str(self.value(frame, part)) for part in parts)
                 self.output.append(Note(label, text))
             case Choose():
-                for inner in action.then if self.holds(frame, action.condition) else action.otherwise:
-                    self._perform(frame, inner)
+                for inner in action.then if self._chooses(frame, state, action) else action.otherwise:
+                    self._perform(frame, state, inner)
+            case Block(block=inside):
+                self.act(frame, state, inside)
+
+    def _chooses(self, frame: Frame, state: str, action: Choose) -> bool:
+        try:
+            return self.holds(frame, action.condition)
+        except InputError as error:
+            self.fail(frame, f"condition of a branch in {frame.prefix}{state}: {error}")
+            return False
 
     def _emit_later(self, frame: Frame, action: Emit, delay: TermField, attributes: Mapping[str, Any]) -> None:
         name = "" if action.id is None else str(self.value(frame, action.id))

@@ -91,7 +91,7 @@ class Revoke:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Something to be written into the trace (SCXML 4.7)."""
+    """Something to be written into the trace: a log (SCXML 4.7), or an error event of an SCXML chart not taken."""
 
     label: str
     text: str
@@ -161,7 +161,8 @@ class Step(NamedTuple):
         knowledge: what the chart told the knowledge base.
         output: external actions and timers, in order.
         emitted: outcome events of the outermost plot.
-        errors: actions or guards that could not be evaluated and that no transition on `error` took.
+        errors: actions or guards that could not be evaluated and that no transition on `error` took; those of
+            plots in profile `scxml`, which go on, are notes in `output`.
         outputs: what the outermost plot hands back, as it has reached its end with this step.
     """
 

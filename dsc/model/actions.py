@@ -110,19 +110,30 @@ class Choose(Frozen):
     otherwise: tuple[InternalAction, ...] = Field(default=(), alias="else")
 
 
+class Block(Frozen):
+    """Actions of which an error skips the rest, and nothing after the block (SCXML 4.9; only in profile `scxml`).
+
+    A state with several `onentry` or `onexit` has one for each (SCXML 3.8, 3.9).
+    """
+
+    block: tuple[InternalAction, ...]
+
+
 InternalAction = Annotated[
     Annotated[Assign, Tag("assign")]
     | Annotated[Tell, Tag("tell")]
     | Annotated[Emit, Tag("emit")]
     | Annotated[Withdraw, Tag("withdraw")]
     | Annotated[Log, Tag("log")]
-    | Annotated[Choose, Tag("if")],
-    by_key("assign", "tell", "emit", "withdraw", "log", "if"),
+    | Annotated[Choose, Tag("if")]
+    | Annotated[Block, Tag("block")],
+    by_key("assign", "tell", "emit", "withdraw", "log", "if", "block"),
 ]
 """What transitions may hold."""
 Choose.model_rebuild()
+Block.model_rebuild()
 
-Internal = Assign | Tell | Emit | Withdraw | Log | Choose
+Internal = Assign | Tell | Emit | Withdraw | Log | Choose | Block
 """The internal actions, to be told from the external ones."""
 
 Action = Annotated[
@@ -135,18 +146,21 @@ Action = Annotated[
     | Annotated[Emit, Tag("emit")]
     | Annotated[Withdraw, Tag("withdraw")]
     | Annotated[Log, Tag("log")]
-    | Annotated[Choose, Tag("if")],
-    by_key("trigger", "set", "switch", "send", "assign", "tell", "emit", "withdraw", "log", "if"),
+    | Annotated[Choose, Tag("if")]
+    | Annotated[Block, Tag("block")],
+    by_key("trigger", "set", "switch", "send", "assign", "tell", "emit", "withdraw", "log", "if", "block"),
 ]
 """What entry and exit may hold; internal actions only in profile `scxml` (SCXML 3.8)."""
 
 
 def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalAction | Internal]:
-    """All actions, also those inside branches."""
+    """All actions, also those inside branches and blocks."""
     for action in actions:
         yield action
         if isinstance(action, Choose):
             yield from flat((*action.then, *action.otherwise))
+        elif isinstance(action, Block):
+            yield from flat(action.block)
 
 
 def component_of(action: ExternalAction | Internal) -> str | None:

@@ -11,7 +11,20 @@ from dsc.dynamic.steps import Step, concerns, mentioned_in, terms_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
-from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Send, Switch, Tell, Trigger, Withdraw
+from dsc.model.actions import (
+    Assign,
+    Block,
+    Choose,
+    Emit,
+    ExternalAction,
+    Internal,
+    Log,
+    Send,
+    Switch,
+    Tell,
+    Trigger,
+    Withdraw,
+)
 from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot, Parameter, Path, Variable
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
@@ -197,6 +210,8 @@ class _Data:
                 yield from self._condition(action.condition, scope, (*path, "if"))
                 yield from self._internal(action.then, attributes, (*path, "then"))
                 yield from self._internal(action.otherwise, attributes, (*path, "else"))
+            elif isinstance(action, Block):
+                yield from self._internal(action.block, attributes, (*path, "block"))
 
     def _assign(self, action: Assign, path: Path) -> Iterator[Finding]:
         for name in action.assign:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from dsc.engine.membership import asked_states
 from dsc.errors import Finding
-from dsc.model.actions import Choose, Emit, ExternalAction, Internal, Log, Withdraw, flat
+from dsc.model.actions import Block, Choose, Emit, ExternalAction, Internal, Log, Withdraw, flat
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import FinalState, HistoryState, OrthogonalState, State
 from dsc.model.transitions import Source, Transition
@@ -60,7 +60,7 @@ def _transition(plot: ActionPlot, name: str, transition: Transition, path: Path)
 
 def _is_foreign(action: ExternalAction | Internal) -> bool:
     sent = isinstance(action, Emit) and (action.delay, action.id, action.into) != (None, None, None)
-    return sent or isinstance(action, Choose | Log | Withdraw)
+    return sent or isinstance(action, Block | Choose | Log | Withdraw)
 
 
 def _finding(plot: ActionPlot, what: str, path: Path) -> Finding:

@@ -57,7 +57,8 @@ class Grower:
         self.quiet = self.chance(3)
         inside = Inside(self, "p0")
         regions = {f"r{n}": {"states": inside.scope(self.depth - n)} for n in range(2)}
-        top = {"regions": regions, "on": {"leave": "away"}, **inside.shown("top")}
+        heard = {"done.state": [{} if self.bare else {"assign": {"v": "(+ ?v 1)"}}]} if self.scxml else {}
+        top = {"regions": regions, "on": {"leave": "away", **heard}, **inside.shown("top")}
         inside.finish({"top": top, "away": {"on": {"leave": "top"}}})
         return self.plots[::-1]
 
@@ -124,15 +125,23 @@ class Inside:
             keys["entry"] = [{"trigger": "arm.go"}, keys["entry"]]
         if self.grower.scxml and self.chance(3):
             keys["entry"] = [*as_tuple(keys["entry"]), self._inner_action()]
+        if self.grower.scxml and self.chance(4):
+            blocks = [{"block": [self._inner_action() for _ in range(2)]} for _ in range(2)]
+            key = self.pick(("entry", "exit"))
+            keys[key] = [*as_tuple(keys[key]), *blocks]
         return keys
 
     def _inner_action(self):
         emit = {"emit": "k"} if self.grower.private else {"tell": "(p)"}
-        return self.pick(({"assign": {"v": "(+ ?v 1)"}}, {"tell": self.pick(TELLS)}, emit, self._branch()))
+        failing = [{"assign": {"v": "?event.n"}}, {"emit": "k", "with": {"n": "?event.n"}}] if self.grower.private else []
+        count = {"assign": {"v": "(+ ?v 1)"}}
+        return self.pick((count, {"tell": self.pick(TELLS)}, emit, self._branch(), *failing))
 
     def _branch(self):
-        guard = f"(in-state {self.pick([*self.states])})" if self.states else "(p)"
-        return {"if": guard, "then": [{"tell": "(q)"}], "else": [{"assign": {"v": 1}}]}
+        """Its condition may ask for an attribute that the event does not have."""
+        guards = [f"(in-state {self.pick([*self.states])})" if self.states else "(p)"]
+        guards += ["(> ?event.n 1)", "(or (p) (> ?event.n 1))"] if self.grower.private else []
+        return {"if": self.pick(guards), "then": [{"tell": "(q)"}], "else": [{"assign": {"v": 1}}]}
 
     def _remember(self, name, form):
         self.states[name] = form
@@ -164,7 +173,10 @@ class Inside:
         return form
 
     def _region(self, name, depth):
-        """A region; in SCXML one that is named as its only state stands for that state."""
+        """A region; in SCXML one that is named as its only state stands for that state: a parallel in a parallel."""
+        if self.grower.scxml and depth > 0 and self.chance(4):
+            inner = self.grower.name("s")
+            return inner, {"states": {inner: self._orthogonal(inner, depth - 1, [inner], [])}}
         states = self.scope(depth - 1)
         alone = self.grower.scxml and len(states) == 1 and self.chance(2)
         return next(iter(states)) if alone else name, {"states": states}

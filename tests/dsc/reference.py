@@ -13,7 +13,11 @@ Where the page is silent, this is assumed:
   state does not listen to does not come.
 - Histories are forgotten between leaving and entering. A transition that forgets the very history that it leads to
   goes where that history leads at first, and its domain is worked out for that.
-- `error` for a guard is fired once in a macrostep for each transition of a running plot.
+- `error` for a guard is fired once in a macrostep for each transition of a running plot; in profile `scxml`, where it
+  has a trigger, once for each event that is no error.
+- A parallel whose children are all in final states is in a final state (SCXML 3.4), so that the parallel around it may
+  be complete with it. (`enterStates` of appendix D, to the letter, looks no further than the grandparent.)
+- An error that a plot in profile `scxml` does not take is dropped, like other events.
 - Nothing outside a transition's domain is entered, also if its history belongs to a state around that domain: such
   a state is active. (Appendix D, to the letter, would enter it once more.)
 - A connector is a state that is entered and left; history can remember it when something else was faster.
@@ -26,7 +30,7 @@ from dataclasses import dataclass, field, replace
 
 from reference_tree import Node, NoValueError, grow, holds, told, value
 
-from dsc.model.actions import Assign, Choose, Emit, Switch, Tell
+from dsc.model.actions import Assign, Block, Choose, Emit, Switch, Tell
 from dsc.model.states import State, SubmachineState
 
 MOST_MICROSTEPS = 1000
@@ -135,6 +139,7 @@ class Reference:
         self.exited, self.entered = [], []
         self.queue = deque()
         self.event = None
+        self.turn = 0
         self.broken = set()
 
     def _run_to_completion(self):
@@ -144,16 +149,17 @@ class Reference:
             if not self.queue:
                 return self.report
             event = self.queue.popleft()
-            if not self._take(event) and event.name in ("error", "error.execution"):
-                self.report.errors += 1
+            if not self._take(event):
+                self.report.errors += event.name == "error"
         self._exit_all(set(self.active), own=set())
         self._close_microstep()
         self.root = None
-        self.report.errors += sum(event.name in ("error", "error.execution") for event in self.queue)
+        self.report.errors += sum(event.name == "error" for event in self.queue)
         return self.report
 
     def _take(self, event):
         self.event = event
+        self.turn += event.name not in ("error", "error.execution")
         if event.to is not None and (event.to not in self.active or event.to.visit is not event.visit):
             return False
         if event.name == "at_least":
@@ -219,8 +225,10 @@ class Reference:
         try:
             return self._holds(way.node.instance, way.transition.guard)
         except NoValueError:
-            if way.key not in self.broken:
-                self.broken.add(way.key)
+            each = way.node.instance.scxml and way.place[0] == "on"
+            broken = (*way.key, self.turn if each else 0)
+            if broken not in self.broken:
+                self.broken.add(broken)
                 self._fail(way.node.instance)
             return False
 
@@ -443,18 +451,23 @@ class Reference:
         if around.kind == "state":
             self._done(around)
         region = self._region_ended_by(around)
-        if region is not None and all(map(self._has_ended, region.parent.kids)):
+        while region is not None and self._in_final_state(region.parent):
             self._done(region.parent)
+            region = self._region_ended_by(region.parent)
 
     def _region_ended_by(self, around):
-        """A region that was only made to hold a state has ended when the state has (isInFinalState)."""
+        """A region that was only made to hold a state has ended when the state has."""
         if around.kind == "region":
             return around
         return None if around.parent.kind != "region" or around.parent.scope else around.parent
 
-    def _has_ended(self, region):
-        within = region if region.scope else region.kids[0]
-        return any(kid.final and kid in self.active for kid in (*region.kids, *within.kids))
+    def _in_final_state(self, node):
+        """isInFinalState."""
+        if node.parallel:
+            return all(map(self._in_final_state, node.kids))
+        alone = node.kind == "region" and not node.scope
+        ended = any(kid.final and kid in self.active for kid in node.kids)
+        return ended or (alone and self._in_final_state(node.kids[0]))
 
     def _end_plot(self, plot):
         host = plot.instance.host
@@ -493,9 +506,18 @@ class Reference:
             case Emit(emit=name):
                 self._emit(instance, name, {key: self._value(instance, t) for key, t in action.arguments.items()})
             case Choose():
-                branch = action.then if self._holds(instance, action.condition) else action.otherwise
-                for inner in branch:
+                for inner in action.then if self._chooses(instance, action) else action.otherwise:
                     self._act(instance, inner)
+            case Block(block=inside):
+                self._perform(instance, inside)
+
+    def _chooses(self, instance, action):
+        """A condition that cannot be evaluated is false, and an error (SCXML 5.9.1)."""
+        try:
+            return self._holds(instance, action.condition)
+        except NoValueError:
+            self._fail(instance)
+            return False
 
     def _emit(self, instance, name, attributes):
         if name not in instance.plot.emits:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import permutations
 
 import pytest
 from dsc_charts import Run, plot
@@ -164,6 +165,104 @@ def test_completion_is_an_event_that_anybody_may_take():
     assert run.active == ["b"]
 
 
+NESTED = """
+    plot: p
+    profile: scxml
+    states:
+      outer:
+        on: {done.state.outer: over}
+        regions:
+          inner:
+            states:
+              inner:
+                regions:
+                  a: {states: {a: {states: {a1: {on: {a: a2}}, a2: {final: true}}}}}
+                  b: {states: {b: {states: {b1: {on: {b: b2}}, b2: {final: true}}}}}
+          c: {states: {c: {states: {c1: {on: {c: c2}}, c2: {final: true}}}}}
+      over: {}
+"""
+
+
+@pytest.mark.parametrize("order", [*permutations("abc")], ids="".join)
+def test_a_parallel_in_a_parallel_counts_as_complete_whichever_part_of_it_is_the_last(order):
+    run = Run(plot(NESTED))
+    run.start()
+    for event in order[:-1]:
+        run.send(event)
+        assert "over" not in run.active
+    step = run.send(order[-1])
+    assert run.active == ["over"]
+    done = {"c": ["done.state.c", "done.state.outer"]}
+    inner = [f"done.state.{order[-1]}", "done.state.inner", "done.state.outer"]
+    assert step.entered("over")
+    assert len(step.microsteps) == 2
+    assert step.microsteps[-1].event.name == done.get(order[-1], inner)[-1]
+
+
+def test_completions_of_parallels_in_each_other_come_from_the_inside_out():
+    heard = "{done.state: {do: [{log: [heard]}]}, done.state.outer: over}"
+    text = NESTED.replace("{done.state.outer: over}", heard).replace("regions:\n          inner", "entry: {emit: a}\n        regions:\n          inner")
+    run = Run(plot(text))
+    run.start()
+    assert [one.event.name for one in run.send("b").microsteps[1:]] == ["done.state.b", "done.state.inner"]
+    assert [one.event.name for one in run.send("c").microsteps[1:]] == ["done.state.c", "done.state.outer"]
+
+
+def test_a_branch_that_cannot_be_decided_is_not_taken_and_its_block_goes_on():
+    branch = {"if": "(> ?event.n 1)", "then": [{"log": ["then"]}], "else": [{"if": "(= ?x 0)", "then": [{"log": ["else"]}]}]}
+    states = {"a": {"on": {"e": {"do": [branch, {"log": ["after"]}]}, "error.execution": {"do": [{"log": ["error"]}]}}}}
+    run = Run(chart(states, variables={"x": {"type": "number", "initial": 0}}))
+    run.start()
+    assert run.send("e").output == (Note("", "else"), Note("", "after"), Note("", "error"))
+
+
+def test_an_error_ends_its_own_block_and_no_other():
+    failing = {"assign": {"x": "?event.n"}}
+    blocks = [{"block": [{"log": [1]}, failing, {"log": [2]}]}, {"block": [{"log": [3]}]}]
+    states = {"a": {"entry": blocks, "exit": blocks, "on": {"e": {"to": "b", "do": [failing, {"log": [4]}]}}}, "b": {}}
+    run = Run(chart({**states, "b": {"on": {"error": {"do": [{"log": ["error"]}]}}}}, variables={"x": "number"}))
+    run.start()
+    assert run.send("e").output == (*(Note("", text) for text in ("1", "3", "error", "error")),)
+
+
+def test_an_error_that_nobody_takes_is_noted_and_the_run_goes_on():
+    states = {"a": {"entry": {"assign": {"x": "?event.n"}}, "on": {"e": "f"}}, "f": {"final": True}}
+    run = DryRun([chart(states, variables={"x": "number"})], "c")
+    [step] = run.steps
+    assert step.errors == ()
+    assert [note.label for note in step.output] == ["error.execution"]
+    assert "?event.n" in step.output[0].text
+    run.send("e")
+    assert run.finished
+
+
+def test_the_sequencer_goes_on_after_an_error_of_an_scxml_chart():
+    ran = Ran("""
+    plot: p
+    profile: scxml
+    variables: {x: number}
+    states:
+      a: {entry: [{block: [{emit: error}, {assign: {x: ?event.n}}]}, {emit: e, delay: 1}], on: {e: f}}
+      f: {final: true}
+    """)
+    assert ran.end.finished
+    assert ran.at == 1.0
+
+
+def test_a_guard_that_fails_is_an_error_for_each_event():
+    on = {"e": {"to": "b", "when": "(> ?event.n 1)"}, "error.execution": {"assign": {"x": "(+ ?x 1)"}}}
+    states = {"a": {"entry": [{"emit": "e"}, {"emit": "e"}], "on": on}, "b": {}}
+    run = Run(chart(states, variables={"x": {"type": "number", "initial": 0}}))
+    run.start()
+    assert run.active == ["a"]
+    assert run.variables() == {"x": 2}
+
+
+def test_a_guard_that_fails_for_its_own_error_does_not_go_round():
+    run = Run(chart({"a": {"entry": {"emit": "e"}, "on": {"*": {"to": "b", "when": "(> ?event.m 1)"}}}, "b": {}}))
+    assert [note.label for note in run.start().output] == ["error.execution"]
+
+
 def test_guards_may_ask_which_states_are_active():
     regions = {"r": {"states": {"r1": {"on": {"go": {"to": "r2", "when": "(in-state s2)"}}}, "r2": {}}},
                "s": {"states": {"s1": {"on": {"next": "s2"}}, "s2": {}}}}  # fmt: skip
@@ -193,6 +292,7 @@ FOREIGN = [
     "a: {states: {h: {history: deep, to: c}, c: {}}, on: {e: b}}",
     "a: {on_break: {emit: e}, on: {e: b}}",
     "a: {choice: [{when: (in-state b), to: b}, b]}",
+    "a: {on: {e: {to: b, do: [{block: [{emit: e}]}]}}}",
 ]
 
 

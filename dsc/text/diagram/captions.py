@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from dsc.events import TIMERS
 from dsc.model.actions import (
     Assign,
+    Block,
     Choose,
     Configure,
     Emit,
@@ -213,6 +214,8 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
         case Choose(condition=condition, then=then, otherwise=otherwise):
             branches = [", ".join(map(action_text, branch)) for branch in (then, otherwise)]
             return f"if {to_text(condition)} {{{branches[0]}}} else {{{branches[1]}}}"
+        case Block(block=inside):
+            return f"{{{', '.join(map(action_text, inside))}}}"
 
 
 def _values(arguments: Mapping[str, Term]) -> str:

@@ -5,7 +5,7 @@
 | `state`, `final`, `history` | state of the same name |
 | `parallel` | state with a region for each child, named as the child and holding only it |
 | `transition` | under `on` by its descriptors, or under `always` |
-| `onentry`, `onexit` | internal actions in `entry` and `exit` |
+| `onentry`, `onexit` | internal actions in `entry` and `exit`; of several each is a `block` |
 | `data` | variable, in lower case |
 | `raise`; `send`, with or without a delay | `emit`; `emit` with a `delay` |
 """
@@ -147,9 +147,10 @@ class _Reader:
             return name, self._history(element)
         form: Form = {"final": True} if element.name == "final" else {}
         for key, tag in (("entry", "onentry"), ("exit", "onexit")):
-            blocks = [child for child in element.children if child.name == tag]
+            inside = [child.children for child in element.children if child.name == tag and child.children]
+            blocks = [actions(children, self._names) for children in inside]
             if blocks:
-                form[key] = [action for block in blocks for action in actions(block.children, self._names)]
+                form[key] = blocks[0] if len(blocks) == 1 else [{"block": block} for block in blocks]
         self._transitions(element, form, path)
         return name, form | self._inside(element, path)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree as ET
 
-from dsc.model.actions import Assign, Choose, Emit, ExternalAction, Internal, Log, Withdraw
+from dsc.model.actions import Assign, Block, Choose, Emit, ExternalAction, Internal, Log, Withdraw
 from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.states import (
@@ -137,8 +137,13 @@ class _Writer:
         _actions(element, transition.effect)
 
     def _block(self, around: ET.Element, tag: str, actions: Iterable[ExternalAction | Internal]) -> None:
-        if actions:
-            _actions(ET.SubElement(around, tag), actions)
+        """One element for each block; loose actions are one block."""
+        listed = tuple(actions)
+        blocks: list[tuple[ExternalAction | Internal, ...]] = [one.block for one in listed if isinstance(one, Block)]
+        if blocks and len(blocks) < len(listed):
+            raise NotExpressibleError("block", f"an error in the actions beside it would not end <{tag}>")
+        for block in blocks or [listed] * bool(listed):
+            _actions(ET.SubElement(around, tag), block)
 
 
 def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -> None:
@@ -160,6 +165,8 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
                 ET.SubElement(around, "cancel", {name: str(value) for name, value in which.items()})
             case Choose():
                 _if(around, action)
+            case Block():
+                raise NotExpressibleError("block", "only <onentry> and <onexit> are blocks")
             case _:
                 raise NotExpressibleError(type(action).__name__.lower(), "SCXML knows no skills and no knowledge base")
 
