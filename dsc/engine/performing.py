@@ -19,6 +19,8 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Expression
 
 Action = ExternalAction | Internal
+_EXPONENT_FROM = 1e21
+"""From here on ECMAScript writes numbers with an exponent."""
 SHORTEST_PERIOD = 0.001
 """Seconds; a period of nothing would leave no time for anything else."""
 
@@ -117,7 +119,7 @@ class Performer(Record):
             case Withdraw(withdraw=term):
                 self.output.append(Revoke(frame.serial, str(self.value(frame, term))))
             case Log(log=parts, label=label):
-                text = "".join(str(self.value(frame, part)) for part in parts)
+                text = "".join(_shown(self.value(frame, part)) for part in parts)
                 self.output.append(Note(label, text))
             case Choose():
                 for inner in action.then if self._chooses(frame, state, action) else action.otherwise:
@@ -148,3 +150,13 @@ class Performer(Record):
         elif not frame.gone:
             self.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
         # Else the host was left by another transition of this microstep: nobody waits for an outcome any more.
+
+
+def _shown(value: Any) -> str:
+    """A value as ECMAScript shows it."""
+    if value is None:
+        return "undefined"
+    if isinstance(value, bool):
+        return str(value).lower()
+    is_whole = isinstance(value, float) and value.is_integer() and abs(value) < _EXPONENT_FROM
+    return f"{value:.0f}" if is_whole else str(value)

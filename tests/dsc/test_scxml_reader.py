@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from dsc_charts import Run
 
+from dsc.dynamic.library import Library
+from dsc.testing import DryRun
 from dsc.text.files import MAX_BYTES
 from dsc.text.plots import parse_plot, plot_to_yaml
 from dsc.text.scxml.document import MAX_DEPTH
 from dsc.text.scxml.ecmascript import condition, term
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.reader import parse_scxml
+from dsc.text.scxml.writer import to_scxml
+from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
 from knowledge_base.language.printer import to_text
 
@@ -77,6 +83,150 @@ def test_conditions_are_translated(text, read):
 def test_what_terms_cannot_say_is_named(text):
     with pytest.raises(NotExpressibleError):
         term(text, {"x": "x"})
+
+
+def outcome(data, content, ways):
+    """The state that a chart ends in: `content` stands in the onentry of the first state, `ways` follow it."""
+    body = f"""<datamodel>{data}</datamodel>
+    <state id="s"><onentry>{content}</onentry>{ways}<transition event="*" target="fail"/></state>
+    <final id="pass"/><final id="fail"/>"""
+    run = DryRun([scxml(body)], "c")
+    run.advance(1)
+    return run.steps[-1].microsteps[-2].entered if run.finished else "waits"
+
+
+CONVERTED = [
+    ('<data id="n" expr="3"/>', "n", True),
+    ('<data id="n" expr="0"/>', "n", False),
+    ('<data id="n" expr="0"/>', "!n", True),
+    ('<data id="t" expr="\'\'"/>', "t", False),
+    ('<data id="t" expr="\'false\'"/>', "t", True),
+    ('<data id="b" expr="false"/>', "b || !b", True),
+    ("", "'foo'", True),
+    ("", "0", False),
+    ('<data id="n" expr="1"/>', "n - 1", False),
+    ('<data id="n" expr="1"/>', "n == 1 && n != 2", True),
+    ('<data id="n" expr="1"/>', "n === '1'", False),
+    ("<data id='t'>1 + 1</data>", "t == '1 + 1'", True),
+    ("<data id='t'> 12 </data>", "t == 12", True),
+    ("<data id='t'>a\n  b</data>", "t == 'a b'", True),
+    ('<data id="t" expr="\'a\\tb\\q\'"/>', "t == 'a\\tbq'", True),
+    ("<data id='u'/>", "u", False),
+    ("<data id='u'/>", "u == undefined", True),
+    ('<data id="n" expr="1"/>', "n === undefined", False),
+    ("<data id='u'/>", "u === 1", False),
+    ("<data id='u'/>", "u !== 1", True),
+]
+
+
+@pytest.mark.parametrize(("data", "cond", "holds"), CONVERTED)
+def test_conditions_mean_what_they_mean_in_ecmascript(data, cond, holds):
+    text = cond.replace("&", "&amp;")
+    ways = f'<transition cond="{text}" target="pass"/><transition target="fail"/>'
+    assert outcome(data, "", ways) == ("pass" if holds else "fail",)
+
+
+SENT = [
+    ('<send event="e"><content>123</content></send>', "_event.data == 123"),
+    ('<send event="e"><content>this  is\n text </content></send>', "_event.data == 'this is text'"),
+    ('<send event="e"><content>"json"</content></send>', "_event.data == 'json'"),
+    ('<send event="e"><content expr="1 + 1"/></send>', "_event.data == 2"),
+    ('<send event="e"><content>{"productName": "bar", "n": 1}</content></send>', "_event.data.productName == 'bar' && _event.data.n &lt; 2"),
+    ('<send event="e"><param name="aB" expr="true"/></send>', "_event.data.aB"),
+    ('<send event="e" namelist="X"/>', "_event.data.X == 7"),
+]
+
+
+@pytest.mark.parametrize(("send", "cond"), SENT)
+def test_events_carry_what_they_carry_in_scxml(send, cond):
+    text = cond.replace("&&", "&amp;&amp;")
+    ways = f'<transition event="e" cond="{text}" target="pass"/>'
+    assert outcome('<data id="X" expr="7"/>', send, ways) == ("pass",)
+
+
+def cond(text, data=""):
+    return f"<datamodel>{data}</datamodel><state id='s'><transition cond=\"{text}\" target='s'/></state>"
+
+
+def sent(send, read):
+    return f"<state id='s'><onentry>{send}</onentry><transition event='e' cond=\"{read}\" target='s'/></state>"
+
+
+REFUSED = [
+    (cond("x == 1", "<data id='x' expr=\"'1'\"/>"), "'==' may convert"),
+    (cond("x == true", "<data id='x' expr='1'/>"), "'==' may convert"),
+    (cond("x &lt; 1", "<data id='x' expr=\"'1'\"/>"), "need not be a number"),
+    (cond("x &lt; 1", "<data id='x'/>"), "need not be a number"),
+    (cond("x === 1 / x", "<data id='x' expr='1'/>"), "only a number other than 0 divides"),
+    (cond("--x === 1", "<data id='x' expr='1'/>"), "'--'"),
+    (cond("x === 010", "<data id='x' expr='1'/>"), "octal"),
+    (cond("x === '\\u0041'", "<data id='x' expr='1'/>"), "escape by number"),
+    (cond("true", "<data id='x' expr='y + 1'/><data id='y' expr='1'/>"), "has none yet"),
+    (cond("true", "<data id='x' expr='x'/>"), "has none yet"),
+    (cond("true", "<data id='x'>[1]</data>"), "an array"),
+    (cond("x === 'undefined'", "<data id='x'/>"), "stands for no value"),
+    (cond("true", "<data id='x'>undefined</data>"), "'undefined'"),
+    (sent("<send event='e'><content>[1]</content></send>", "_event.data === 1"), "an array"),
+    (sent("<send event='e'><content>{'a': {}}</content></send>".replace("'a'", '"a"'), "_event.data.a === 1"), "an array"),
+    (sent("<send event='e'><param name='aB' expr='1'/></send>", "_event.data.ab === 1"), "is undefined for the event 'e'"),
+    (sent("<send event='e'><param name='a' expr='1'/><param name='A' expr='2'/></send>", "_event.data.a === 1"), "two are named 'a'"),
+    (sent("<send event='e'><param name='a' expr='1'/></send>", "_event.data === 1"), "is undefined for the event 'e'"),
+    (sent("<send event='e'/>", "_event.data === 1"), "is undefined for the event 'e'"),
+    (sent("<send event='e'><param name='a' expr='1'/></send><send event='e.f'><param name='a' expr=\"'1'\"/></send>", "_event.data.a == 1"), "may convert"),
+    (sent("<raise event='f'/>", "_event.data === 1"), "not sent with <content>"),
+    (sent("<raise event='f'/>", "_event.data.a &lt; 1 &amp;&amp; _event.data.a == 'x'"), None),
+    (sent("<raise event='f'/>", "_event.data.a === 1 &amp;&amp; _event.data.A === 1"), "spelt 'a' elsewhere"),
+    (sent("<send event='e' target='#_internal' delay='1s'/>", "true"), "send/@delay"),
+]
+
+
+@pytest.mark.parametrize(("body", "message"), REFUSED)
+def test_what_ecmascript_would_convert_or_not_find_is_refused_by_name(body, message):
+    with pytest.raises(NotExpressibleError, match=message and re.escape(message)) as caught:
+        scxml(body)
+    assert str(caught.value).startswith("c.scxml:1")
+
+
+def test_attributes_of_events_from_outside_are_declared_with_the_types_that_the_chart_needs():
+    body = """<datamodel><data id="n" expr="0"/></datamodel><state id="s">
+      <transition event="e" cond="_event.data.level &gt; 3 &amp;&amp; _event.data.who == 'me'"><assign location="n" expr="_event.data.n"/></transition>
+      <transition event="f" cond="_event.data.x !== 1"/></state>"""
+    read = scxml(body)
+    assert read.receives == {"e": {"level": "number", "who": "text", "n": "number"}, "f": {"x": "number"}}
+    assert validate_plot(read, Library([read])) == []
+
+
+def test_data_that_get_a_value_before_they_can_be_read_need_none_at_first():
+    entered = "<state id='s'><onentry><assign location='x' expr='1'/><assign location='x' expr='x + 1'/></onentry></state>"
+    left = "<state id='s'><transition event='e' target='t'><assign location='x' expr='1'/></transition></state><state id='t'><transition cond='x &lt; 2'/></state>"
+    data = "<datamodel><data id='x'/></datamodel>"
+    assert scxml(data + entered).variables["x"].type == "number"
+    assert scxml(data + left).variables["x"].type == "number"
+    for body in (entered.replace("'1'", "'x'"), left.replace("target", "cond='x &lt; 1' target"), left.replace("</transition>", "</transition><transition event='f' target='t'/>")):
+        with pytest.raises(NotExpressibleError, match="undefined"):
+            scxml(data + body)
+
+
+def test_several_onentry_are_blocks_of_their_own():
+    body = """<datamodel><data id="x" expr="1"/></datamodel><state id="s">
+      <onentry><log expr="1"/></onentry><onentry><log expr="2"/></onentry><onentry/>
+      <onexit><log expr="3"/></onexit></state>"""
+    state = scxml(body).state("s")
+    assert [len(block.block) for block in state.entry] == [1, 1]
+    assert [type(action).__name__ for action in state.exit] == ["Log"]
+    assert to_scxml(scxml(body)).count("<onentry>") == 2
+    assert parse_scxml(to_scxml(scxml(body))).state("s") == state
+
+
+@pytest.mark.parametrize(
+    ("expr", "shown"),
+    [("n + 1 + 'a'", "3a"), ("'a' + n + 1", "a21"), ("n / 2", "1"), ("n / 4", "0.5"), ("b", "true"), ("t + n", "t2"), ("u", "undefined")],
+)
+def test_a_log_shows_what_ecmascript_shows(expr, shown):
+    data = '<data id="n" expr="2"/><data id="b" expr="true"/><data id="t" expr="\'t\'"/><data id="u"/>'
+    body = f'<datamodel>{data}</datamodel><state id="s"><onentry><log expr="{expr}"/></onentry></state>'
+    [note] = DryRun([scxml(body)], "c").steps[0].output
+    assert note.text == shown
 
 
 @pytest.mark.parametrize(

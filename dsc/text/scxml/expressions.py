@@ -6,6 +6,7 @@ import json
 
 from dsc.engine.membership import asked_states
 from dsc.text.scxml.errors import NotExpressibleError
+from dsc.text.scxml.kinds import NO_VALUE
 from knowledge_base.language.expression import (
     ARITHMETIC,
     And,
@@ -51,6 +52,8 @@ def expression_text(e: Expression) -> str:
 def term_text(term: Term) -> str:
     """A term as an `expr`; raises `NotExpressibleError` for a fluent or a name that is no identifier."""
     match term:
+        case Constant(NO_VALUE.value):
+            return "undefined"
         case Constant(value):
             return json.dumps(value, ensure_ascii=False)
         case Variable(name):

@@ -14,20 +14,22 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator, Mapping
 from pathlib import PurePath
 from typing import Any
 
 from dsc.events import RESERVED, TIMERS
 from dsc.model.plot import ActionPlot, Path
 from dsc.text.form import read_model
-from dsc.text.scxml.content import Form, actions, needed
+from dsc.text.scxml.content import Form, actions, assigned, fired, needed, set_at_first, variable
 from dsc.text.scxml.document import Element, read_xml, written
-from dsc.text.scxml.ecmascript import condition, term
+from dsc.text.scxml.ecmascript import condition
 from dsc.text.scxml.errors import NotExpressibleError
+from dsc.text.scxml.kinds import BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, Scope, work_out
 from dsc.text.scxml.vocabulary import STATES, check
 from dsc.text.yaml import Document
 from knowledge_base.errors import InputError, Place
-from knowledge_base.language.expression import Arithmetic, Constant, Term
+from knowledge_base.language.expression import Constant, Term, free_variables
 from knowledge_base.spelling import is_plain_name
 
 
@@ -49,7 +51,7 @@ class _Reader:
     def __init__(self, root: Element, source: str | None) -> None:
         check(root)
         self._root, self._source = root, source
-        self._names: dict[str, str] = {}
+        self._known = Scope({})
         self._places: dict[Path, Place] = {}
         self._note((), root.place)
         self._unnamed = 0
@@ -66,7 +68,8 @@ class _Reader:
             raise InputError("a chart needs at least one state", place=root.place)
         form: Form = {"plot": self._name(), "profile": "scxml", "variables": self._variables()}
         form |= self._scope(root, ())
-        form["receives"] = dict.fromkeys(self._received())
+        received = self._known.data.received
+        form["receives"] = {event: _declared(attributes) or None for event, attributes in received.items()}
         return read_model(ActionPlot, Document(form, self._places)).written_at(self._places)
 
     def _note(self, path: Path, place: Place) -> None:
@@ -84,28 +87,59 @@ class _Reader:
 
     def _variables(self) -> Form:
         data = [element for element in self._root.walk() if element.name == "data"]
+        names: dict[str, str] = {}
         for element in data:
             name = needed(element, "id")
             if not is_plain_name(name.lower()):
                 raise InputError(f"'{name}' is no name for data", place=element.place, found=name)
-            if name.lower() in self._names.values():
+            if name.lower() in names.values():
                 raise InputError(f"two data are named '{name}', in lower case", place=element.place, found=name)
-            self._names[name] = name.lower()
+            names[name] = name.lower()
             self._note(("variables", name.lower()), element.place)
-        return {self._names[element.attributes["id"]]: self._variable(element) for element in data}
+        self._known = Scope(names)
+        self._work_out_kinds()
+        form: Form = {}
+        for element in data:
+            form[names[element.attributes["id"]]] = self._variable(element, form)
+        return form
 
-    def _variable(self, element: Element) -> Form:
-        text = element.attributes.get("expr") or element.text
-        if not text:
-            return {"type": "text"}
-        initial = term(text, self._names, element.place)
-        return {"type": _type(initial), "initial": initial}
+    def _work_out_kinds(self) -> None:
+        """From here on the scope knows the kinds of the data, and what is converted is refused."""
+        known = self._known.data
+        early = {self._known.names.get(name) for name in set_at_first(self._root, self._known)}
+        given = [one for one in self._given(self._root, self._known) if one[1] is not None or one[0] not in early]
+        known.received = {event: {} for event in self._received()}
+        work_out(known, given)
+
+    def _given(self, element: Element, scope: Scope) -> Iterator[tuple[str, Term | None, Scope]]:
+        """What the elements inside give to variables; events that they fire are noted on the way."""
+        for child in element.children:
+            if child.name == "data":
+                yield scope.names[child.attributes["id"]], assigned(child, scope), scope
+            elif child.name == "assign":
+                yield variable(needed(child, "location"), scope, child), assigned(child, scope), scope
+            elif child.name in {"raise", "send"}:
+                scope.data.sent.append(fired(child, scope))
+            if "idlocation" in child.attributes:
+                yield variable(child.attributes["idlocation"], scope, child), Constant("", quoted=True), scope
+            yield from self._given(child, scope.on(_descriptors(child)) if child.name == "transition" else scope)
+
+    def _variable(self, element: Element, before: Form) -> Form:
+        initial = assigned(element, self._known)
+        for name in free_variables(initial) if initial is not None else ():
+            if name not in before:
+                why = f"its value reads '{name}', which has none yet"
+                raise NotExpressibleError("data/@expr", why, place=element.place)
+        kinds = (self._known.data.kinds or {})[self._known.names[element.attributes["id"]]]
+        if initial is None and UNDEFINED in kinds:
+            initial = NO_VALUE
+        form: Form = {"type": next(iter(kinds)) if len(kinds) == 1 and kinds <= {TEXT, NUMBER, BOOLEAN} else "symbol"}
+        return form if initial is None else {**form, "initial": initial}
 
     def _received(self) -> list[str]:
         """The events that the chart listens to and does not itself fire."""
-        inside = list(self._root.walk())
-        own = {element.attributes.get("event") for element in inside if element.name in {"raise", "send"}}
-        heard = [e for element in inside if element.name == "transition" for e in _descriptors(element)]
+        own = {sent.event for sent in self._known.data.sent}
+        heard = [e for one in self._root.walk() if one.name == "transition" for e in _descriptors(one)]
         plain = dict.fromkeys(event.removesuffix(".*").removesuffix(".") for event in heard)
         nobodys = own | RESERVED | {"*"}
         return [event for event in plain if event not in nobodys and not event.startswith(("done.", "error."))]
@@ -148,7 +182,7 @@ class _Reader:
         form: Form = {"final": True} if element.name == "final" else {}
         for key, tag in (("entry", "onentry"), ("exit", "onexit")):
             inside = [child.children for child in element.children if child.name == tag and child.children]
-            blocks = [actions(children, self._names) for children in inside]
+            blocks = [actions(children, self._known) for children in inside]
             if blocks:
                 form[key] = blocks[0] if len(blocks) == 1 else [{"block": block} for block in blocks]
         self._transitions(element, form, path)
@@ -187,7 +221,7 @@ class _Reader:
             raise InputError("a history is shallow or deep", place=element.place, found=depth, valid=valid)
         if len(targets) != 1:
             raise NotExpressibleError("history", "its default is one state", place=element.place)
-        return {"history": depth, "to": targets[0], "do": actions(default.children, self._names)}
+        return {"history": depth, "to": targets[0], "do": actions(default.children, self._known)}
 
     # -- transitions ---------------------------------------------------------------------------------------
 
@@ -216,11 +250,12 @@ class _Reader:
         if kind not in {"internal", "external"}:
             valid = ("internal", "external")
             raise InputError("a transition is internal or external", place=element.place, found=kind, valid=valid)
-        form: Form = {"do": actions(element.children, self._names), "internal": kind == "internal"}
+        scope = self._known.on(_descriptors(element))
+        form: Form = {"do": actions(element.children, scope), "internal": kind == "internal"}
         if targets:
             form |= {"to": targets[0], "also": targets[1:]}
         if "cond" in element.attributes:
-            form["when"] = condition(element.attributes["cond"], self._names, element.place)
+            form["when"] = condition(element.attributes["cond"], scope, element.place)
         return form
 
 
@@ -257,8 +292,6 @@ def _only(element: Element) -> Element:
     return element.children[0]
 
 
-def _type(initial: Term) -> str:
-    value = initial.value if isinstance(initial, Constant) else None
-    if isinstance(value, bool):
-        return "boolean"
-    return "number" if isinstance(value, int | float) or isinstance(initial, Arithmetic) else "text"
+def _declared(attributes: Mapping[str, str]) -> dict[str, str]:
+    """Attributes with their types; one that is only compared for equality may be anything."""
+    return {name.lower(): kind or "symbol" for name, kind in attributes.items()}

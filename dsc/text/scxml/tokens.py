@@ -13,11 +13,12 @@ _WORDS = re.compile(
     (?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)
     |(?P<text>'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*")
     |(?P<name>[A-Za-z_$][\w$]*(?:\.[A-Za-z_$][\w$]*)*)
-    |(?P<sign>===|!==|==|!=|<=|>=|&&|\|\||[-+*/<>!(),])
+    |(?P<sign>\+\+|--|===|!==|==|!=|<=|>=|&&|\|\||[-+*/<>!(),])
     )""",
     re.VERBOSE,
 )
-_ESCAPES = {"n": "\n", "t": "\t", "\\": "\\", "'": "'", '"': '"'}
+_ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v"}
+_BY_NUMBER = re.compile(r"(?<!\\)(?:\\\\)*\\[0-9ux]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,8 @@ def tokens(text: str, place: Place | None) -> list[Token]:
             raise NotExpressibleError("expression", f"'{text}' cannot be said in conditions and terms", place=place)
         kind = match.lastgroup or ""
         word = match[kind]
+        if kind == "text" and _BY_NUMBER.search(word):
+            raise NotExpressibleError("expression", f"an escape by number in {word} has no counterpart", place=place)
         found.append(Token(kind, _unquoted(word) if kind == "text" else word))
         at = match.end()
     return [*found, Token("end", "")]

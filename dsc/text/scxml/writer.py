@@ -23,6 +23,7 @@ from dsc.model.transitions import Transition
 from dsc.text.scxml.document import NAMESPACE
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.expressions import expression_text, identifier, term_text
+from dsc.text.scxml.kinds import NO_VALUE
 from knowledge_base.language.expression import Constant, Term, free_variables
 
 
@@ -42,7 +43,8 @@ def to_scxml(plot: ActionPlot) -> str:
     if plot.variables:
         data = ET.SubElement(root, "datamodel")
         for name, variable in plot.variables.items():
-            initial = {} if variable.initial is None else {"expr": term_text(variable.initial)}
+            value = None if variable.initial is None else term_text(variable.initial)
+            initial = {} if value in {None, term_text(NO_VALUE)} else {"expr": value}
             ET.SubElement(data, "data", {"id": identifier(name), **initial})
     _Writer(plot).scope(root, plot)
     ET.indent(root)
