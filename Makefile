@@ -50,7 +50,7 @@ check: $(VENV)/.test   ## ruff, mypy strict, import contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 
-conformance: $(VENV)/.test   ## SCION's SCXML charts, fetched with npm into .conformance/, on this engine (WRITE=1 writes the docs)
+conformance: $(VENV)/.test   ## the SCXML charts of SCION and of the W3C, fetched with npm into .conformance/, on this engine (WRITE=1 writes the docs)
 	$(BIN)/python tests/conformance/charts.py $(if $(WRITE),--write)
 
 sweep-pddl: $(VENV)/.engines   ## the PDDL files that come with unified-planning: read, planned for, plans checked by their validator (WRITE=1 writes the docs)

@@ -1,7 +1,7 @@
-"""SCION's own SCXML charts with their event scripts, run on this engine; see docs/conformance.md.
+"""SCION's own SCXML charts and its copies of the W3C's, with their event scripts, run on this engine.
 
 `python tests/conformance/charts.py [--write]` fetches the npm package into `.conformance/` if it is not there,
-prints the score, and with `--write` puts the table into docs/conformance.md. Exit status 1: a chart fails.
+prints the scores, and with `--write` puts the tables into docs/conformance.md. Exit status 1: a chart fails.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 import tarfile
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import count
@@ -40,6 +41,9 @@ AGAINST_THE_STANDARD = {
     "internal-transitions/test0": "a `transition` directly in `scxml`, which has no such children (SCXML 3.2.2)",
 }
 """Charts that are no SCXML documents, with the paragraph that says so."""
+W3C = "w3c-ecma"
+LONGEST = 60.0
+"""Seconds after which nothing comes any more: the longest delay of the W3C's charts is shorter."""
 OTHERWISE = "expects that a child of `parallel` can be left alone; SCXML's LCCA is never a `parallel` (appendix D, 3.13)"
 SCRIPT_AGAINST_THE_STANDARD = {"more-parallel/test10": OTHERWISE, "more-parallel/test10b": OTHERWISE}
 """Charts whose script contradicts the standard; their `legacySemantics` script, which does not, has to pass."""
@@ -50,7 +54,7 @@ class Result:
     """What became of one chart.
 
     Attributes:
-        verdict: `passed`, `excluded` (because of the element) or `failed`.
+        verdict: `passed`, `excluded` (because of the element, or of a mistake) or `failed`.
         crosses: whether transitions cross borders, which profile `dsc` has to refuse.
     """
 
@@ -128,7 +132,42 @@ def fetch() -> Path:
 
 def charts(tests: Path) -> list[Path]:
     """SCION's own charts; its copies of the W3C's are not among them."""
-    return sorted(file for file in tests.glob("*/*.scxml") if file.parent.name != "w3c-ecma")
+    return sorted(file for file in tests.glob("*/*.scxml") if file.parent.name != W3C)
+
+
+def w3c_charts(tests: Path) -> list[Path]:
+    """The W3C's charts that have a script; the others are parts of them."""
+    return sorted(file for file in (tests / W3C).glob("*.scxml") if file.with_suffix(".json").is_file())
+
+
+def run_w3c(file: Path) -> Result:
+    """Play one of the W3C's charts until nothing is due any more: it has to end in `pass`, as the W3C says.
+
+    Of the script the events count. The configurations before the last one tell how long SCION takes to send.
+    """
+    name = file.name.partition(".")[0]
+    try:
+        player = _player(parse_scxml(file.read_text(encoding="utf-8"), str(file)), file)
+    except NotExpressibleError as error:
+        return Result(name, "excluded", error.element, error.message.removeprefix(f"{error.element}: "))
+    except InputError as error:
+        return Result(name, "excluded", "mistake", error.message)
+    player.start(next(iter(player.library)).name)
+    for entry in _script(file, standard=True)["events"]:
+        player.until(player.now + entry.get("after", 0) / 1000)
+        player.send(Event(entry["event"]["name"]))
+    player.until(player.now + LONGEST)
+    found = player.leaves
+    return Result(name, "passed") if found == ["pass"] else Result(name, "failed", "", f"ends in {found}")
+
+
+def _player(plot: ActionPlot, file: Path) -> Player:
+    """A player of the plot after it was written as SCXML and read again; raises `InputError`."""
+    plot = parse_scxml(to_scxml(plot), str(file))
+    library = Library([plot])
+    raise_findings(validate_plot(plot, library))
+    knowledge = KnowledgeBase(Schema.parse("(define (domain none))"))
+    return Player(library, lambda: KnowledgeSituation(knowledge, library))
 
 
 def run(file: Path) -> Result:
@@ -137,16 +176,12 @@ def run(file: Path) -> Result:
     if name in AGAINST_THE_STANDARD:
         return Result(name, "excluded", "no SCXML", AGAINST_THE_STANDARD[name])
     try:
-        plot = parse_scxml(file.read_text(encoding="utf-8"), str(file))
-        plot = parse_scxml(to_scxml(plot), str(file))  # and what is read can be written
-        library = Library([plot])
-        raise_findings(validate_plot(plot, library))
+        player = _player(parse_scxml(file.read_text(encoding="utf-8"), str(file)), file)
+        plot = next(iter(player.library))
         crosses = _crosses(plot)
-        refused = any(finding.rule == "no border crossing" for finding in validate_plot(_strict(plot), library))
+        refused = any(one.rule == "no border crossing" for one in validate_plot(_strict(plot), player.library))
         if crosses != refused:
             return Result(name, "failed", "", f"crosses borders: {crosses}; refused by profile dsc: {refused}")
-        knowledge = KnowledgeBase(Schema.parse("(define (domain none))"))
-        player = Player(library, lambda: KnowledgeSituation(knowledge, library))
         problem = play(player, plot.name, _script(file, standard=name not in SCRIPT_AGAINST_THE_STANDARD))
     except NotExpressibleError as error:
         return Result(name, "excluded", error.element, error.message.removeprefix(f"{error.element}: "))
@@ -197,32 +232,45 @@ def play(player: Player, plot: str, script: dict[str, Any]) -> str:
 
 
 def table(results: list[Result]) -> str:
-    """The published list."""
+    """The published list of SCION's charts."""
+    crossing = sum(one.crosses for one in results)
+    told = f"{crossing} of those that pass cross borders of composites, and profile dsc refuses each of them"
+    return f"Score: {score(results)}; {told}.\n\n{_rows(results)}"
+
+
+def w3c_table(results: list[Result]) -> str:
+    """The published list of the W3C's charts, with the reasons counted."""
+    reasons = Counter(one.element for one in results if one.verdict == "excluded")
+    counted = "\n".join(f"| {element} | {number} |" for element, number in reasons.most_common())
+    head = "| refused because of | charts |\n|---|---|"
+    return f"Score: {score(results)}.\n\n{head}\n{counted}\n\n{_rows(results)}"
+
+
+def _rows(results: list[Result]) -> str:
     rows = [f"| {one.name} | {one.verdict} | {one.element} | {one.reason.replace('|', '&#124;')} |" for one in results]
-    return "\n".join([f"Score: {score(results)}.", "", "| chart | verdict | element | why |", "|---|---|---|---|", *rows])
+    return "\n".join(["| chart | verdict | element | why |", "|---|---|---|---|", *rows])
 
 
 def score(results: list[Result]) -> str:
     """`passed/all`, and what became of the rest."""
     found = {verdict: sum(one.verdict == verdict for one in results) for verdict in ("passed", "excluded", "failed")}
-    crossing = sum(one.crosses for one in results)
-    return (
-        f"{found['passed']}/{len(results)} pass, {found['excluded']} excluded, {found['failed']} fail; "
-        f"{crossing} of those that pass cross borders of composites, and profile dsc refuses each of them"
-    )
+    return f"{found['passed']}/{len(results)} pass, {found['excluded']} excluded, {found['failed']} fail"
 
 
 def main() -> int:
     """Run all charts and say how it went."""
-    results = [run(file) for file in charts(fetch())]
-    for one in results:
+    tests = fetch()
+    own = [run(file) for file in charts(tests)]
+    w3c = [run_w3c(file) for file in w3c_charts(tests)]
+    for one in (*own, *w3c):
         if one.verdict != "passed":
             print(f"{one.verdict:9} {one.name:40} {one.element} {one.reason}")
-    print(score(results))
+    print(f"SCION's charts: {score(own)}\nthe W3C's charts: {score(w3c)}")
     if "--write" in sys.argv[1:]:
         head, mark, _ = PAGE.read_text(encoding="utf-8").partition("<!-- results -->\n")
-        PAGE.write_text(f"{head}{mark}{table(results)}\n", encoding="utf-8")
-    return 1 if any(one.verdict == "failed" for one in results) else 0
+        body = f"## SCION's charts\n\n{table(own)}\n\n## The W3C's charts\n\n{w3c_table(w3c)}\n"
+        PAGE.write_text(f"{head}{mark}{body}", encoding="utf-8")
+    return 1 if any(one.verdict == "failed" for one in (*own, *w3c)) else 0
 
 
 if __name__ == "__main__":
