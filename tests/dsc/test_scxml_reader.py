@@ -237,6 +237,7 @@ def test_a_log_shows_what_ecmascript_shows(expr, shown):
         ("<state id='a'><onentry><send event='e' target='http://x'/></onentry></state>", "send/@target"),
         ("<state id='a' initial='b c'><state id='b'/><state id='c'/></state>", "only one state"),
         ("<state id='a'><x:y xmlns:x='other'/></state>", "y: has no counterpart"),
+        ("<parallel id='a'><parallel id='b'/><state id='c'/></parallel>", "parallel: without states"),
         ("<state id='a'><transition event='go after' target='a'/></state>", "transition/@event: 'after'"),
         ("<state id='a'><transition event='every' target='a'/></state>", "transition/@event: 'every'"),
         ("<state id='a'><transition event='at_least' target='a'/></state>", "transition/@event: 'at_least'"),

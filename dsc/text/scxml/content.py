@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from dsc.text.scxml.document import Element
-from dsc.text.scxml.ecmascript import condition, joined, term
+from dsc.text.scxml.ecmascript import MAX_WHOLE, condition, joined, term
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.kinds import NO_VALUE, WHOLE, Scope, Sent
 from dsc.text.scxml.vocabulary import STATES
@@ -18,8 +18,6 @@ from knowledge_base.spelling import is_plain_name
 
 Form = dict[str, Any]
 
-MAX_NUMBER = 2**53
-"""Whole numbers up to it are the same in ECMAScript."""
 _PROCESSORS = frozenset({"", "scxml", "http://www.w3.org/TR/scxml/#SCXMLEventProcessor"})
 _DELAY = re.compile(r"(\d+\.?\d*|\.\d+)(ms|s)")
 
@@ -254,7 +252,7 @@ def _literal(element: Element) -> Constant | Mapping[str, Constant]:
 def _is_scalar(value: object) -> bool:
     if isinstance(value, str):
         return value != NO_VALUE.value
-    return isinstance(value, int | float) and abs(value) <= MAX_NUMBER
+    return isinstance(value, int | float) and abs(value) <= MAX_WHOLE
 
 
 def _scalar(value: str | float) -> Constant:

@@ -35,6 +35,8 @@ Names = Mapping[str, str] | Scope
 _COMPARE = {"===": "=", "==": "=", "!==": "!=", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 _FALSE = {BOOLEAN: Constant(False), NUMBER: Constant(0), TEXT: Constant("", quoted=True), UNDEFINED: NO_VALUE}  # noqa: FBT003
 """The values that count as false; NaN is none of ours."""
+MAX_WHOLE = 2**53
+"""Whole numbers up to it are the same in ECMAScript, which rounds larger ones."""
 MAX_EXPONENT = 8
 MAX_NESTING = 50
 MAX_OPERATIONS = 100
@@ -180,7 +182,7 @@ class _Parser:
                 raise self._refused("a number is too large")
             if token.text[:1] == "0" and token.text[1:2].isdigit():
                 raise self._refused(f"'{token.text}' is octal, or an error,")
-            return Constant(int(number) if number.is_integer() else number)
+            return Constant(int(number) if number.is_integer() and number <= MAX_WHOLE else number)
         if token.kind == "text":
             if token.text == NO_VALUE.value:
                 raise self._refused("the text 'undefined' stands for no value")

@@ -194,6 +194,8 @@ class _Reader:
                 raise InputError("a history needs states beside it", place=child.place)
             if self._initial(element) is not None:
                 raise InputError("there is no state inside to begin with", place=element.place)
+            if element.name == "parallel":
+                raise NotExpressibleError("parallel", "without states it is complete at once", place=element.place)
             return {}
         if element.name == "state":
             return self._scope(element, path)
