@@ -24,6 +24,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from dsc.calls import OBSERVED, Outcome, SkillCall
+from knowledge_base.errors import described
 from knowledge_base.facts import Delta
 
 STOPPING = 2.0
@@ -32,6 +33,8 @@ _KILLING = 3
 """How often `STOPPING` passes until a process is left alone: first it is told to end, then it is killed."""
 _POLL = 0.02
 """Real seconds after which a body's supervisor looks again whether it shall stop."""
+MOST_REPORTED = 1_000
+"""Reports that the loop has not taken; the body waits before the next one."""
 _PR_SET_PDEATHSIG = 1
 """Of Linux's `prctl`: the signal that a process gets when its parent dies."""
 
@@ -50,7 +53,8 @@ class BlockingCall:
 
     Attributes:
         action_id: as in `SkillCall`.
-        report: as in `SkillCall`; may be used from the thread or process that the body runs in.
+        report: as in `SkillCall`; may be used from the thread or process that the body runs in. It waits while
+            `MOST_REPORTED` are on their way, and raises as `sleep`.
         seconds: real seconds that the body has at most.
         stopping: is set when the body shall stop; in a process never, since that is ended.
     """
@@ -99,11 +103,19 @@ async def in_process(
 
 def _blocking(call: SkillCall) -> BlockingCall:
     loop = asyncio.get_running_loop()
+    room = threading.BoundedSemaphore(MOST_REPORTED)
+
+    def take(outcome: Outcome) -> None:
+        room.release()
+        call.report(outcome)
 
     def report(outcome: Outcome) -> None:
-        loop.call_soon_threadsafe(call.report, outcome)
+        while not room.acquire(timeout=_POLL):
+            blocking.sleep()
+        loop.call_soon_threadsafe(take, outcome)
 
-    return BlockingCall(call.action_id, report, call.remaining)
+    blocking = BlockingCall(call.action_id, report, call.remaining)
+    return blocking
 
 
 async def _supervised(
@@ -123,10 +135,9 @@ async def _supervised(
     def run() -> None:
         try:
             outcome = work()
-        except StoppedError:
-            post(ended.set_exception, DeadlineError())
         except BaseException as error:  # noqa: BLE001  # e.g. SystemExit: it must not end in silence
-            post(ended.set_exception, error if isinstance(error, Exception) else RuntimeError(repr(error)))
+            stopped = issubclass(type(error), StoppedError) and blocking.stopping.is_set()
+            post(ended.set_exception, DeadlineError() if stopped else _carried_over(error))
         else:
             post(ended.set_result, outcome)
 
@@ -148,6 +159,14 @@ async def _supervised(
     finally:
         for watcher in tuple(watchers):
             watcher.cancel()
+
+
+def _carried_over(error: BaseException) -> Exception:
+    """What a thread raised, as a future takes it: no `StopIteration`, and nothing that would end the program."""
+    with suppress(BaseException):  # an exception may fail when it is asked for its class
+        if isinstance(error, Exception) and not isinstance(error, StopIteration | type):
+            return error
+    return RuntimeError(described(error))
 
 
 async def _until_stopped(ended: asyncio.Future[Outcome], stop: Callable[[], None]) -> Outcome:
@@ -226,8 +245,9 @@ def _child(
     call = BlockingCall(action_id, lambda outcome: theirs.send(("report", outcome)), seconds)
     try:
         theirs.send(("ended", body(call, **arguments)))
-    except (Exception, SystemExit) as error:  # noqa: BLE001  # whatever it is goes to the parent, in words
-        theirs.send(("error", f"{type(error).__name__}: {error}"))
+    except BaseException as error:  # noqa: BLE001  # whatever it is goes to the parent, in words
+        with suppress(OSError):  # the parent is gone
+            theirs.send(("error", described(error)))
 
 
 def _end_with_parent() -> None:

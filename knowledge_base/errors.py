@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import heapq
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -57,6 +57,50 @@ def shortened(text: str, longest: int = MAX_MESSAGE) -> str:
     """The text, without its middle if it is longer than that."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]} … {text[-half:]}"
+
+
+MAX_MEMBERS = 3
+"""Exceptions of a group that its description has; and so many groups inside each other."""
+_name_of = type.__dict__["__name__"].__get__  # a metaclass may say something else, or fail
+_members_of = BaseExceptionGroup.__dict__["exceptions"].__get__
+
+
+def type_name(value: object) -> str:
+    """The name of the value's type on one line, without asking the value or its metaclass."""
+    return printable(shortened(str.__str__(_name_of(type(value))), MAX_NAME))
+
+
+def described(error: BaseException, *, named: bool = True) -> str:
+    """The exception on one line of at most `MAX_MESSAGE` characters; a group with the first exceptions in it.
+
+    User code defines an exception's type, metaclass and text, and any of them may fail. This function does not.
+
+    Args:
+        error: the exception.
+        named: whether the name of its type stands before its text.
+    """
+    try:
+        return shortened(_described(error, MAX_MEMBERS, named=named))
+    except BaseException:  # noqa: BLE001  # e.g. RecursionError: the stack ends here
+        return "an exception that cannot be described"
+
+
+def _described(error: BaseException, depth: int, *, named: bool) -> str:
+    text = text_of(error, str)
+    if issubclass(type(error), BaseExceptionGroup) and depth:  # `isinstance` would ask the exception for its class
+        members = [_described(one, depth - 1, named=True) for one in _members_of(error)[:MAX_MEMBERS]]
+        text = f"{text}: {'; '.join(members)}"
+    said = [type_name(error)] if named or not text else []
+    return shortened(": ".join([*said, text] if text else said))
+
+
+def text_of(value: object, write: Callable[[object], str]) -> str:
+    """What `str` or `repr` says of the value, on one line; bounded, and words instead where it fails."""
+    try:
+        text = shortened(str.__str__(write(value)))
+        return shortened(printable(" ".join(text.split()) if write is str else text))
+    except BaseException as problem:  # noqa: BLE001  # user code may raise anything, `SystemExit` too
+        return f"(a text that cannot be made: {type_name(problem)})"
 
 
 @lru_cache(maxsize=4096)  # the many errors of one text have the same valid names

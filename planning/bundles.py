@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from dsc.components.component import Component
+from dsc.components.hooks import contained
 from dsc.model.plot import ActionPlot
 from dsc.text.plots import load_library
 from dsc.validation.components import addressed_by
-from knowledge_base.errors import InputError, Place, UnknownNameError
+from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.language.inputs import shown
 from knowledge_base.pddl.domain_text import DomainText
 from planning.domain import PlanningDomain
@@ -200,10 +201,11 @@ def domain_of(bundles: Collection[Bundle]) -> PlanningDomain:
 
 def _loaded(point: EntryPoint) -> Bundle:
     try:
-        found = point.load()
-        bundle = found() if callable(found) else found
+        with contained():
+            found = point.load()
+            bundle = found() if callable(found) else found
     except Exception as error:
-        raise InputError(f"the bundle '{point.name}' of {_of(point)} cannot be loaded: {error}") from error
+        raise InputError(f"the bundle '{point.name}' of {_of(point)} cannot be loaded: {described(error)}") from error
     if not isinstance(bundle, Bundle):
         raise InputError(f"the entry point '{point.name}' of {_of(point)} leads to {shown(bundle)}, which is no Bundle")
     return bundle

@@ -13,6 +13,8 @@ import threading
 import time
 from typing import TYPE_CHECKING, TypeVar
 
+from knowledge_base.errors import described
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -90,8 +92,8 @@ async def aside(work: Callable[[], T], patience: Patience | None = None) -> T:
     def run() -> None:
         try:
             done = work()
-        except Exception as error:  # noqa: BLE001  carried over to the one who waits
-            failure = error
+        except BaseException as error:  # noqa: BLE001  carried over to the one who waits
+            failure = error if isinstance(error, Exception) else RuntimeError(described(error))
             settle(lambda: result.set_exception(failure))
         else:
             settle(lambda: result.set_result(done))

@@ -11,13 +11,14 @@ from typing import Any, ClassVar, cast
 from dsc.calls import Ended, Outcome, SkillCall, Status
 from dsc.components.activations import Activations
 from dsc.components.declarations import check_declarations
+from dsc.components.hooks import contained
 from dsc.components.life import NEUTRAL, Life, LifeCycle
 from dsc.components.needs import ALWAYS
 from dsc.components.parameters import Parameter, changed, check_relations, known, require_bound, unsaid
 from dsc.components.streams import Push, Stream
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import UnknownNameError, described
 
 TAKES = "__dsc_takes__"
 """Where `takes` notes what it declares."""
@@ -228,9 +229,10 @@ class Component:
             return
         self._starting = True
         try:
-            await self.start()
+            with contained():
+                await self.start()
         except Exception as error:  # noqa: BLE001  # whatever it is, the component cannot work
-            became, reason = Life.FATAL_ERROR, f"{type(error).__name__}: {error}"
+            became, reason = Life.FATAL_ERROR, described(error)
         else:
             became, reason = Life.ALIVE, ""
         finally:
@@ -247,10 +249,11 @@ class Component:
         if others or not (active or again):
             return
         try:
-            await self.activate(active)
+            with contained():
+                await self.activate(active)
         except Exception as error:  # noqa: BLE001  # whatever it is, it has not what it needs
             if self.life.state is not Life.SHUTDOWN:
-                self.life.become(Life.FATAL_ERROR, f"{type(error).__name__}: {error}")
+                self.life.become(Life.FATAL_ERROR, described(error))
 
     @property
     def takes_part(self) -> bool:

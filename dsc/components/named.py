@@ -8,8 +8,9 @@ from importlib import import_module
 from pathlib import Path
 
 from dsc.components.component import Component
+from dsc.components.hooks import contained
 from dsc.components.roster import require_instances
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError, described
 from knowledge_base.language.inputs import shown
 
 
@@ -29,16 +30,18 @@ def robot_of(named: str) -> tuple[Component, ...]:
     if here not in sys.path:
         sys.path.insert(0, here)
     try:
-        module = import_module(module_name)
+        with contained():
+            module = import_module(module_name)
     except Exception as error:  # whatever somebody's module does wrong
-        raise InputError(f"the module '{module_name}' cannot be imported: {type(error).__name__}: {error}") from error
+        raise InputError(f"the module '{module_name}' cannot be imported: {described(error)}") from error
     if not hasattr(module, name):
         valid = [one for one in vars(module) if not one.startswith("_")]
         raise UnknownNameError(f"there is no '{name}' in the module '{module_name}'", found=name, valid=valid)
     found = getattr(module, name)
     try:
-        made = found() if callable(found) else found
+        with contained():
+            made = found() if callable(found) else found
     except Exception as error:
-        raise InputError(f"'{named}' gives no components: {type(error).__name__}: {error}") from error
+        raise InputError(f"'{named}' gives no components: {described(error)}") from error
     components = (made,) if isinstance(made, Component) or not isinstance(made, Iterable) else tuple(made)
     return require_instances(components)

@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 
 from dsc.calls import Outcome, SkillCall
 from dsc.components.component import TAKES
+from dsc.components.hooks import contained
 from dsc.skills import Declared, SkillBody, Skilled, require_names
 
 ANSWERED = "answered"
@@ -80,7 +81,8 @@ async def _activate(component: Skilled, body: SkillBody, call: SkillCall, argume
     def test(*values: Any) -> None:
         nonlocal held
         try:
-            found = body(*values, **arguments)
+            with contained():
+                found = body(*values, **arguments)
             if found is not None and not held:
                 call.report(Outcome(body.__name__, found))
             held = found is not None

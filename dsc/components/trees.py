@@ -24,6 +24,7 @@ from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Repeat, Retry
 
 from dsc.calls import Outcome, SkillCall
+from dsc.components.hooks import contained
 from dsc.skills import AfterCrash, Declared, SkillBody, Skilled, require_names
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
@@ -148,10 +149,8 @@ class _Action(Behaviour):
         self._task = asyncio.ensure_future(self._carry_out())
 
     async def _carry_out(self) -> Outcome:
-        try:
+        with contained():
             outcome = await self._begin()
-        except SystemExit as error:  # would end the program with the task
-            raise RuntimeError(f"SystemExit: {error}") from error
         if not isinstance(outcome, Outcome):
             raise InputError(f"the action '{self.name}' ended with {shown(outcome)}, which is no outcome")
         if outcome.observed:

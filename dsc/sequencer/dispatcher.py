@@ -11,13 +11,16 @@ import asyncio
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.activity import Activity
 from dsc.components.component import Component
+from dsc.components.hooks import contained, is_own
+from dsc.components.reports import Reports
 from dsc.components.roster import Roster, require_instances
 from dsc.components.stopping import GRACE, give_up
 from dsc.components.support import Support
@@ -44,7 +47,7 @@ from dsc.sequencer.telling import CLOSING, Telling, failure
 from dsc.sequencer.time_limit import TimeLimit
 from dsc.sequencer.timers import Timers
 from dsc.skills import Pattern
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError, described
 
 DEFAULT_WITHIN = 300.0
 """Seconds a skill may take if the trigger does not say: every wait has a bound."""
@@ -78,7 +81,6 @@ class Dispatcher:
         self.activity = Activity(self._roster, self._at_work)
         self._wiring = Wiring(self._components)
         self._given_up: list[str] = []
-        self._answered_for: set[str] = set()
         self._clock = clock
         self._post = post
         self._running: dict[str, _Running] = {}
@@ -191,9 +193,17 @@ class Dispatcher:
             self._forgetting.add(task)
             task.add_done_callback(self._forgetting.discard)
 
+    def report_taken(self, start: Start) -> None:
+        """A report of a skill has been taken, so that there is room for another."""
+        running = self._running.get(start.action_id)
+        if running is not None:
+            running.reports.taken()
+
     def dismiss(self, start: Start) -> None:
         """Stop a skill that has failed by what it reported: that was its answer, and whatever it says now is none."""
-        self._answered_for.add(start.action_id)
+        running = self._running.get(start.action_id)
+        if running is not None:
+            running.answered = True
         self.stop(start)
 
     def stop(self, start: Start) -> None:
@@ -202,6 +212,7 @@ class Dispatcher:
             return
         stopped = self._running.pop(start.action_id)
         stopped.limit.end()
+        assert stopped.task is not None  # noqa: S101
         stopped.task.cancel()
         self._endings.add(start.component, stopped.task, partial(self._not_stopped, start))
 
@@ -224,10 +235,10 @@ class Dispatcher:
         component, action_id = self.component(start.component), self._id(start)
         try:
             async with asyncio.timeout(CLOSING):
-                ended = await component.abandon(action_id, start.skill, encoded(start.arguments))
-        except (Exception, SystemExit) as error:  # whatever a component does wrong must not end the program
-            why = f"{type(error).__name__}: {error}"
-            raise InputError(f"{start.component}.{start.skill} may still go on: {why}") from error
+                with contained():
+                    ended = await component.abandon(action_id, start.skill, encoded(start.arguments))
+        except Exception as error:  # whatever a component does wrong must not end the program
+            raise InputError(f"{start.component}.{start.skill} may still go on: {described(error)}") from error
         if ended is not None:
             self._post(SkillMessage(start, declared(component, start, ended.outcome), final=True))
 
@@ -256,48 +267,57 @@ class Dispatcher:
     def _start(self, start: Start, earlier: Earlier | None = None) -> None:
         component = self.component(start.component)
         within = self._within(start)
-        limit = TimeLimit(partial(self._overdue, start, within))
-        work = self._execute(component, start, within, limit, earlier)
-        task = asyncio.get_running_loop().create_task(work)
-        self._running[start.action_id] = _Running(start, task, within, limit)
+        due = within + (self._clock.now() if earlier is None else earlier.began)
+        limit = TimeLimit(partial(self._overdue, start), self._clock, due)
+        running = _Running(start, within, limit, Reports(partial(self._report, start)))
+        running.task = asyncio.get_running_loop().create_task(self._execute(component, running, earlier))
+        running.task.add_done_callback(partial(self._over, running))
+        self._running[start.action_id] = running
         self.activity.look(start.component)
-        limit.begin(task, self._clock, within + (self._clock.now() if earlier is None else earlier.began))
+        limit.begin(running.task)
 
-    def _overdue(self, start: Start, within: float) -> None:
+    def _report(self, start: Start, report: Outcome, conflated: int) -> None:
+        failed = report.event == SKILL_ERROR
+        self._post(SkillMessage(start, report, final=failed, goes_on=failed, conflated=conflated))
+
+    def _overdue(self, start: Start) -> None:
         """It swallowed that its time is over; the chart need not wait for it."""
-        if start.action_id in self._running:
+        running = self._running.get(start.action_id)
+        if running is not None and not running.answered:
             self._not_stopped(start)
-            self._answered_for.add(start.action_id)
-            self._post(SkillMessage(start, late(start, within), final=True))
+            self._answer(running, late(start, running.within))
 
     def _not_stopped(self, start: Start) -> None:
         skill = f"{start.component}.{start.skill}"
         self._given_up.append(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
 
-    async def _execute(
-        self, component: Component, start: Start, within: float, limit: TimeLimit, earlier: Earlier | None
-    ) -> None:
-        try:
-            outcome = await self._outcome(component, start, within, limit, earlier)
-        finally:
-            limit.end()
-        if start.action_id in self._answered_for:
-            return
-        self._post(SkillMessage(start, outcome, final=True))
+    def _answer(self, running: _Running, outcome: Outcome) -> None:
+        """Post how a skill ended, once; until that has succeeded its time limit stands."""
+        if not running.answered:
+            running.reports.flush()
+            self._post(SkillMessage(running.start, outcome, final=True))
+            running.answered = True
+            running.limit.end()
 
-    async def _outcome(
-        self, component: Component, start: Start, within: float, limit: TimeLimit, earlier: Earlier | None
-    ) -> Outcome:
-        heard = 0
+    def _over(self, running: _Running, task: asyncio.Task[None]) -> None:
+        """The task of a skill has ended: without an answer the skill has failed, unless it was stopped."""
+        why = asyncio.CancelledError("its task was cancelled") if task.cancelled() else task.exception()
+        if why is not None and self._running.get(running.start.action_id) is running:
+            self._answer(running, broken(running.start, described(why)))
+
+    async def _execute(self, component: Component, running: _Running, earlier: Earlier | None) -> None:
+        outcome = await self._outcome(component, running, earlier)
+        self._answer(running, outcome)
+
+    async def _outcome(self, component: Component, running: _Running, earlier: Earlier | None) -> Outcome:
+        start, within, limit, heard = running.start, running.within, running.limit, 0
 
         def report(outcome: Outcome) -> None:
             nonlocal heard
             if heard:
                 heard -= 1
             elif start.action_id in self._running:
-                said = declared(component, start, outcome)
-                failed = said.event == SKILL_ERROR
-                self._post(SkillMessage(start, said, final=failed, goes_on=failed))
+                running.reports.put(declared(component, start, outcome))
 
         support = Support(self._roster, self.activity, component)
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
@@ -311,23 +331,14 @@ class Dispatcher:
                 if status is Status.RUNNING or not self._is_event(start):  # else it is activated anew
                     heard = earlier.reports
             work = component.execute(start.skill, call, encoded(start.arguments))
-            return declared(component, start, await support.carrying(work))
-        except asyncio.CancelledError:
-            if limit.has_cancelled():
-                return late(start, within, support.missing)
-            if _cancelled_from_outside():
+            outcome = declared(component, start, await support.carrying(work))
+        except BaseException as error:
+            failed = _failed(error, running, support)
+            if failed is None:
                 raise
-            return broken(start, "CancelledError: it cancelled itself")
-        except (KeyboardInterrupt, GeneratorExit):
-            raise
-        except BaseException as error:  # noqa: BLE001  # whatever a skill does wrong, `sys.exit` too, must not end the run
-            return self._raised(start, error, limit, within)
-
-    @staticmethod
-    def _raised(start: Start, error: BaseException, limit: TimeLimit, within: float) -> Outcome:
-        if limit.expired or isinstance(error, DeadlineError):
-            return late(start, within)
-        return broken(start, f"{type(error).__name__}: {error}")
+            return failed
+        # What it observed is so, however late it says so.
+        return replace(late(start, within), observed=outcome.observed) if limit.passed else outcome
 
     async def _ready(self, component: Component, start: Start, support: Support) -> None:
         """Wait until the skill can begin."""
@@ -343,20 +354,33 @@ class Dispatcher:
         self.timers.cancel(activation)
 
 
-class _Running(NamedTuple):
-    """A skill that is carried out, and the seconds that it may take."""
+@dataclass(slots=True)
+class _Running:
+    """A skill that is carried out, the seconds that it may take, and whether it has answered."""
 
     start: Start
-    task: asyncio.Task[None]
     within: float
     limit: TimeLimit
+    reports: Reports
+    answered: bool = False
+    task: asyncio.Task[None] | None = None
 
 
 async def _forgotten(component: Component, action_id: str) -> None:
-    with suppress(Exception):  # it is over: whatever goes wrong now must not end the run
+    with suppress(Exception), contained():  # it is over: whatever goes wrong now must not end the run
         await component.forget(action_id)
 
 
-def _cancelled_from_outside() -> bool:
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0
+def _failed(error: BaseException, running: _Running, support: Support) -> Outcome | None:
+    """How a skill ends that raised; `None` if others end its task."""
+    start, limit = running.start, running.limit
+    cancelled = issubclass(type(error), asyncio.CancelledError)
+    if cancelled and limit.has_cancelled():
+        return late(start, running.within, support.missing)
+    if not is_own(error, running.task):
+        return None
+    if cancelled:
+        return broken(start, "CancelledError: it cancelled itself")
+    if limit.passed or issubclass(type(error), DeadlineError):
+        return late(start, running.within)
+    return broken(start, described(error))

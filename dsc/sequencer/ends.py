@@ -8,10 +8,11 @@ from typing import Any
 
 from dsc.calls import OBSERVED, Outcome
 from dsc.components.component import Component
+from dsc.components.hooks import is_own, running_task
 from dsc.engine.steps import Start
 from dsc.events import NO_ATTRIBUTES, SKILL_ERROR, TIMED_OUT
 from dsc.sequencer.attributes import Declared, require_declared
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, described
 from knowledge_base.language.inputs import require_delta, shown
 
 
@@ -28,12 +29,19 @@ def declared(component: Component, start: Start, outcome: object) -> Outcome:
         return _sound(outcome, component.skills()[start.skill].outcomes)
     except InputError as error:
         return broken(start, str(error))
+    except BaseException as error:
+        if not is_own(error, running_task()):
+            raise
+        return broken(start, f"what it ended with cannot be read: {described(error)}")
 
 
 def _sound(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
     if not isinstance(outcome, Outcome):
-        raise InputError(f"it ended with {outcome!r}, which is no outcome")
+        raise InputError(f"it ended with {shown(outcome)}, which is no outcome")
     event, attributes = outcome.event, outcome.attributes
+    if not isinstance(event, str):
+        raise InputError(f"it ended with the event {shown(event)}, which is no text")
+    event = str.__str__(event)  # a subclass, e.g. an `Enum`, is compared in a way of its own
     declared = NO_ATTRIBUTES if event == OBSERVED else outcomes.get(event)
     if declared is None:
         raise InputError(f"it ended with '{event}', which it does not declare")
@@ -47,7 +55,7 @@ def _sound(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
     try:
         return Outcome(event, encoded(dict(attributes)), outcome.observed)
     except (TypeError, ValueError) as error:
-        raise InputError(f"the attributes of '{event}' are no plain data: {error}") from None
+        raise InputError(f"the attributes of '{event}' are no plain data: {described(error, named=False)}") from None
 
 
 def broken(start: Start, reason: str) -> Outcome:

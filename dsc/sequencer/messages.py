@@ -19,12 +19,14 @@ class SkillMessage:
         outcome: what it said.
         final: whether the skill has ended with it.
         goes_on: whether it has not, and only counts as ended: it has to be stopped.
+        conflated: how many older reports of the same event it stands for, see `dsc.components.reports`.
     """
 
     start: Start
     outcome: Outcome
     final: bool
     goes_on: bool = False
+    conflated: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.calls import OBSERVED
+from dsc.components.hooks import contained
 from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
@@ -19,7 +20,7 @@ from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, Param
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.tracing import StepTracer
 from dsc.trace import Trace
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, described
 from knowledge_base.facts import Delta
 from knowledge_base.language.world import World
 from knowledge_base.store import KnowledgeBase
@@ -123,8 +124,8 @@ class Reactor:
                 worlds.insert(0, after := self.knowledge.overlay())
                 after.apply(said.observed)
             require_things(said.event, said.attributes, declared, *worlds)
-        except InputError as error:
-            outcome = broken(message.start, str(error))
+        except Exception as error:  # noqa: BLE001  # what a skill hands over may be anything, e.g. not hashable
+            outcome = broken(message.start, described(error, named=not isinstance(error, InputError)))
             return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)
         return message
 
@@ -199,8 +200,10 @@ class Reactor:
 
     def _commit(self, step: Step) -> tuple[Output, ...]:
         """First what the chart told becomes knowledge, then actions may leave."""
-        for listener in self.listeners:
-            listener(step)
+        if self.listeners:
+            with contained():
+                for listener in self.listeners:
+                    listener(step)
         self.tracer.step(step)
         self.tracer.decisions(step)
         self._apply(step.knowledge, CHART)

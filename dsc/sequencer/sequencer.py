@@ -295,6 +295,8 @@ class Sequencer:
                 self.dispatcher.dismiss(message.start)
             else:
                 self.dispatcher.settle(message.start)
+        elif isinstance(message, SkillMessage):
+            self.dispatcher.report_taken(message.start)
         self._carry_out(output)
 
     def _react_and_keep(self, message: Message) -> tuple[Output, ...]:

@@ -8,10 +8,12 @@ from collections.abc import Awaitable, Callable, Collection, Iterable, Sequence
 from functools import partial
 
 from dsc.components.component import Component
+from dsc.components.hooks import contained
 from dsc.components.life import Life
 from dsc.components.stopping import GRACE
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
 from dsc.sequencer.ends import encoded
+from knowledge_base.errors import described
 
 CLOSING = GRACE
 """Seconds for components to take what they were last told, and for cancelled skills to stop."""
@@ -64,11 +66,10 @@ class Telling:
 
         async def taking() -> None:
             try:
-                await take()
-            except (Exception, SystemExit) as error:
+                with contained():
+                    await take()
+            except Exception:
                 self._refused.extend(numbers.values())
-                if isinstance(error, SystemExit):  # would end the program with the task
-                    raise RuntimeError(f"SystemExit: {error}") from error
                 raise
             finally:
                 for number in numbers:
@@ -141,5 +142,5 @@ def _succeeded(task: asyncio.Task[None]) -> bool:
 
 def _untaken(component: str, task: asyncio.Task[None]) -> str:
     why = failure(task) if task.done() else None
-    reason = f"{type(why).__name__}: {why}" if why is not None else f"no answer within {CLOSING:g} s"
+    reason = described(why) if why is not None else f"no answer within {CLOSING:g} s"
     return f"component '{component}' did not take what it was told: {reason}"

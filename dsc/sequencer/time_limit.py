@@ -15,23 +15,30 @@ class TimeLimit:
     """Bounds a task; `asyncio.timeout` and a bound for who swallows it, with one timer for both.
 
     Args:
-        say: called when nobody waits for the task any more, as it went on for `GRACE` seconds after it was cancelled.
-
-    Attributes:
-        expired: whether the time is over.
+        say: called when nobody waits for the task any more: it went on for `GRACE` seconds after it was cancelled, or
+            has ended and left its limit standing.
+        clock: tells the time.
+        due: second of run time at which the task is cancelled, unless it is `math.inf`.
     """
 
-    def __init__(self, say: Callable[[], None]) -> None:
-        self.expired = False
+    def __init__(self, say: Callable[[], None], clock: LoopClock, due: float) -> None:
+        self._expired = False
         self._say = say
+        self._clock = clock
+        self._due = due
         self._timer: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[Any] | None = None
 
-    def begin(self, task: asyncio.Task[Any], clock: LoopClock, due: float) -> None:
-        """Cancel the task at that second of run time, unless it is `math.inf`."""
+    @property
+    def passed(self) -> bool:
+        """Whether the time is over, maybe unnoticed as the task kept its loop from turning (never if simulated)."""
+        return self._expired or (self._clock.now() > self._due and not self._clock.simulated)
+
+    def begin(self, task: asyncio.Task[Any]) -> None:
+        """Cancel the task when it is due."""
         self._task = task
-        if math.isfinite(due):
-            self._timer = clock.call_at(due, self._expire)
+        if math.isfinite(self._due):
+            self._timer = self._clock.call_at(self._due, self._expire)
 
     def end(self) -> None:
         """The task is over, or somebody else sees to its end."""
@@ -41,11 +48,14 @@ class TimeLimit:
     def has_cancelled(self) -> bool:
         """Whether the limit has cancelled the task, and nobody else has; the task itself asks, once."""
         assert self._task is not None  # noqa: S101
-        return self.expired and self._task.uncancel() <= 0
+        return self._expired and self._task.uncancel() <= 0
 
     def _expire(self) -> None:
         assert self._task is not None  # noqa: S101
-        self.expired = True
+        self._expired = True
+        if self._task.done():
+            self._say()
+            return
         self._task.cancel()
         self._timer = asyncio.get_running_loop().call_later(GRACE, self._overdue)
 

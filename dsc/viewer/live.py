@@ -15,7 +15,7 @@ from threading import Thread
 from typing import IO, TYPE_CHECKING, Any
 
 from dsc.viewer.control import Control
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, described
 
 if TYPE_CHECKING:
     from dsc.trace import Record
@@ -142,4 +142,4 @@ class LivePage:
         if error is None:
             self._tell({"answer": number, "said": done.result()})
         else:
-            self._tell({"answer": number, "wrong": str(error) if isinstance(error, InputError) else repr(error)})
+            self._tell({"answer": number, "wrong": described(error, named=not isinstance(error, InputError))})

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 
+from knowledge_base.errors import described
 from knowledge_base.facts import Change
 from knowledge_base.world.turn import Turn
 
@@ -80,6 +81,8 @@ class Announcer:
                     call()
                 except Exception as error:  # noqa: BLE001  one listener must not silence the others
                     errors.append(error)
+                except (SystemExit, GeneratorExit) as error:  # neither may end the program
+                    errors.append(RuntimeError(described(error)))
         except BaseException:  # an interrupt must not leave the queue without anyone to empty it
             if self._deliverer is me:
                 self._deliverer = None

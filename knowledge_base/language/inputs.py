@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError, type_name
 from knowledge_base.facts import VALUE_TYPES, Delta, Fact, Value
 from knowledge_base.language.expression import Expression, free_variables
 
@@ -15,9 +15,11 @@ _NO_CHANGE = Delta()
 def shown(value: object) -> str:
     """The value as a message says it, whatever it is."""
     try:
-        return repr(value)
+        return str.__str__(repr(value))
     except ValueError:  # Python writes no number of that many digits
-        return "a number of thousands of digits"
+        return "a number of thousands of digits" if isinstance(value, int) else f"an object of type {type_name(value)}"
+    except BaseException:  # noqa: BLE001  # user code may raise anything, `SystemExit` too
+        return f"an object of type {type_name(value)}"
 
 
 def require(value: object, kinds: type | tuple[type, ...], wanted: str) -> None:

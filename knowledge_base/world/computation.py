@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, Generic, ParamSpec
 
-from knowledge_base.errors import InputError, Place, SchemaError
+from knowledge_base.errors import InputError, Place, SchemaError, described, text_of
 from knowledge_base.language.expression import Arithmetic, Atom, Call, Term, TypedVariable, Variable, free_variables
 from knowledge_base.language.parser import parse_term
 from knowledge_base.language.printer import to_text
@@ -81,10 +81,10 @@ class Computed(Generic[_Inputs]):
         function: Callable[..., object] = self.function
         try:
             truth = function(*values)
-        except Exception as error:
-            raise InputError(f"{type(error).__name__}: {error}") from error
-        if not isinstance(truth, bool):
-            raise InputError(f"true or false is expected, and its function gave {truth!r}")
+        except (Exception, SystemExit, GeneratorExit) as error:  # none of them may end the program
+            raise InputError(described(error)) from error
+        if type(truth) is not bool:
+            raise InputError(f"true or false is expected, and its function gave {text_of(truth, repr)}")
         return truth
 
 

@@ -12,6 +12,7 @@ from contextlib import aclosing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from knowledge_base.errors import described
 from planning.engines.planner import PlannerProcess
 from planning.engines.registry import chosen, nobody
 from planning.plan import EngineFailed, NobodyCan, NoneFound, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
@@ -146,7 +147,7 @@ async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answer
             async for outcome in plans:
                 answers.put_nowait((planner.engine, outcome))
     except Exception as error:  # noqa: BLE001  whatever one engine's planner does, the other goes on
-        answers.put_nowait((planner.engine, EngineFailed(planner.engine, f"{type(error).__name__}: {error}")))
+        answers.put_nowait((planner.engine, EngineFailed(planner.engine, described(error))))
     finally:
         answers.put_nowait((planner.engine, None))
 

@@ -202,7 +202,9 @@ def _answer(line: bytes, search: Search, said: int) -> None:
     except MemoryError:
         _say(said, {"failed": "it ran out of memory"})
     except Exception as error:  # noqa: BLE001  an engine may raise anything
-        _say(said, {"failed": f"{type(error).__name__}: {error}"})
+        from knowledge_base.errors import described  # noqa: PLC0415  a search that goes well does without
+
+        _say(said, {"failed": described(error)})
 
 
 if __name__ == "__main__":

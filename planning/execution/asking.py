@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from knowledge_base.errors import described, text_of
 from planning.engines.improving import Improving
 from planning.execution.bounds import LateError, bounded
 from planning.execution.improvements import Improvements
@@ -67,5 +68,7 @@ class Asking:
                 return TimedOut(engine, seconds)
             return EngineFailed(engine, "no answer in time, and it goes on although it was told to stop")
         except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
-            return EngineFailed(engine, f"{type(error).__name__}: {error}")
-        return answer if isinstance(answer, PlanningOutcome) else EngineFailed(engine, f"no answer: {answer!r:.80}")
+            return EngineFailed(engine, described(error))
+        if isinstance(answer, PlanningOutcome):
+            return answer
+        return EngineFailed(engine, f"no answer: {text_of(answer, repr):.80}")

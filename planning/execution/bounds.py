@@ -8,6 +8,8 @@ import math
 import threading
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from dsc.components.hooks import contained
+
 if TYPE_CHECKING:
     from collections.abc import Awaitable
 
@@ -40,7 +42,7 @@ async def bounded(work: Awaitable[_Result], seconds: float, name: str) -> _Resul
     Raises:
         LateError: there is nothing.
     """
-    task = asyncio.ensure_future(work)
+    task = asyncio.ensure_future(_contained(work))
     try:
         in_time = await _ends(task, seconds)
     except asyncio.CancelledError:
@@ -53,6 +55,11 @@ async def bounded(work: Awaitable[_Result], seconds: float, name: str) -> _Resul
             raise RuntimeError("it has cancelled itself")
         raise LateError(obeyed=True)
     return task.result()
+
+
+async def _contained(work: Awaitable[_Result]) -> _Result:
+    with contained():
+        return await work
 
 
 async def _ends(task: asyncio.Future[Any], seconds: float) -> bool:

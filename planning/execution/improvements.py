@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Self
 
+from knowledge_base.errors import described
 from planning.execution import bounds
 
 if TYPE_CHECKING:
@@ -38,4 +39,4 @@ class Improvements:
         except bounds.LateError:  # it has been blamed if it did not obey
             return
         except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
-            bounds.blame(self._name, f"it cannot be closed: {type(error).__name__}: {error}")
+            bounds.blame(self._name, f"it cannot be closed: {described(error)}")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from dsc.calls import Outcome
 from dsc.sequencer.taking_up import PastClock
+from knowledge_base.errors import described
 from knowledge_base.language.printer import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.execution.course import Course, cost_of, shortest_end
@@ -205,7 +206,7 @@ class _Watch:
             if isinstance(found, Found):
                 await found.close()
         except Exception as error:  # noqa: BLE001  whatever goes wrong beside a plan must not leave it unwatched
-            found = NotFound("failed", f"{type(error).__name__}: {error}")
+            found = NotFound("failed", described(error))
         self._put(found)
 
     async def _improve(self, better: Improvements) -> None:

@@ -69,6 +69,11 @@ class Worker(Arm):
                 self.note("no")
 
 
+class BrokenText(blocking.StoppedError):
+    def __str__(self):
+        raise ValueError("no text")
+
+
 class Far(Component):
     """Skills in processes of their own: must be importable there, hence no Arm."""
 
@@ -86,6 +91,10 @@ class Far(Component):
     @skill(outcomes={"ok": {}}, blocking="process")
     def exits(self, call):
         sys.exit("no driver")
+
+    @skill(outcomes={"ok": {}}, blocking="process")
+    def stops(self, call):
+        raise BrokenText
 
     @skill(outcomes={"ok": {}}, blocking="process")
     def dies(self, call):
@@ -184,7 +193,7 @@ def test_a_blocking_skill_runs_in_a_process_and_reports():
     assert reports == [Outcome("begun", {"n": 3})]
 
 
-@pytest.mark.parametrize(("name", "why"), [("raises", "RuntimeError: the bus is stuck"), ("dies", "exit code 7"), ("exits", "SystemExit: no driver")])
+@pytest.mark.parametrize(("name", "why"), [("raises", "RuntimeError: the bus is stuck"), ("dies", "exit code 7"), ("exits", "SystemExit: no driver"), ("stops", "BrokenText")])
 def test_what_goes_wrong_in_a_process_is_told(name, why):
     with pytest.raises(RuntimeError, match=why):
         execute(Far(), name)

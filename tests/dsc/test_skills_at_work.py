@@ -447,16 +447,6 @@ def test_a_component_that_exits_while_it_is_configured_fails_the_skill_that_need
     assert event["attributes"]["reason"] == "arm.grasp: RuntimeError: SystemExit: no driver"
 
 
-def test_ctrl_c_goes_through_whoever_runs_then():
-    class Interrupted(Arm):
-        @skill(outcomes={"ok": {}})
-        async def go(self, call):
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        Ran(BREAKS.replace("arm.breaks, with: {how: HOW}", "arm.go"), arm=Interrupted())
-
-
 def test_a_component_that_is_for_ever_being_configured_is_timed_out():
     ran = Ran(
         """

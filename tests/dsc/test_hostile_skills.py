@@ -1,0 +1,391 @@
+"""Each end of a skill's task is one answer, however hostile its body; and no hook of a component ends the program."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+import time
+
+import pytest
+from dsc_charts import plot
+from dsc_runs import SCHEMA, Ran
+
+from dsc.blocking import StoppedError
+from dsc.calls import Outcome
+from dsc.components.component import Component
+from dsc.components.ports import takes
+from dsc.components.trees import action, condition, sequence, tree_skill
+from dsc.dynamic.library import Library
+from dsc.sequencer import dispatcher, ends
+from dsc.sequencer.clock import LoopClock, run_real, run_simulated
+from dsc.sequencer.plot_skill import PlotComponent
+from dsc.sequencer.sequencer import Sequencer
+from dsc.skills import skill
+from knowledge_base.facts import Delta, fact
+from knowledge_base.store import KnowledgeBase
+
+ANSWERS = """
+    plot: p
+    variables: {why: text}
+    emits: {because: {why: text}, late: {}}
+    states:
+      a:
+        entry: {trigger: arm.SKILL, within: 100}
+        on: {ok: e, skill_error: {to: f, assign: {why: ?event.reason}}, timed_out: l}
+      e: {final: true}
+      f: {final: true, emit: because, with: {why: ?why}}
+      l: {final: true, emit: late}
+"""
+
+
+class NoTextError(Exception):
+    def __str__(self):
+        raise ValueError("no text")
+
+    __repr__ = __str__
+
+
+class Meta(type):
+    @property
+    def __name__(cls):
+        raise RuntimeError("no name")
+
+
+class Nameless(BaseException, metaclass=Meta):
+    @property
+    def __class__(self):
+        raise RuntimeError("no class")
+
+
+class Garbage:  # noqa: PLW1641  # it has a hash that fails
+    @property
+    def __class__(self):
+        raise RuntimeError("no class")
+
+    def __eq__(self, other):
+        raise RuntimeError("no equality")
+
+    __hash__ = __repr__ = __bool__ = __str__ = __eq__
+
+
+class Unequal(str):
+    def __eq__(self, other):
+        raise RuntimeError("no equality")
+
+    def __hash__(self):
+        raise RuntimeError("no hash")
+
+
+RAISED = {
+    "no text": NoTextError,
+    "no name": Nameless,
+    "exit": lambda: SystemExit("the driver"),
+    "closes": GeneratorExit,
+    "interrupts": KeyboardInterrupt,
+    "stops": StopIteration,
+    "stops asynchronously": StopAsyncIteration,
+    "stopped": StoppedError,
+    "base": lambda: BaseException("so"),
+    "group": lambda: BaseExceptionGroup("g", [NoTextError(), SystemExit(3)]),
+    "surrogates": lambda: RuntimeError("\ud800\x1b[31m" * 10_000),
+}
+RETURNED = {
+    "garbage": Garbage,
+    "garbage as event": lambda: Outcome(Garbage()),
+    "odd event": lambda: Outcome(Unequal("ok"), {Unequal("a"): 1}),
+    "event of no text": lambda: Outcome(["ok"]),
+    "garbage as attributes": lambda: Outcome("ok", Garbage()),
+    "garbage as value": lambda: Outcome("ok", {"a": Garbage()}),
+    "garbage as observation": lambda: Outcome("ok", observed=Garbage()),
+    "garbage observed": lambda: Outcome("ok", observed=Delta(added=(fact("p", Garbage()),))),
+    "unhashable observed": lambda: Outcome("ok", observed=Delta(added=(fact("p", []),))),
+    "nothing": lambda: None,
+}
+
+
+class Hostile(Component):
+    """Does what it is made for, in a coroutine, a thread, a behaviour tree, or while it is told something."""
+
+    name = "arm"
+
+    def __init__(self, does):
+        super().__init__()
+        self.does = does
+
+    @skill(outcomes={"ok": {}})
+    async def awaited(self, call):
+        return self.does()
+
+    @skill(outcomes={"ok": {}})
+    async def later(self, call):
+        await call.clock.sleep(1)
+        return self.does()
+
+    @skill(outcomes={"ok": {}}, blocking="thread")
+    def in_thread(self, call):
+        return self.does()
+
+    @skill(outcomes={"ok": {}})
+    async def while_cancelled(self, call):
+        try:
+            await call.clock.sleep(1000)
+        except asyncio.CancelledError:
+            return self.does()
+
+    @tree_skill(success="ok", failure="no", outcomes={"ok": {}, "no": {}})
+    def tree(self, call):
+        async def act():
+            return self.does()
+
+        return sequence(action("act", act, {"ok"}))
+
+    @tree_skill(success="ok", failure="no", outcomes={"ok": {}, "no": {}})
+    def tests(self, call):
+        return sequence(condition("test", self.does))
+
+    @skill(outcomes={"ok": {}})
+    async def goes(self, call):
+        return Outcome("ok")
+
+    @skill(outcomes={"ok": {}})
+    async def reports(self, call):
+        call.report(self.does())
+        await call.clock.sleep(1)
+        return Outcome("ok")
+
+    @skill(outcomes={"ok": {}}, blocking="thread")
+    def reports_from_thread(self, call):
+        call.report(self.does())
+        return Outcome("ok")
+
+    @takes
+    async def told(self):
+        self.does()
+
+
+def raising(make):
+    def does():
+        raise make()
+
+    return does
+
+
+def answers(ran):
+    return [event for event in ran.of_type("event") if event["name"] in {"ok", "skill_error", "timed_out"}]
+
+
+@pytest.mark.parametrize("where", ["awaited", "later", "in_thread", "tree", "tests"])
+@pytest.mark.parametrize("kind", RAISED)
+def test_whatever_ends_a_skill_is_one_skill_error(kind, where):
+    ran = Ran(ANSWERS.replace("SKILL", where), arm=Hostile(raising(RAISED[kind])))
+    (event,) = answers(ran)
+    assert event["name"] == "skill_error"
+    assert event["attributes"]["reason"].isprintable()
+    assert len(event["attributes"]["reason"]) < 500
+    assert ran.at < 2
+
+
+@pytest.mark.parametrize("where", ["awaited", "in_thread", "reports", "reports_from_thread"])
+@pytest.mark.parametrize("kind", RETURNED)
+def test_whatever_a_skill_says_that_cannot_be_is_one_skill_error(kind, where):
+    ran = Ran(ANSWERS.replace("SKILL", where), arm=Hostile(RETURNED[kind]))
+    (event,) = answers(ran)
+    assert event["name"] == ("ok" if kind == "odd event" and event["name"] == "ok" else "skill_error")
+    assert ran.at < 2
+
+
+@pytest.mark.parametrize("kind", RAISED)
+def test_what_cannot_be_said_while_it_is_told_something_fails_the_next_skill(kind):
+    text = ANSWERS.replace("{trigger: arm.SKILL, within: 100}", "[{send: arm.told}, {trigger: arm.goes, within: 100}]")
+    ran = Ran(text, arm=Hostile(raising(RAISED[kind])))
+    assert [event["name"] for event in answers(ran)] == ["skill_error"]
+
+
+@pytest.mark.parametrize("kind", RAISED)
+def test_what_is_raised_at_the_time_limit_is_timed_out(kind):
+    ran = Ran(ANSWERS.replace("SKILL", "while_cancelled"), arm=Hostile(raising(RAISED[kind])))
+    assert [event["name"] for event in answers(ran)] == ["timed_out"]
+    assert ran.at == 100
+
+
+def test_an_answer_after_the_time_limit_is_none_but_what_it_observed_is_known():
+    seen = Outcome("ok", observed=Delta(added=(fact("p"),)))
+    ran = Ran(ANSWERS.replace("SKILL", "while_cancelled"), arm=Hostile(lambda: seen))
+    assert [event["name"] for event in answers(ran)] == ["timed_out"]
+    assert ran.kb.ask("(p)")
+
+
+def test_a_task_that_others_cancel_is_a_skill_error():
+    def cancel_all():
+        for task in asyncio.all_tasks():
+            if "_execute" in repr(task):
+                task.cancel()
+        return Outcome("ok")
+
+    def cancel_soon(sequencer):
+        sequencer.listen(lambda _: asyncio.get_running_loop().call_soon(cancel_all))
+
+    class Cancels(Hostile):
+        @skill(outcomes={"ok": {}})
+        async def itself(self, call):
+            asyncio.current_task().cancel()
+            await call.clock.sleep(1)
+            return Outcome("ok")
+
+    for where in ("itself", "goes"):
+        arm = Cancels(cancel_all)
+        ran = Ran(ANSWERS.replace("SKILL", where), arm=arm, prepare=cancel_soon if where == "goes" else None)
+        (event,) = answers(ran)
+        assert event["name"] == "skill_error"
+        assert "cancelled" in event["attributes"]["reason"]
+
+
+@pytest.mark.parametrize("broken_part", ["declared", "broken"])
+def test_the_time_limit_holds_even_if_the_handler_of_ends_fails(broken_part, monkeypatch):
+    def fails(*_):
+        raise RuntimeError("a fault of our own")
+
+    for module in (dispatcher, ends):
+        monkeypatch.setattr(module, broken_part, fails)
+    ran = Ran(ANSWERS.replace("SKILL", "awaited"), arm=Hostile(raising(NoTextError) if broken_part == "broken" else lambda: Outcome("ok")))
+    (event,) = answers(ran)
+    assert event["name"] == ("timed_out" if broken_part == "broken" else "skill_error")
+    assert ran.at == (100 if broken_part == "broken" else 0)
+
+
+@pytest.mark.parametrize("presses", [1, 2])
+def test_ctrl_c_ends_the_program(presses):
+    def press():
+        for _ in range(presses):
+            signal.raise_signal(signal.SIGINT)
+        return Outcome("ok")
+
+    with pytest.raises(KeyboardInterrupt):
+        Ran(ANSWERS.replace("SKILL", "later"), arm=Hostile(press))
+
+
+def test_ctrl_c_ends_a_program_whose_loop_has_no_handler_of_its_own():
+    async def main():
+        clock = LoopClock()
+        library = Library([plot(ANSWERS.replace("SKILL", "awaited"))])
+        arm = Hostile(lambda: signal.raise_signal(signal.SIGINT))
+        await Sequencer(library, KnowledgeBase(SCHEMA), [arm], clock).run("p")
+
+    loop = asyncio.new_event_loop()
+    running = loop.create_task(main())
+    with pytest.raises(KeyboardInterrupt):
+        loop.run_until_complete(running)
+    running.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        loop.run_until_complete(running)
+    loop.close()
+
+
+@pytest.mark.parametrize("kind", RAISED)
+def test_a_plot_as_a_skill_says_what_failed_in_it(kind):
+    inner = plot("{plot: inner, states: {a: {entry: {trigger: arm.awaited}, on: {ok: e}}, e: {final: true}}}")
+    outer = PlotComponent("arm", Library([inner]), [Hostile(raising(RAISED[kind]))])
+    ran = Ran(ANSWERS.replace("arm.SKILL", "arm.inner").replace("ok: e", "completed: e"), arm=outer)
+    (event,) = answers(ran)
+    assert event["name"] == "skill_error"
+    assert "arm.awaited" in event["attributes"]["reason"]
+
+
+# -- hooks -------------------------------------------------------------------------------------------------
+
+EXITS = {kind: RAISED[kind] for kind in ("no text", "no name", "exit", "closes", "interrupts", "base")} | {
+    "cancels itself": asyncio.CancelledError,
+}
+USES = """
+    plot: p
+    states:
+      a:
+        entry: [{set: arm.speed, to: 1}, {trigger: arm.goes, within: 100}]
+        exit: {switch: arm, to: shutdown}
+        on: {ok: e, skill_error: f, timed_out: f}
+      e: {final: true}
+      f: {final: true}
+"""
+
+
+class Hooked(Hostile):
+    """A component one of whose hooks raises."""
+
+    def __init__(self, hook, make):
+        super().__init__(lambda: None)
+        self.hook = hook
+        self.make = make
+        self.called = []
+
+    def run(self, hook):
+        self.called.append(hook)
+        if hook == self.hook:
+            raise self.make()
+
+    async def start(self):
+        self.run("start")
+
+    async def stop(self):
+        self.run("stop")
+
+    async def activate(self, active):
+        self.run("activate" if active else "deactivate")
+
+    async def configure(self, parameter, value):
+        self.run("configure")
+
+    async def forget(self, action_id):
+        self.run("forget")
+
+
+@pytest.mark.parametrize("kind", EXITS)
+@pytest.mark.parametrize("hook", ["start", "stop", "activate", "deactivate", "configure", "forget"])
+def test_a_hook_that_exits_fails_and_the_run_goes_on(hook, kind):
+    arm = Hooked(hook, EXITS[kind])
+    ran = Ran(USES, arm=arm)
+    assert hook in arm.called
+    assert ran.end.finished
+    failed = [event["name"] for event in ran.of_type("event")]
+    assert failed == (["skill_error"] if hook in {"start", "activate", "configure"} else ["ok"])
+    assert ("did not take" in (ran.end.problem or "")) == (hook == "stop")
+
+
+@pytest.mark.parametrize("where", ["listener", "subscriber"])
+def test_an_observer_that_exits_fails_in_its_own_name(where):
+    def exits(_):
+        sys.exit("the window")
+
+    def prepare(sequencer):
+        if where == "listener":
+            sequencer.listen(exits)
+        else:
+            sequencer.knowledge.subscribe(exits)
+
+    arm = Hostile(lambda: Outcome("ok", observed=Delta(added=(fact("p"),))))
+    with pytest.raises((RuntimeError, ExceptionGroup)) as failed:
+        Ran(ANSWERS.replace("SKILL", "awaited"), arm=arm, prepare=prepare)
+    assert "the window" in repr(failed.value)
+
+
+# -- late --------------------------------------------------------------------------------------------------
+
+SHORT = ANSWERS.replace("within: 100", "within: 0.02")
+
+
+@pytest.mark.parametrize(("run", "ends"), [(run_real, "timed_out"), (run_simulated, "ok")])
+def test_a_skill_that_blocked_the_loop_past_its_limit_has_timed_out_in_real_time(run, ends):
+    def blocks():
+        time.sleep(0.05)
+        return Outcome("ok")
+
+    heard = []
+
+    async def main():
+        clock = LoopClock()
+        sequencer = Sequencer(Library([plot(SHORT.replace("SKILL", "awaited"))]), KnowledgeBase(SCHEMA), [Hostile(blocks)], clock)
+        sequencer.listen(lambda step: heard.extend(micro.event.name for micro in step.microsteps if micro.event))
+        await sequencer.run("p")
+
+    run(main())
+    assert heard == [ends]
