@@ -3,6 +3,10 @@
 A call is sent again until it is answered, and whoever carries it out remembers its answer until the caller has it. So
 every pattern that wants an answer (query, param, state, send, event) survives loss, doubles and reordering; what
 cannot be helped is that nobody answers in time. Pushes are sent once; one that was overtaken is dropped.
+
+Any bytes may arrive. A frame that is none of ours, or that there is no room for, is dropped and counted; a caller
+sends its frame again. A peer keeps its place until it has been silent for `REMEMBERED` seconds, so that a flood from
+new addresses makes nothing be carried out twice.
 """
 
 from __future__ import annotations
@@ -10,12 +14,14 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from dsc.components.hooks import contained
 from dsc.components.transport import EVERYBODY, Transport
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, described, text_of
 
 Answers = Callable[[str, Any], Awaitable[Any]]
 """What answers a call: is given the sender's address and the body."""
@@ -25,6 +31,12 @@ WITHIN = 5.0
 """Seconds for a call if nobody says otherwise."""
 AGAIN = 0.2
 """Seconds after which an unanswered call is sent again."""
+MOST_PEERS = 1_000
+"""Lives of senders of which anything is known."""
+REMEMBERED = 60.0
+"""Seconds of silence after which a sender may be forgotten if there are `MOST_PEERS`."""
+MOST_CALLS = 1_000
+"""Calls of one sender that are being carried out, or whose answer it may still ask for."""
 
 
 class NoAnswerError(Exception):
@@ -40,7 +52,7 @@ def encoded(value: Any) -> bytes:
     try:
         return json.dumps(value, separators=(",", ":"), allow_nan=False).encode()
     except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"only plain data can be sent: {error}") from None
+        raise InputError(f"only plain data can be sent: {described(error, named=False)}") from None
 
 
 @dataclass(slots=True)
@@ -50,6 +62,12 @@ class _Peer:
     answers: dict[int, bytes | None] = field(default_factory=dict)
     newest: dict[str, int] = field(default_factory=dict)
     forgotten: int = 0
+    at: float = 0.0
+
+    @property
+    def at_work(self) -> bool:
+        """Whether a call of it is being carried out."""
+        return None in self.answers.values()
 
 
 class Endpoint:
@@ -58,6 +76,7 @@ class Endpoint:
     Attributes:
         address: how others reach it.
         life: tells it from an earlier one at the address.
+        dropped: how many frames were dropped, by reason.
 
     Args:
         address: how others reach it.
@@ -72,7 +91,9 @@ class Endpoint:
         self._answering: dict[str, Answers] = {}
         self._hearing: dict[str, Hears] = {}
         self._asked: dict[int, asyncio.Future[Any]] = {}
-        self._peers: dict[str, dict[str, _Peer]] = {}  # by address and life; the last life is the present one
+        self._peers: dict[tuple[str, str], _Peer] = {}  # by address and life
+        self._lives: dict[str, str] = {}  # the present life of each address
+        self.dropped: Counter[str] = Counter()
         self._last = 0
         self._working: set[asyncio.Task[None]] = set()
         transport.attach(address, self._receive)
@@ -88,9 +109,8 @@ class Endpoint:
     def deafen(self, kind: str) -> None:
         """Hear pushes of that kind no more."""
         self._hearing.pop(kind, None)
-        for lives in self._peers.values():
-            for peer in lives.values():
-                peer.newest.pop(kind, None)
+        for peer in self._peers.values():
+            peer.newest.pop(kind, None)
 
     async def call(self, to: str, kind: str, body: Any = None, within: float = WITHIN) -> Any:
         """Ask the address, and wait for its answer.
@@ -140,23 +160,48 @@ class Endpoint:
         self._transport.send(self.address, to, encoded(frame))
 
     def _receive(self, sender: str, frame: bytes) -> None:
-        said = json.loads(frame)
-        if said["what"] == "call":
-            self._carry_out(sender, said)
-        elif said["what"] == "push":
-            self._heard(sender, said)
-        elif said["life"] == self.life:
-            self._answered(said)
+        said = _frame(frame)
+        if said is None:
+            self.dropped["no frame"] += 1
+        elif said["what"] in {"answer", "refusal"}:
+            if said["life"] == self.life:
+                self._answered(said)
+        elif (peer := self._peer(sender, said["life"])) is None:
+            self.dropped["too many peers"] += 1
+        elif said["what"] == "call":
+            self._carry_out(sender, peer, said)
+        else:
+            self._heard(sender, peer, said)
 
-    def _peer(self, sender: str, said: Mapping[str, Any]) -> _Peer:
-        return self._peers.setdefault(sender, {}).setdefault(said["life"], _Peer())
+    def _peer(self, sender: str, life: str) -> _Peer | None:
+        """What is known of the sender; `None` if it is new and there is no room."""
+        now, peer = asyncio.get_running_loop().time(), self._peers.get((sender, life))
+        if peer is None:
+            if len(self._peers) >= MOST_PEERS and not self._forget_silent(now):
+                return None
+            peer = self._peers[sender, life] = _Peer()
+            self._lives[sender] = life
+        peer.at = now
+        return peer
 
-    def _heard(self, sender: str, said: Mapping[str, Any]) -> None:
-        newest = self._peer(sender, said).newest
-        present = next(reversed(self._peers[sender])) == said["life"]
-        if present and said["kind"] in self._hearing and said["n"] > newest.get(said["kind"], 0):
-            newest[said["kind"]] = said["n"]
-            self._hearing[said["kind"]](sender, said["body"])
+    def _forget_silent(self, now: float) -> bool:
+        """Forget who has been silent for long; whether that was anybody."""
+        silent = [key for key, peer in self._peers.items() if now - peer.at > REMEMBERED and not peer.at_work]
+        for address, life in silent:
+            del self._peers[address, life]
+            if self._lives.get(address) == life:
+                del self._lives[address]
+        return bool(silent)
+
+    def _heard(self, sender: str, peer: _Peer, said: Mapping[str, Any]) -> None:
+        kind, number = said["kind"], said["n"]
+        if kind in self._hearing and self._lives.get(sender) == said["life"] and number > peer.newest.get(kind, 0):
+            peer.newest[kind] = number
+            try:
+                with contained():
+                    self._hearing[kind](sender, said["body"])
+            except Exception:  # noqa: BLE001  # whatever was pushed, the others are heard
+                self.dropped[f"push '{kind}' that nobody could take"] += 1
 
     def _answered(self, said: Mapping[str, Any]) -> None:
         waiting = self._asked.get(said["n"])
@@ -165,10 +210,10 @@ class Endpoint:
         if said["what"] == "answer":
             waiting.set_result(said["body"])
         else:
-            waiting.set_exception(RefusedError(said["body"]))
+            waiting.set_exception(RefusedError(text_of(said["body"], str)))
 
-    def _carry_out(self, sender: str, said: Mapping[str, Any]) -> None:
-        peer, number = self._peer(sender, said), said["n"]
+    def _carry_out(self, sender: str, peer: _Peer, said: Mapping[str, Any]) -> None:
+        number = said["n"]
         if said["low"] > peer.forgotten:
             peer.forgotten = said["low"]
             peer.answers = {n: answer for n, answer in peer.answers.items() if n >= peer.forgotten}
@@ -178,6 +223,9 @@ class Endpoint:
             again = peer.answers[number]
             if again is not None:
                 self._transport.send(self.address, sender, again)
+            return
+        if len(peer.answers) >= MOST_CALLS:
+            self.dropped["too many calls"] += 1
             return
         peer.answers[number] = None
         task = asyncio.get_running_loop().create_task(self._work(sender, peer, said))
@@ -196,10 +244,31 @@ class Endpoint:
         if answers is None:
             return "refusal", f"'{self.address}' does not answer '{said['kind']}'"
         try:
-            body = await answers(sender, said["body"])
+            with contained():
+                body = await answers(sender, said["body"])
             encoded(body)
-        except InputError as error:
-            return "refusal", str(error)
         except Exception as error:  # noqa: BLE001  # whatever it is, the caller is told
-            return "refusal", f"{type(error).__name__}: {error}"
+            return "refusal", described(error, named=not isinstance(error, InputError))
         return "answer", body
+
+
+def _frame(frame: bytes) -> dict[str, Any] | None:
+    """What a frame says; `None` if it is none that an endpoint sends."""
+    try:
+        said = json.loads(frame)
+    except (ValueError, TypeError, RecursionError):
+        return None
+    if not (isinstance(said, dict) and {"what", "n", "life", "body"} <= said.keys()):
+        return None
+    if not (type(said["n"]) is int and isinstance(said["life"], str) and len(said["life"]) <= _LONGEST):
+        return None
+    match said:
+        case {"what": "answer" | "refusal"}:
+            return said
+        case {"what": "call" | "push", "kind": str(kind), "low": int(low)}:
+            return said if len(kind) <= _LONGEST and low <= said["n"] else None
+    return None
+
+
+_LONGEST = 1_000
+"""Characters of the name of a kind or a life."""

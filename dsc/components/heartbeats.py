@@ -73,6 +73,7 @@ class Heart:
             await self._become(active=False)
 
     async def _beat(self) -> None:
+        self._heard_at = {name: at for name, at in self._heard_at.items() if _now() - at < SILENCE}
         self._activators = {name for name in self._activators if self.alive(name)}
         await self._become(active=self._root or bool(self._activators))
         if self.active:
@@ -91,8 +92,8 @@ class Heart:
         self._heard(sender, {"needs": [self._endpoint.address]})
 
     def _heard(self, sender: str, said: Any) -> None:
-        self._heard_at[sender] = _now()
         needed = self._endpoint.address in said["needs"]
+        self._heard_at[sender] = _now()
         if needed != (sender in self._activators):
             (self._activators.add if needed else self._activators.discard)(sender)
             self.stir()

@@ -1,6 +1,7 @@
 """The actions that a host carries out for others: each once for its id, however often it is asked for.
 
-What an action has said, its end last, is there until its user lets it be forgotten.
+What an action has said, its end last, is there until its user lets it be forgotten, within the bounds `MOST_ACTIONS`
+and `MOST_KEPT`.
 """
 
 from __future__ import annotations
@@ -10,10 +11,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from dsc.calls import Clock, Outcome, SkillCall
+from dsc.calls import OBSERVED, Clock, Outcome, SkillCall
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint
+from dsc.components.endpoint import Endpoint, encoded
+from dsc.components.hooks import contained
+from dsc.components.reports import Reports
+from knowledge_base.errors import InputError, described
 from knowledge_base.exchange.forms import delta_form, delta_of
+from knowledge_base.language.inputs import require_delta, require_time, shown
+
+MOST_ACTIONS = 1_000
+"""Actions that are going on at a host, and as many that are over and were not forgotten; of those, the latest."""
+MOST_KEPT = 10_000
+"""Reports of an action whose text is kept for a user that is resumed; older ones count, and say nothing."""
 
 
 def outcome_form(outcome: Outcome) -> dict[str, Any]:
@@ -30,13 +40,28 @@ def outcome_of(form: Mapping[str, Any]) -> Outcome:
     return Outcome(form["event"], form["attributes"], delta_of(form["observed"]))
 
 
+_NO_REPORT = {"report": outcome_form(Outcome(OBSERVED))}
+"""Stands for a report that its user has had long ago."""
+
+
 @dataclass(slots=True)
 class _Action:
     """Who wants to know, and what the action has said so far."""
 
     user: str
-    task: asyncio.Task[None]
+    task: asyncio.Task[None] | None = None
+    reports: Reports | None = None
     said: list[dict[str, Any]] = field(default_factory=list)
+    heard: int = 0
+
+    def hear(self, heard: int) -> None:
+        """The user has so much of what was said: there is room for more, and the eldest need not be kept."""
+        assert self.reports is not None  # noqa: S101
+        for number in range(self.heard, min(heard, len(self.said))):
+            if number >= MOST_KEPT:
+                self.said[number - MOST_KEPT] = _NO_REPORT
+            self.heard = number + 1
+            self.reports.taken()
 
 
 class HostedActions:
@@ -53,46 +78,81 @@ class HostedActions:
 
     def tasks(self) -> list[asyncio.Task[None]]:
         """What is going on, or is over and not forgotten."""
-        return [action.task for action in self._actions.values()]
+        return [action.task for action in self._actions.values() if action.task is not None]
 
     async def _start(self, sender: str, said: dict[str, Any]) -> None:
         action = self._actions.get(_key(said))
         if action is not None:  # whose user has been started anew
             action.user = sender
-        else:
-            task = asyncio.get_running_loop().create_task(self._carry_out(said))
-            self._actions[_key(said)] = _Action(sender, task)
+            return
+        self._make_room()
+        action = self._actions[_key(said)] = _Action(sender)
+        action.reports = Reports(lambda report, _: self._tell(said["id"], action, {"report": outcome_form(report)}))
+        action.task = asyncio.get_running_loop().create_task(self._carry_out(said, action, action.reports))
 
-    async def _carry_out(self, said: dict[str, Any]) -> None:
-        def tell(form: dict[str, Any]) -> None:
-            action.said.append(form)
-            self._endpoint.push(action.user, f"news {said['id']}", len(action.said))
+    def _make_room(self) -> None:
+        """Forget the first action that is over and was not claimed; refuse a new one while too many are going on."""
+        over = [key for key, action in self._actions.items() if action.task is None or action.task.done()]
+        if len(self._actions) - len(over) >= MOST_ACTIONS:
+            raise InputError(f"{MOST_ACTIONS} actions are going on here, and no more are carried out")
+        for key in over[: max(0, len(over) + 1 - MOST_ACTIONS)]:
+            del self._actions[key]
 
-        await asyncio.sleep(0)  # until it is known under its id
-        action = self._actions[_key(said)]
-        seconds = {} if said["seconds"] is None else {"deadline": self._clock.now() + said["seconds"]}
-        call = SkillCall(said["id"], self._clock, lambda outcome: tell({"report": outcome_form(outcome)}), **seconds)
+    def _tell(self, action_id: str, action: _Action, form: dict[str, Any]) -> None:
+        action.said.append(form)
+        self._endpoint.push(action.user, f"news {action_id}", len(action.said))
+
+    async def _carry_out(self, said: dict[str, Any], action: _Action, reports: Reports) -> None:
         end: dict[str, Any]
         try:
+            seconds = {}
+            if said["seconds"] is not None:
+                require_time(said["seconds"])
+                seconds["deadline"] = self._clock.now() + said["seconds"]
+            call = SkillCall(said["id"], self._clock, lambda outcome: reports.put(_plain(outcome)), **seconds)
             async with asyncio.timeout(said["seconds"]):
-                end = {"ended": outcome_form(await self._component.execute(said["skill"], call, said["arguments"]))}
+                with contained():
+                    outcome = await self._component.execute(said["skill"], call, said["arguments"])
+            end = {"ended": outcome_form(_plain(outcome))}
         except Exception as error:  # noqa: BLE001  # whatever it is, it is told
-            end = {"failed": f"{type(error).__name__}: {error}"}
-        tell(end)
+            end = {"failed": described(error)}
+        reports.flush()
+        self._tell(said["id"], action, end)
 
     async def _how(self, _: str, said: dict[str, Any]) -> list[dict[str, Any]] | None:
         """What the action has said after so many answers; `None` if it is unknown."""
         action = self._actions.get(_key(said))
-        return None if action is None else action.said[said["heard"] :]
+        if action is None:
+            return None
+        action.hear(said["heard"])
+        if action.task is not None and action.task.done() and not (action.said and "report" not in action.said[-1]):
+            self._tell(said["id"], action, {"failed": "its task was cancelled"})
+        return action.said[said["heard"] :]
 
     async def _stop(self, _: str, said: dict[str, Any]) -> None:
         """Cancel the action if it is still going on, and forget it."""
         action = self._actions.get(_key(said))
-        if action is not None and not action.task.done():
+        if action is not None and action.task is not None and not action.task.done():
             action.task.cancel()
             await asyncio.wait([action.task])
         self._actions.pop(_key(said), None)
 
 
+def _plain(outcome: Outcome) -> Outcome:
+    """The outcome, if it can be sent.
+
+    Raises:
+        InputError: it is none, or something in it is no plain data.
+    """
+    if not isinstance(outcome, Outcome) or not isinstance(outcome.event, str):
+        raise InputError(f"it ended with {shown(outcome)}, which is no outcome")
+    require_delta(outcome.observed)
+    encoded(outcome_form(outcome))
+    return outcome
+
+
 def _key(said: Mapping[str, Any]) -> tuple[str, str]:
-    return said["run"], said["id"]
+    run, action_id = said["run"], said["id"]
+    if not (isinstance(run, str) and isinstance(action_id, str)):
+        raise InputError("an action is named by the texts 'run' and 'id'")
+    return run, action_id

@@ -13,11 +13,16 @@ from typing import Any
 
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
 from dsc.components.streams import Values, require_fitting
+from knowledge_base.errors import InputError, described
 
 RENEWED = 1.0
 """Seconds after which a subscriber asks again."""
 FORGOTTEN = 5.0
 """Seconds after which a publisher forgets a subscriber that does not."""
+MOST_SUBSCRIBERS = 1_000
+"""Subscribers of one port; more are refused."""
+MOST_LIVES = 100
+"""Lives of a publisher that are told from its present one."""
 
 
 class Publisher:
@@ -54,7 +59,12 @@ class Publisher:
     async def _subscribe(self, sender: str, wanted: Values | None) -> dict[str, Any]:
         if self._values is not None and wanted is not None:
             require_fitting(f"{self._endpoint.address}.{self._port}", wanted, self._values)
-        self._subscribers[sender] = asyncio.get_running_loop().time() + FORGOTTEN
+        now = asyncio.get_running_loop().time()
+        if len(self._subscribers) >= MOST_SUBSCRIBERS and sender not in self._subscribers:
+            self._subscribers = {who: until for who, until in self._subscribers.items() if until > now}
+            if len(self._subscribers) >= MOST_SUBSCRIBERS:
+                raise InputError(f"{MOST_SUBSCRIBERS} have subscribed already, and no more are told")
+        self._subscribers[sender] = now + FORGOTTEN
         return self.newest
 
 
@@ -123,24 +133,41 @@ class Subscription:
             except RefusedError as refused:  # so may another one
                 self.problem = str(refused)
             else:
-                self.problem = None
-                self.take(newest)
+                try:
+                    self.take(newest)
+                    self.problem = None
+                except Exception as error:  # noqa: BLE001  # whatever it pushes, we go on to listen
+                    self.problem = described(error, named=not isinstance(error, InputError))
             await asyncio.sleep(RENEWED)
 
-    def _heard(self, sender: str, newest: dict[str, Any]) -> None:
+    def _heard(self, sender: str, newest: Any) -> None:
         if sender == self._publisher:
             self.take(newest)
 
-    def take(self, newest: dict[str, Any]) -> None:
-        """Hear what the publisher has said, `Publisher.newest`, on whatever way; nothing older than known is taken."""
-        self._at = asyncio.get_running_loop().time()
-        life, number = newest["life"], newest["n"]
+    def take(self, newest: Any) -> None:
+        """Hear what the publisher has said, `Publisher.newest`, on whatever way; nothing older than known is taken.
+
+        Raises:
+            InputError: it is not what a publisher says; nothing is taken.
+        """
+        match newest:
+            case {"life": str(life), "n": int(number), "value": value}:
+                self._at = asyncio.get_running_loop().time()
+            case _:
+                raise InputError(f"'{self._publisher}' has pushed '{self._port}' in a form that cannot be read")
         present = life not in self._numbers or next(reversed(self._numbers)) == life
-        if present and number > self._numbers.setdefault(life, 0):
-            self._numbers[life], self.value = number, newest["value"]
+        if present and number > self._numbers.get(life, 0):
+            before, self.value = self.value, value
+            try:
+                if self._tell is not None:
+                    self._tell(value)
+            except BaseException:
+                self.value = before
+                raise
+            self._numbers[life] = number
+            if len(self._numbers) > MOST_LIVES:
+                del self._numbers[next(iter(self._numbers))]
             self._news.set()
-            if self._tell is not None:
-                self._tell(self.value)
 
 
 def _kind(publisher: str, port: str) -> str:

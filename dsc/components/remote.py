@@ -27,6 +27,8 @@ from dsc.components.pushing import RENEWED, Publisher, Subscription
 from dsc.components.remote_streams import HostedStreams, ports_form, ports_of
 from dsc.components.transport import Transport
 from dsc.skills import SkillSignature
+from knowledge_base.errors import InputError, described, text_of
+from knowledge_base.language.inputs import require_text
 
 WATCH = 1.0
 """Seconds after which a host is asked how an action goes."""
@@ -141,18 +143,23 @@ class RemoteComponent(Component):
 
         Raises:
             NoAnswerError: it is not there.
+            RefusedError: it is there, and says of itself what cannot be read.
         """
         life = secrets.token_hex(6)
         endpoint = Endpoint(f"for {name} {life}", transport, life)
         try:
             said = await endpoint.call(name, "hull", within=within)
-        except NoAnswerError:
+        except (NoAnswerError, RefusedError):
             await endpoint.close()
             raise
-        skills = {form["name"]: SkillSignature(**form) for form in said["skills"]}
-        remote = cls(name, transport, endpoint, skills)
-        remote.pushes = ports_of(said["pushes"], remote, endpoint)
-        remote._there.take(said["condition"])
+        try:
+            skills = {form["name"]: SkillSignature(**form) for form in said["skills"]}
+            remote = cls(name, transport, endpoint, skills)
+            remote.pushes = ports_of(said["pushes"], remote, endpoint)
+            remote._there.take(said["condition"])
+        except Exception as error:
+            await endpoint.close()
+            raise RefusedError(f"'{name}' says of itself what cannot be read: {described(error)}") from error
         return remote
 
     def skills(self) -> dict[str, SkillSignature]:
@@ -211,7 +218,13 @@ class RemoteComponent(Component):
         finally:
             renewing.cancel()
 
-    def _heard(self, said: Mapping[str, Any]) -> None:
+    def _heard(self, said: Any) -> None:
+        match said:
+            case {"life": str(life), "reason": str(), "mode": str(), "needs": [*needs]} if life in list(Life):
+                for need in needs:
+                    require_text(need, "the name of a component that is needed")
+            case _:
+                raise InputError(f"'{self.name}' says of its condition what cannot be read: {text_of(said, repr)}")
         if self._working and not self._starting:
             self._follow(Life(said["life"]), said["reason"])
         self.life.mode = said["mode"]
@@ -256,7 +269,7 @@ class RemoteComponent(Component):
                     call.report(outcome_of(form["report"]))
                     continue
                 if "failed" in form:
-                    raise RefusedError(form["failed"])
+                    raise RefusedError(text_of(form["failed"], str))
                 return outcome_of(form["ended"])
             if not said:
                 with suppress(TimeoutError):

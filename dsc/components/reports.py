@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 from dsc.calls import Outcome
@@ -57,9 +56,8 @@ class Reports:
         aside, self._aside = self._aside, {}
         observed, self._observed = _as_one(self._observed), []
         for event, (attributes, conflated) in aside.items():
-            report = Outcome(event, attributes)
             self._waiting += 1
-            self._post(replace(report, observed=observed) if observed else report, conflated)
+            self._post(Outcome(event, attributes, observed), conflated)
             observed = Delta()
 
 

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Iterable, MutableMapping
 
 from dsc.components.component import Component
+from dsc.components.hooks import contained
 from dsc.components.needs import require_declared
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import require_several, shown
@@ -42,7 +43,7 @@ class Roster:
         if found is not None:
             return found
         loop = asyncio.get_running_loop()
-        here, there = loop.create_task(self._until_deployed(name)), loop.create_task(needing.reach(name))
+        here, there = loop.create_task(self._until_deployed(name)), loop.create_task(_reached(needing, name))
         try:
             await asyncio.wait((here, there), return_when=asyncio.FIRST_COMPLETED)
             if there.done():
@@ -64,6 +65,11 @@ class Roster:
             return str(UnknownNameError(f"component '{name}', which is not there", found=name, valid=self.components))
         why = f": {component.life.reason}" if component.life.reason else ""
         return f"component '{name}', which is in '{component.life.state}'{why}"
+
+
+async def _reached(needing: Component, name: str) -> Component:
+    with contained():
+        return await needing.reach(name)
 
 
 def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:

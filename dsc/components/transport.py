@@ -57,8 +57,8 @@ class LocalTransport:
 
     def deliver(self, sender: str, to: str, frame: bytes) -> None:
         """Hand a frame over now."""
-        if to == EVERYBODY:
-            for address in [address for address in self._attached if address != sender]:
-                self._attached[address](sender, frame)
-        elif to in self._attached:
-            self._attached[to](sender, frame)
+        others = [address for address in self._attached if address != sender] if to == EVERYBODY else [to]
+        for address in others:
+            receive = self._attached.get(address)  # who hears first may have detached the next
+            if receive is not None:
+                receive(sender, frame)

@@ -178,10 +178,21 @@ class Dispatcher:
         return {} if signature is None else signature.outcomes.get(message.outcome.event, {})
 
     def memories(self) -> Iterator[tuple[str, Any]]:
-        """What components have to remember, by their names."""
+        """What components have to remember, by their names; one that fails keeps what it last said."""
         for component in self._components.values():
             if component.remembers:
-                yield component.name, component.remember()
+                try:
+                    with contained():
+                        memory = component.remember()
+                except Exception as error:  # noqa: BLE001  # whatever it is, the others remember
+                    self._fault(f"component '{component.name}' cannot say what it remembers: {described(error)}")
+                else:
+                    yield component.name, memory
+
+    def _fault(self, what: str) -> None:
+        """Say at the end of the run what went wrong, once."""
+        if what not in self._given_up:
+            self._given_up.append(what)
 
     def settle(self, start: Start) -> None:
         """The final answer of a skill has been taken; until then its component counts as busy."""

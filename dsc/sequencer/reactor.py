@@ -190,7 +190,8 @@ class Reactor:
         name = start.names.get(outcome.event, outcome.event)
         event = Event(name, outcome.attributes, to=start.activation)
         self.trace.cause = self.caused_by.get(start.action_id)
-        self.trace.cause = self.tracer.event(event, f"{start.component}.{start.skill}", outcome.event)
+        skill = f"{start.component}.{start.skill}"
+        self.trace.cause = self.tracer.event(event, skill, outcome.event, message.conflated)
         self._apply(outcome.observed, start.component)
         return event
 

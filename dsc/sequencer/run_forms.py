@@ -146,6 +146,8 @@ def message_form(message: Message, short: Shortener) -> Form:
         case SkillMessage():
             outcome = message.outcome
             form = {"action": message.start.action_id, "outcome": outcome.event, "final": message.final}
+            if message.conflated:
+                form["conflated"] = message.conflated
             return form | {"attributes": short(outcome.attributes), "observed": delta_form(outcome.observed)}
         case TimerMessage():
             return {"timer": _plain(message.timer)}
@@ -159,7 +161,7 @@ def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Ca
     match form:
         case {"action": action_id}:
             outcome = Outcome(form["outcome"], full(form["attributes"], find), delta_of(form["observed"]))
-            return SkillMessage(action(action_id), outcome, form["final"])
+            return SkillMessage(action(action_id), outcome, form["final"], conflated=form.get("conflated", 0))
         case {"timer": timer}:
             return TimerMessage(StartTimer(**timer))
         case {"late": number}:

@@ -106,10 +106,10 @@ class Present:
         match message:
             case Event():  # which nobody waits for in particular
                 pass
-            case SkillMessage(start=start, final=False):
+            case SkillMessage(start=start, final=False, conflated=conflated):
                 for place in self._places.get(_key(start), ()):
                     row = self._rows[place]
-                    self._put_row(place, row._replace(reports=row.reports + 1))
+                    self._put_row(place, row._replace(reports=row.reports + 1 + conflated))
             case SkillMessage(start=start, goes_on=goes_on):
                 (self._cancel if goes_on else self._forget)(_key(start))
             case TimerMessage(timer=timer):

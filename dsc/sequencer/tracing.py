@@ -47,14 +47,19 @@ class StepTracer:
             known = {"schema": schema_form(knowledge.schema), **world_form(knowledge.snapshot())}
             self._trace.record("world", version=knowledge.version, **known)
 
-    def event(self, event: Event, source: str, original: str | None = None) -> int:
-        """An event that came in; `original` is the skill's own name for it where the chart uses another."""
+    def event(self, event: Event, source: str, original: str | None = None, conflated: int = 0) -> int:
+        """An event that came in; `original` is the skill's own name for it where the chart uses another.
+
+        `conflated` older reports were dropped in favour of it.
+        """
         if not self._trace.heard:
             return self._trace.record("event")
         attributes = {name: _told_once(value) for name, value in event.attributes.items()}
         data: dict[str, Any] = {"name": event.name, "source": source, "attributes": attributes}
         if original not in (None, event.name):
             data["original"] = original
+        if conflated:
+            data["conflated"] = conflated
         return self._trace.record("event", **data)
 
     def begun(self, start: Start) -> str:

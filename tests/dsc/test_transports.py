@@ -80,7 +80,7 @@ def test_answers_are_forgotten_when_nobody_waits_for_them():
         server.answer("big", big)
         for _ in range(100):
             await client.call("server", "big")
-        (peer,) = server._peers["client"].values()
+        (peer,) = server._peers.values()
         return len(peer.answers)
 
     assert run_simulated(main()) <= 1
