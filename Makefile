@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer test-viewer screenshots clean
 
 help:   ## this list
@@ -67,6 +67,9 @@ kill-runs: $(VENV)/.test   ## kill -9 runs of the clean-up table and resume them
 
 soak-kb: $(VENV)/.test   ## four threads and an event loop change, ask and watch one knowledge base at once (SECONDS=N)
 	$(BIN)/python tests/knowledge_base/kb_soak.py $(or $(SECONDS),30)
+
+memory: $(VENV)/.run   ## a run of 24 simulated hours and 1,000,000 events: is its memory flat after the first tenth? (EVENTS=N)
+	$(BIN)/python benchmarks/memory.py $(if $(EVENTS),--events $(EVENTS))
 
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py

@@ -51,6 +51,7 @@ from knowledge_base.errors import InputError, UnknownNameError, described
 
 DEFAULT_WITHIN = 300.0
 """Seconds a skill may take if the trigger does not say: every wait has a bound."""
+_MOST_FAULTS = 100
 
 
 class Dispatcher:
@@ -190,8 +191,8 @@ class Dispatcher:
                     yield component.name, memory
 
     def _fault(self, what: str) -> None:
-        """Say at the end of the run what went wrong, once."""
-        if what not in self._given_up:
+        """Say at the end of the run what went wrong, once; of very many things the first."""
+        if what not in self._given_up and len(self._given_up) < _MOST_FAULTS:
             self._given_up.append(what)
 
     def settle(self, start: Start) -> None:
@@ -300,7 +301,7 @@ class Dispatcher:
 
     def _not_stopped(self, start: Start) -> None:
         skill = f"{start.component}.{start.skill}"
-        self._given_up.append(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
+        self._fault(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
 
     def _answer(self, running: _Running, outcome: Outcome) -> None:
         """Post how a skill ended, once; until that has succeeded its time limit stands."""
@@ -332,7 +333,7 @@ class Dispatcher:
 
         support = Support(self._roster, self.activity, component)
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
-        call = SkillCall(self._id(start), clock, report, clock.now() + within, self._given_up.append)
+        call = SkillCall(self._id(start), clock, report, clock.now() + within, self._fault)
         try:
             await self._ready(component, start, support)
             if earlier is not None:

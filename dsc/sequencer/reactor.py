@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,7 +12,7 @@ from dsc.dynamic.library import Library
 from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.state import MachineState
-from dsc.engine.steps import Output, SendLater, SetParameter, Start, StartTimer, Step
+from dsc.engine.steps import Cancel, Output, SendLater, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
 from dsc.sequencer.attributes import Declared, require_things
@@ -25,6 +26,8 @@ from knowledge_base.facts import Delta
 from knowledge_base.language.world import World
 from knowledge_base.store import KnowledgeBase
 
+MOST_CANCELLED = 1_000
+"""Cancelled skills of which it is known what started them, for the trace of what they still observe."""
 CHART = "chart"
 """Author of what a plot tells the knowledge base."""
 StepListener = Callable[[Step], None]
@@ -40,7 +43,8 @@ class Reactor:
         problem: why the run cannot go on, or what went wrong in its last step.
         in_vain: periods that passed without any effect since anything else happened.
         settings: what an operator has said about plots, by plot and parameter.
-        caused_by: the records of the skills that were started, by action id.
+        caused_by: the records of the skills that were started and may still say something, by action id; of cancelled
+            ones the latest `MOST_CANCELLED`.
         listeners: are told every macrostep, before its actions leave.
     """
 
@@ -56,6 +60,7 @@ class Reactor:
         self.in_vain: set[tuple[int, int]] = set()
         self.settings: dict[tuple[str, str], ParameterMessage] = {}
         self.caused_by: dict[str, int] = {}
+        self._cancelled: deque[str] = deque()
 
     def restore(self, kept: Kept) -> None:
         """Be as after the last macrostep of a run that was broken off."""
@@ -187,9 +192,11 @@ class Reactor:
             return None
         if message.final:
             self.tracer.answered(start)
+            self.trace.cause = self.caused_by.pop(start.action_id, None)
+        else:
+            self.trace.cause = self.caused_by.get(start.action_id)
         name = start.names.get(outcome.event, outcome.event)
         event = Event(name, outcome.attributes, to=start.activation)
-        self.trace.cause = self.caused_by.get(start.action_id)
         skill = f"{start.component}.{start.skill}"
         self.trace.cause = self.tracer.event(event, skill, outcome.event, message.conflated)
         self._apply(outcome.observed, start.component)
@@ -209,6 +216,8 @@ class Reactor:
         self.tracer.decisions(step)
         self._apply(step.knowledge, CHART)
         for output in step.output:
+            if isinstance(output, Cancel):
+                self._forget_causes(output.activation)
             seq = self.tracer.output(output)
             if isinstance(output, Start) and seq is not None:
                 self.caused_by[output.action_id] = seq
@@ -216,6 +225,12 @@ class Reactor:
         if step.errors:
             self.problem = self.problem or "; ".join(step.errors)
         return step.output
+
+    def _forget_causes(self, activation: int) -> None:
+        """Skills of an activation are cancelled: they may say something for a while, and then never again."""
+        self._cancelled.extend(self.tracer.at_work(activation))
+        while len(self._cancelled) > MOST_CANCELLED:
+            self.caused_by.pop(self._cancelled.popleft(), None)
 
     def _note_periods(self, message: Message, *, in_vain: bool) -> None:
         if not isinstance(message, TimerMessage) or not in_vain:

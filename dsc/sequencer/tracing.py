@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from dsc.engine.state import FrameState
@@ -67,6 +67,10 @@ class StepTracer:
         skill = f"{start.component}.{start.skill}"
         self._at_work.setdefault(start.activation, {})[start.action_id] = skill
         return skill
+
+    def at_work(self, activation: int) -> Iterable[str]:
+        """The ids of the skills that were started for an activation and have not ended."""
+        return self._at_work.get(activation, ())
 
     def answered(self, start: Start) -> None:
         """A skill has ended by itself: it cannot be cancelled any more."""

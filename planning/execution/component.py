@@ -124,6 +124,10 @@ class PlanningComponent(Component):
         answer = self._answers[call.action_id] = await super().execute(skill_name, call, arguments)
         return answer
 
+    async def forget(self, action_id: str) -> None:
+        """The answer has been heard."""
+        self._answers.pop(action_id, None)
+
     async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:
         """What was answered before a restart; any other action goes on where its plan is."""
         answer = self._answers.get(action_id)
