@@ -23,8 +23,6 @@ Domain = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
-_SQLITE = b"SQLite format 3\0"
-
 readers: dict[str, Callable[[Path], KnowledgeBase]] = {}
 """More kinds of sources by the ending of their file, e.g. `.yaml`; upper rooms add theirs."""
 
@@ -78,11 +76,9 @@ def writable(store: Path) -> Iterator[KnowledgeBase]:
 
 def is_store(path: Path) -> bool:
     """Whether the file is a database."""
-    try:
-        with path.open("rb") as file:
-            return file.read(len(_SQLITE)) == _SQLITE
-    except OSError:
-        return False
+    from knowledge_base.journal.neighbours import is_database
+
+    return is_database(path)
 
 
 def _opened(source: Path, domain: Path | None) -> Opened:
