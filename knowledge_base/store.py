@@ -11,11 +11,11 @@ from threading import get_ident
 from types import TracebackType
 from typing import Self, get_args
 
-from knowledge_base.errors import ConflictError, HistoryError, InputError, StoreError
+from knowledge_base.errors import ConflictError, HistoryError, InputError
 from knowledge_base.exchange.json import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
 from knowledge_base.journal.archive import Archive
-from knowledge_base.journal.file import Durability
+from knowledge_base.journal.file import Durability, located
 from knowledge_base.journal.history import History, Version, Writer, gone
 from knowledge_base.journal.journal import Journal
 from knowledge_base.journal.memory import MemoryHistory
@@ -66,20 +66,23 @@ class KnowledgeBase(Observable):
         clock: Now = wall.time,
         *,
         read_only: bool = False,
+        new: bool = False,
     ) -> KnowledgeBase:
         """A knowledge base in memory, or one that lasts in a file; close it, or use it in a `with` block.
 
         Args:
             schema: what may be said; for a file that is there already `None` takes what it was written with,
                 and an extension of that (more declarations, none changed) is accepted and recorded.
-            path: the store's file, made when it is not there; `None` keeps everything in memory.
+            path: the store's file, made when nothing is there; `None` keeps everything in memory.
             durability: what a committed change outlives: "memory" nothing (without a path), "process" the
                 death of this process by whatever means (the default with a path), "power" a power cut too.
             clock: gives the time of changes, in seconds.
             read_only: look at a store that another process may be writing; `refresh` follows it.
+            new: the file must not be there yet.
 
         Raises:
-            StoreError: the file cannot be read or written, is no store, or somebody else is writing it.
+            StoreError: the file cannot be read or written, is no store, or somebody else is writing it; or a file
+                beside it has a name of the store's and is none of it. All files are as before.
             SchemaMismatchError: the file was written with a schema that this one does not extend.
             InputError: there is no schema, or path and durability contradict each other.
         """
@@ -89,13 +92,15 @@ class KnowledgeBase(Observable):
             valid = get_args(Durability)
             raise InputError(f"there is no durability {shown(durability)}", found=str(durability), valid=valid)
         if path is None:
-            if schema is None or durability not in (None, "memory") or read_only:
+            if schema is None or durability not in (None, "memory") or read_only or new:
                 raise InputError("a knowledge base without a file has a schema and durability 'memory'")
             return cls(schema, clock)
         if durability == "memory":
             raise InputError(f"with the file '{path}' durability is 'process' or 'power', not 'memory'")
+        if read_only and new:
+            raise InputError("a store that is opened read_only is there already, and not new")
         file = _resolved(path)
-        archive = Archive(file, schema) if read_only else Journal(file, schema, durability or "process", clock)
+        archive = Archive(file, schema) if read_only else Journal(file, schema, durability or "process", clock, new=new)
         try:
             return cls(archive.schema, clock, archive)
         except BaseException:
@@ -371,10 +376,7 @@ class KnowledgeBase(Observable):
 def _resolved(path: object) -> Path:
     if not isinstance(path, str | Path) or "\0" in str(path) or not str(path):
         raise InputError(f"a store's path is text or a Path, not {shown(path)}")
-    try:
-        return Path(path).resolve()
-    except (OSError, RuntimeError) as error:  # links that lead to each other
-        raise StoreError(f"cannot open the store: {error}") from error
+    return located(path)
 
 
 def _require_names(author: object, key: object) -> None:

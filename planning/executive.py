@@ -28,7 +28,7 @@ from dsc.skills import signatures
 from dsc.text.plots import parse_plot
 from dsc.trace import Listener, Trace
 from knowledge_base.errors import InputError, SchemaError, StoreError
-from knowledge_base.journal.file import Durability
+from knowledge_base.journal.file import Durability, located
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.compatibility import require_extension
@@ -102,7 +102,7 @@ class Executive:
             raise InputError("with a store the knowledge is the store's; none can be given beside it")
         if knowledge is not None:
             require_extension(self.domain.schema, knowledge.schema)
-        self._store = None if store is None else Path(store).resolve()
+        self._store = None if store is None else located(store)
         self.library = plots if isinstance(plots, Library) else Library(plots)
         if ACHIEVE not in self.library:
             self.library.add(achieve_plot())

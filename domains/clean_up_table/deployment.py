@@ -17,7 +17,7 @@ from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.second_robot import PatientCamera, SuctionArm, Tracks
 from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
 from domains.clean_up_table.world import World
-from domains.clean_up_table.world_file import LastingWorld, beside
+from domains.clean_up_table.world_file import LastingWorld, beside, require_free
 from domains.tally import Tally
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
@@ -151,6 +151,7 @@ def deploy(
         return _wired(world, planner, listener, profile)
     if has_run(store):
         raise InputError(f"'{store}' has a run already; go on with it by --resume, or take another file")
+    require_free(beside(store))
     lasting = LastingWorld.from_state(world.state())
     deployed = _wired(lasting, planner, listener, profile, store, durability)
     try:

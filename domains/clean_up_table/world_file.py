@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
 from domains.clean_up_table.world import World
 from knowledge_base.errors import Place, StoreError
+from knowledge_base.journal.file import Kind, connect, is_there, located, require_one_name, require_own
+from knowledge_base.journal.neighbours import WORLD
+from knowledge_base.journal.placing import new_database
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,17 +22,26 @@ if TYPE_CHECKING:
 
     from domains.clean_up_table.results import Result
 
+KIND = Kind("simulated world", 0x64736377, 2)
+"""The first format had no number, and nothing that says whose file it is."""
 _TABLES = (
-    "DROP TABLE IF EXISTS world",
-    "DROP TABLE IF EXISTS done",
     "CREATE TABLE world (state TEXT NOT NULL)",
     "CREATE TABLE done (action_id TEXT PRIMARY KEY, result TEXT NOT NULL)",
 )
 
 
 def beside(store: Path) -> Path:
-    """Where the world of the run in that store is kept."""
-    return store.with_name(store.name + "-world")
+    """Where the world of the run in that store is kept; raises `StoreError` as `located`."""
+    place = located(store)
+    return place.with_name(place.name + WORLD)
+
+
+def require_free(path: Path) -> None:
+    """Raise `StoreError` unless a world can be kept there: no file is there, or that of another world."""
+    with _reported(path, "read"):
+        if is_there(path):
+            require_own(path, KIND)
+            require_one_name(path)
 
 
 class LastingWorld(World):
@@ -39,13 +51,17 @@ class LastingWorld(World):
     _seen = 0
 
     def create(self, path: Path) -> None:
-        """Keep this world in a file from now on, in the place of what is there; raises `StoreError`."""
+        """Keep this world in a file from now on, in the place of the world that is there; raises `StoreError`."""
+        require_free(path)
         with _reported(path, "write"):
-            self._file = sqlite3.connect(path, isolation_level=None)
-            self._file.execute("PRAGMA journal_mode = WAL")
+            if not is_there(path):
+                with new_database(path, KIND.application_id, KIND.form, lasting=False) as file:
+                    for statement in _TABLES:
+                        file.execute(statement)
+            self._file = connect(path, "rw")
             self._file.execute("BEGIN")
-            for statement in _TABLES:
-                self._file.execute(statement)
+            self._file.execute("DELETE FROM world")
+            self._file.execute("DELETE FROM done")
             self._file.execute("INSERT INTO world VALUES (?)", (self._present(),))
             self._file.execute("COMMIT")
             self._seen = self._version()
@@ -53,9 +69,18 @@ class LastingWorld(World):
     @classmethod
     def open(cls, path: Path) -> Self:
         """The world as it was left; raises `StoreError`."""
-        lasting = cls.from_state(_read(path))
-        lasting._file = sqlite3.connect(path, isolation_level=None)  # noqa: SLF001  of its own class
-        lasting._seen = lasting._version()  # noqa: SLF001
+        if not is_there(path):
+            raise StoreError("the world of the run is not there", place=Place(str(path)))
+        require_free(path)
+        with _reported(path, "read"):
+            file = connect(path, "rw")
+            try:
+                lasting = cls.from_state(_state(file))
+                lasting._file = file  # noqa: SLF001  of its own class
+                lasting._seen = lasting._version()  # noqa: SLF001
+            except BaseException:
+                file.close()
+                raise
         return lasting
 
     def catch_up(self) -> None:
@@ -89,13 +114,6 @@ class LastingWorld(World):
         return json.dumps({name: value for name, value in self.state().items() if name != "done"})
 
 
-def _read(path: Path) -> dict[str, Any]:
-    if not path.exists():
-        raise StoreError("the world of the run is not there", place=Place(str(path)))
-    with _reported(path, "read"), closing(sqlite3.connect(path)) as file:
-        return _state(file)
-
-
 def _state(file: sqlite3.Connection) -> dict[str, Any]:
     (state,) = file.execute("SELECT state FROM world").fetchone()
     done = {action_id: json.loads(result) for action_id, result in file.execute("SELECT * FROM done")}
@@ -106,5 +124,5 @@ def _state(file: sqlite3.Connection) -> dict[str, Any]:
 def _reported(path: Path, doing: str) -> Iterator[None]:
     try:
         yield
-    except sqlite3.Error as error:
+    except (sqlite3.Error, OSError) as error:
         raise StoreError(f"cannot {doing} the world: {error}", place=Place(str(path))) from error

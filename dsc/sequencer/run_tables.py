@@ -20,7 +20,7 @@ from dsc.engine.steps import Start
 from dsc.sequencer.run_standing import Row, Standing, standing
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
-from knowledge_base.journal.file import is_there, reading
+from knowledge_base.journal.file import is_there, located, reading
 
 TABLES = (
     """CREATE TABLE IF NOT EXISTS runs (run INTEGER PRIMARY KEY, plot TEXT NOT NULL, arguments TEXT NOT NULL,
@@ -162,7 +162,7 @@ def archive(path: Path) -> Iterator[RunArchive]:
     Raises:
         StoreError: the file is not there, not a store, or cannot be read.
     """
-    with reading(path) as connection:
+    with reading(located(path)) as connection:
         if not _has_tables(connection):
             raise StoreError("no run was ever kept in this store", place=Place(str(path)))
         require_format(connection, path)
@@ -189,9 +189,9 @@ def records_of(
 
 def has_run(path: Path) -> bool:
     """Whether a run was begun in that file; raises `StoreError` if it is there and no store."""
-    if not is_there(path):
+    if not is_there(place := located(path)):
         return False
-    with reading(path) as connection:
+    with reading(place) as connection:
         if not _has_tables(connection):
             return False
         require_format(connection, path)

@@ -38,14 +38,11 @@ def new(
     ] = None,
 ) -> None:
     """Make an empty store whose schema is that of a PDDL domain."""
-    from knowledge_base.errors import StoreError
     from knowledge_base.store import KnowledgeBase
     from knowledge_base.world.schema import Schema
 
     schema = Schema.from_pddl(domain).with_functional(*functional or ())
-    if store.exists():
-        raise StoreError(f"'{store}' is there already; a new store takes the place of no file")
-    with KnowledgeBase.open(schema, store) as kb:
+    with KnowledgeBase.open(schema, store, new=True) as kb:
         said = f"{len(schema.types)} types, {len(schema.predicates)} predicates, {len(schema.functions)} functions"
         typer.echo(f"made {store}: {said}, {len(kb.nodes())} constants")
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
 from knowledge_base.errors import Place, StoreError
+from knowledge_base.journal.neighbours import INDEX, LOG, regular, require_no_strangers, unlocked
+from knowledge_base.journal.still import changed, is_still, open_still, stamp_of
 from knowledge_base.pddl.files import files_beside
 
 Durability = Literal["memory", "process", "power"]
@@ -20,6 +24,8 @@ FORMAT = 2
 PATIENCE_S = 1.0
 """How long to wait for others who lock the file; there should be none."""
 
+_LONGEST_PATH = 500
+"""In bytes; SQLite opens no file with a path of more than 511."""
 _PAGES_IN_LOG = {"process": 0, "power": 1000}
 """Pages of 4 KiB in SQLite's log after which it makes the commit put them in their place; 0: others see to that."""
 _LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its head; commits are not cut
@@ -39,14 +45,21 @@ def reported(path: Path, doing: str) -> Iterator[None]:
 def reading(path: Path) -> Iterator[sqlite3.Connection]:
     """A connection that sees one version of the file, whatever is written meanwhile.
 
+    Args:
+        path: as from `located`.
+
     Raises:
         StoreError: the file is not there, not a store, or cannot be read.
     """
-    require_place(path)
     if not is_there(path):
         beside = files_beside(path)
         raise StoreError(f"there is no store '{path.name}'", place=Place(str(path)), found=path.name, valid=beside)
     with reported(path, "read"):
+        require_own(path)
+        if is_still(path):
+            with _reading_still(path) as connection:
+                yield connection
+            return
         connection = connect(path, "ro")
         try:
             connection.execute("BEGIN")
@@ -56,17 +69,59 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
             connection.close()
 
 
+@contextmanager
+def _reading_still(path: Path) -> Iterator[sqlite3.Connection]:
+    connection, stamp = open_still(path)
+    try:
+        require_store(connection, path)
+        yield connection
+    except sqlite3.Error:
+        if stamp not in (None, stamp_of(path)):
+            raise changed(path) from None
+        raise
+    finally:
+        connection.close()
+    if stamp not in (None, stamp_of(path)):
+        raise changed(path)
+
+
+def located(path: str | Path) -> Path:
+    """The place of a store that somebody names, without links on the way.
+
+    Raises:
+        StoreError: it is no name of a file, too long, or a link that leads nowhere.
+    """
+    text = str(path)
+    if text == ":memory:" or text.startswith("file:"):
+        raise StoreError(f"'{text}' has a meaning to SQLite; a store is named by its path, e.g. './{text}'")
+    if text.endswith("/"):
+        raise StoreError(f"'{text}' names a folder; a store is a file")
+    try:
+        found = Path(path).resolve()
+        if Path(path).is_symlink() and not found.exists():
+            raise StoreError(f"'{text}' is a link to '{found}', which is not there")
+    except (OSError, RuntimeError, ValueError) as error:  # e.g. links that lead to each other
+        raise StoreError(f"cannot open the store: {error}", place=Place(text)) from None
+    if len(os.fsencode(found)) > _LONGEST_PATH:
+        raise StoreError(f"the path of the store has more than {_LONGEST_PATH} bytes", place=Place(str(found)))
+    return found
+
+
 def is_there(path: Path) -> bool:
-    """Whether there is a file that has any content."""
-    return path.exists() and path.stat().st_size > 0
+    """Whether a store can be there; if not, one can be made.
 
-
-def require_place(path: Path) -> None:
-    """Raise `StoreError` where no file can be: the path is a folder, or in none."""
-    if path.is_dir():
-        raise StoreError(f"'{path.name}' is a folder; a store is a file", place=Place(str(path)))
-    if not path.parent.is_dir():
+    Raises:
+        StoreError: neither: something else than a file with content is there, or a file of a store that is none of
+            this one's is beside it, or there is no folder.
+    """
+    found = regular(path)
+    if found is None and not path.parent.is_dir():
         raise StoreError(f"there is no folder '{path.parent}' for a store to be in", place=Place(str(path)))
+    require_no_strangers(path, there=bool(found and found.st_size))
+    if found is not None and not found.st_size:
+        said = f"'{path.name}' is empty, and no store; a new store takes the place of no file"
+        raise StoreError(said, place=Place(str(path)))
+    return found is not None
 
 
 def writing(path: Path, durability: Durability) -> sqlite3.Connection:
@@ -76,6 +131,8 @@ def writing(path: Path, durability: Durability) -> sqlite3.Connection:
         StoreError: it cannot be opened, or is something else than a store.
     """
     with reported(path, "open"):
+        require_own(path)
+        require_one_name(path)
         connection = connect(path, "rw")
         try:
             require_store(connection, path)
@@ -86,6 +143,14 @@ def writing(path: Path, durability: Durability) -> sqlite3.Connection:
             connection.close()
             raise
     return connection
+
+
+def require_one_name(path: Path) -> None:
+    """Raise `StoreError` for a file with several names (hard links): each would have a log and a lock of its own."""
+    found = regular(path)
+    if found is not None and found.st_nlink > 1:
+        said = f"the file has {found.st_nlink} names (hard links); only a store with one name is written"
+        raise StoreError(said, place=Place(str(path)))
 
 
 def to_tidy_up(path: Path) -> sqlite3.Connection:
@@ -105,7 +170,7 @@ def lay_out_log(path: Path) -> None:
         StoreError: there is no room for it.
     """
     try:
-        with path.with_name(path.name + "-wal").open("r+b") as log:
+        with open(path.with_name(path.name + LOG), "r+b", opener=_not_through_links) as log:
             length = log.seek(0, os.SEEK_END)
             log.write(bytes(max(0, _LOG_LENGTH - length)))
             log.flush()
@@ -114,13 +179,64 @@ def lay_out_log(path: Path) -> None:
         raise StoreError(f"cannot lay out the store's log: {error.strerror}", place=Place(str(path))) from error
 
 
-def require_store(connection: sqlite3.Connection, path: Path) -> None:
+def delete_empty_log(path: Path) -> None:
+    """Delete what SQLite leaves beside a store that was moved away; the writer still has its lock."""
+    log = path.with_name(path.name + LOG)
+    if not path.exists() and log.exists() and not log.stat().st_size:
+        log.unlink()
+        path.with_name(path.name + INDEX).unlink(missing_ok=True)
+
+
+def _not_through_links(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NOFOLLOW)
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a file is known by, in SQLite's header.
+
+    Attributes:
+        name: in messages.
+        application_id: says whose it is.
+        form: number of its format.
+    """
+
+    name: str
+    application_id: int
+    form: int
+
+
+STORE = Kind("knowledge store", APPLICATION_ID, FORMAT)
+
+
+def require_own(path: Path, kind: Kind = STORE) -> None:
+    """Raise `StoreError` unless the file is of that kind; SQLite's files beside it stay as they are.
+
+    Opening somebody else's database in the usual way may already put its log into it.
+    """
+    _require_own(path, kind, identity(path))
+
+
+def identity(path: Path) -> tuple[int, int] | None:
+    """By which the file is known, whatever its name is; `None` if nothing is there."""
+    found = regular(path)
+    return found and (found.st_dev, found.st_ino)
+
+
+@lru_cache(maxsize=256)  # whoever asks for the past opens a file again and again
+def _require_own(path: Path, kind: Kind, file: tuple[int, int] | None) -> None:  # noqa: ARG001  another file, another answer
+    with closing(unlocked(path)) as connection:
+        require_store(connection, path, kind)
+
+
+def require_store(connection: sqlite3.Connection, path: Path, kind: Kind = STORE) -> None:
     """Raise `StoreError` unless the file is a store of a format known here."""
-    if _number(connection, "PRAGMA application_id") != APPLICATION_ID:
-        raise StoreError("this is a database, but no knowledge store", place=Place(str(path)))
+    if _number(connection, "PRAGMA application_id") != kind.application_id:
+        raise StoreError(f"this is a database, but no {kind.name}", place=Place(str(path)))
     form = _number(connection, "PRAGMA user_version")
-    if form != FORMAT:
-        raise StoreError(f"the store has format {form}, this program reads format {FORMAT}", place=Place(str(path)))
+    if form != kind.form:
+        said = f"the {kind.name.split()[-1]} has format {form}, this program reads format {kind.form}"
+        raise StoreError(said, place=Place(str(path)))
 
 
 def _number(connection: sqlite3.Connection, statement: str) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 from knowledge_base.errors import ConflictError, InputError, Place, StoreError
@@ -14,10 +14,10 @@ from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.checkpoints import CHECKPOINTS
 from knowledge_base.journal.file import (
     Durability,
+    delete_empty_log,
     is_there,
     lay_out_log,
     reported,
-    require_place,
     writing,
 )
 from knowledge_base.journal.history import Version, Writer
@@ -56,6 +56,7 @@ class Journal(Archive):
         schema: that of a new store, or an extension of the store's own; `None` takes that.
         durability: what a commit outlives.
         clock: gives the time of what opening it writes, in seconds.
+        new: whether it must not be there yet.
 
     Raises:
         StoreError: another writer has it, it is something else, or cannot be read or written.
@@ -63,17 +64,24 @@ class Journal(Archive):
         InputError: there is no store yet and no schema for it.
     """
 
-    def __init__(self, path: Path, schema: Schema | None, durability: Durability, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        schema: Schema | None,
+        durability: Durability,
+        clock: Callable[[], float],
+        *,
+        new: bool = False,
+    ) -> None:
         self._path = path
-        require_place(path)
-        if schema is None and not is_there(path):
+        if not is_there(path) and schema is None:
             raise _no_schema(path)
         self._place = Place(str(path))
         self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
         self._durability = durability
         self._writers = WriterLock(path)
         try:
-            if not is_there(path):
+            if new or not is_there(path):
                 _make(path, schema, durability, clock())
             self._connection = writing(path, durability)
             self._transaction = Transaction(self._connection, path, durability)
@@ -148,7 +156,13 @@ class Journal(Archive):
     def close(self) -> None:
         """Let others write; nothing stays beside the file."""
         CHECKPOINTS.leave(self._path)
+        moved = not self._transaction.is_in_place()
+        if moved:  # SQLite puts the log only into a file that is in its place
+            with suppress(sqlite3.Error):  # it is closed already
+                self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
         self._connection.close()
+        if moved:
+            delete_empty_log(self._path)
         self._writers.release()
 
     def _lay_out_log(self) -> None:

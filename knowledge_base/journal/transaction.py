@@ -5,6 +5,7 @@ They are classes and no generators, since every change and every macrostep of a 
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from contextlib import suppress
 from pathlib import Path
@@ -34,11 +35,15 @@ class Transaction:
         self._connection = connection
         self._path = path
         self._durability = durability
+        self._name = str(path)  # a `Path` takes longer
+        self._file = os.stat(self._name)  # noqa: PTH116
         self._commits = 0
         self._rows = 0  # ever written, when it began
 
     def __enter__(self) -> sqlite3.Connection:
         self._rows = self._connection.total_changes
+        if not self.is_in_place():
+            raise StoreError("the store was moved or deleted while it is open", place=Place(self._name))
         try:
             self._connection.execute("BEGIN IMMEDIATE")
         except BaseException as error:
@@ -55,6 +60,13 @@ class Transaction:
         except BaseException as failed:
             self._roll_back(failed)
             raise
+
+    def is_in_place(self) -> bool:
+        """Whether the file that is written still has its name; without it a restart finds nothing of a commit."""
+        try:
+            return os.path.samestat(os.stat(self._name), self._file)  # noqa: PTH116
+        except OSError:
+            return False
 
     def _roll_back(self, error: BaseException) -> None:
         with reported(self._path, "write"):

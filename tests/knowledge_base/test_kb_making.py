@@ -9,9 +9,9 @@ from itertools import count
 import pytest
 
 from dsc.sequencer.run_tables import has_run
-from knowledge_base import Delta, InputError, KnowledgeBase, Schema, fact
+from knowledge_base import Delta, KnowledgeBase, Schema, fact
 from knowledge_base.errors import StoreError
-from knowledge_base.journal import journal, making
+from knowledge_base.journal import journal, lock, making, placing
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - cup)) (:constants c1 - cup))")
 CLEAN = Delta(added=(fact("clean", "c1"),))
@@ -24,7 +24,7 @@ def dies_at(line: int, path) -> bool:
         lines = count()
 
         def trace(frame, happens, _):
-            if frame.f_code.co_filename not in (making.__file__, journal.__file__):
+            if frame.f_code.co_filename not in {part.__file__ for part in (journal, lock, making, placing)}:
                 return None
             if happens == "line" and next(lines) == line:
                 os._exit(9)
@@ -54,35 +54,26 @@ def test_whenever_its_maker_dies_the_next_one_makes_it(tmp_path):
     assert deaths > 20
 
 
-def test_a_file_without_content_is_no_store_yet(tmp_path):
-    path = tmp_path / "s.kb"
-    path.touch()
-    assert not has_run(path)
-    with pytest.raises(InputError, match="there is no store"):
-        KnowledgeBase.open(None, path)
-    with pytest.raises(StoreError, match="there is no store"):
-        KnowledgeBase.open(SCHEMA, path, read_only=True)
-    with KnowledgeBase.open(SCHEMA, path) as kb:
-        assert kb.nodes() == {"c1": "cup"}
-
-
-def test_what_is_left_of_an_earlier_store_does_not_come_back(tmp_path):
-    path = tmp_path / "s.kb"
-    with KnowledgeBase.open(SCHEMA, path) as kb:
+def test_a_system_without_nameless_files_makes_it_under_another_name_first(tmp_path, monkeypatch):
+    monkeypatch.delattr(os, "O_TMPFILE")
+    with KnowledgeBase.open(SCHEMA, tmp_path / "s.kb", durability="power") as kb:
         kb.apply(CLEAN, "me")
-        log = (tmp_path / "s.kb-wal").read_bytes()
-    path.unlink()
-    (tmp_path / "s.kb-wal").write_bytes(log)
-    with KnowledgeBase.open(SCHEMA, path) as kb:
-        assert not kb.ask("(clean c1)")
-        assert kb.version == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["s.kb"]
+    (tmp_path / "x").touch()
+    with pytest.raises(FileExistsError):
+        placing.place(tmp_path / "x", b"new")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["s.kb", "x"]
 
 
 def test_what_cannot_be_made_leaves_nothing(tmp_path, monkeypatch):
-    def full(*_):
-        raise OSError(28, "No space left on device")
+    link = os.link
 
-    monkeypatch.setattr(making.Path, "rename", full)
+    def full(source, target, **how):
+        if target.name == "s.kb":
+            raise OSError(28, "No space left on device")
+        link(source, target, **how)
+
+    monkeypatch.setattr(placing.os, "link", full)
     with pytest.raises(StoreError, match=r"cannot make the store '.*s.kb': No space left on device"):
         KnowledgeBase.open(SCHEMA, tmp_path / "s.kb")
     assert list(tmp_path.iterdir()) == []
