@@ -190,6 +190,10 @@ class StoreError(InputError):
     """A store's file cannot be opened, read or written; what was acknowledged before is untouched."""
 
 
+class DamagedStoreError(StoreError):
+    """A store's file has not what was written into it; the message names the table and the row."""
+
+
 class SchemaMismatchError(SchemaError):
     """What was written with one schema is read with another that is not an extension of it.
 

@@ -313,6 +313,11 @@ class KnowledgeBase(Observable):
                 raise InputError(said)
             return self._history.changes(since, until)
 
+    @property
+    def digest(self) -> bytes:
+        """Of the newest version in the store's file and of everything before it; empty in memory."""
+        return self._history.digest
+
     def compact(self, keep_since: int | None = None) -> None:
         """Forget what only versions before `keep_since` need (default: the present one); keys are remembered.
 

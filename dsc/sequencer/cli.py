@@ -73,11 +73,22 @@ def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
     raise typer.Exit(DIVERGED if found else 0)
 
 
+@app.command()
+def check(file: Store) -> None:
+    """Look whether a store, runs and knowledge, has what was written into it and nothing else; it reads all of it."""
+    from dsc.sequencer.run_tables import archive
+    from knowledge_base.journal.archive import Archive
+
+    Archive(file.resolve(), None).require_all()
+    with archive(file, again=True) as runs:
+        for run in runs.require_all():
+            last = runs.last(run.number)
+            typer.echo(f"run {run.number}: {last.number} steps as they were written, {_state(run)}")
+
+
 def _summary(runs: RunArchive, run: RunRow) -> dict[str, Any]:
-    steps, seconds = runs.connection.execute(
-        "SELECT count(*), coalesce(max(time), 0) FROM steps WHERE run = ?", (run.number,)
-    ).fetchone()
-    return {"run": run.number, "plot": run.plot, "steps": steps, "seconds": seconds, "state": _state(run)}
+    last = runs.last(run.number)
+    return {"run": run.number, "plot": run.plot, "steps": last.number, "seconds": last.time, "state": _state(run)}
 
 
 def _state(run: RunRow) -> str:

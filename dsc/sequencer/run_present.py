@@ -61,6 +61,7 @@ class Present:
         self._in_force: dict[_Key, int] = {}  # places of parameters and modes
         self._telling: dict[int, Told] = {}  # by place: of this it is not known whether it has been taken
         self._last_place = 0
+        self._memories: dict[str, str] = {}
         self._reactor: Form = {}
         self._news: Form = {}
 
@@ -68,6 +69,8 @@ class Present:
         """This is what is kept."""
         self._root = kept.state.root
         self._frames = _by_serial(self._root)
+        self.remember(kept.memory.items())
+        self._news.clear()
         for one in kept.pending:
             self._note(one.what, one.place)
             if one.reports and isinstance(one.what, SetParameter | SwitchMode):
@@ -93,12 +96,20 @@ class Present:
             self._remembered = remembered
             self._reactor = self._news["reactor"] = _reactor_form(reactor, self._short)
 
+    def remember(self, memories: Iterable[tuple[str, Any]]) -> None:
+        """What components have to remember, by name; kept as text, since a component may go on with the very object."""
+        for component, memory in memories:
+            text = text_of(memory)
+            if self._memories.get(component) != text:
+                self._memories[component] = self._news.setdefault("memory", {})[component] = text
+
     def change(self, *, whole: bool = False) -> str:
         """A line with what is different since the last time, or with all there is; empty if nothing is."""
         news, self._news = self._news, {}
         if whole:
             frames = {serial: frame_news(None, frame, self._short) for serial, frame in self._frames.items()}
             news = {"whole": True, "reactor": self._reactor, "frames": frames, "pending": self._rows}
+            news["memory"] = self._memories
         return f"{text_of(news)}\n" if news else ""
 
     def taken(self, message: Message) -> None:
@@ -221,8 +232,9 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
 
     Raises:
         UnknownNameError: the library lacks one of the plots, or a plot one of the states.
+        DamagedStoreError: the run is not what was written.
     """
-    connection, find = runs.connection, runs.form
+    find = runs.form
     steps = list(runs.steps(run.number))
     last, now = steps[-1], runs.standing()
     reactor = now.reactor
@@ -238,7 +250,7 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         problem=reactor["problem"],
         settings=tuple([ParameterMessage(**setting) for setting in reactor["settings"]]),
         pending=tuple([_pending(place, Row(*row), find) for place, row in sorted(now.pending.items())]),
-        memory={name: json.loads(memory) for name, memory in connection.execute("SELECT * FROM memory")},
+        memory={name: json.loads(memory) for name, memory in now.memory.items()},
         records=tuple(record for step in steps for record in step.records),
     )  # fmt: skip
 

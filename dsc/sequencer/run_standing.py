@@ -35,11 +35,13 @@ class Standing:
         reactor: what it remembers besides the machine's frames.
         frames: running plots by serial number, as `run_forms.frame_news` gives them.
         pending: what is awaited or in force by its number, as `Row`.
+        memory: what components have to remember, as text by name.
     """
 
     reactor: Form = field(default_factory=dict)
     frames: dict[int, Form] = field(default_factory=dict)
     pending: dict[int, list[Any]] = field(default_factory=dict)
+    memory: dict[str, str] = field(default_factory=dict)
 
     def take(self, change: Form) -> None:
         """Be as after that change: new values, `None` for what is gone."""
@@ -50,6 +52,7 @@ class Standing:
                 del self.frames[int(serial)]
             else:
                 self.frames[int(serial)] = self.frames.get(int(serial), {}) | news
+        self.memory.update(change.get("memory", {}))
         for place, row in change.get("pending", {}).items():
             if row is None:
                 self.pending.pop(int(place), None)  # it may have come and gone in one macrostep

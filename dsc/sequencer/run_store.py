@@ -15,16 +15,13 @@ from dsc.sequencer.messages import LateMessage, Message
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import Kept, Shortener, message_form
 from dsc.sequencer.run_present import Present, read
-from dsc.sequencer.run_tables import archive, serials_before, unfinished
+from dsc.sequencer.run_tables import RunArchive, archive, unfinished
 from dsc.sequencer.run_writing import Writing
 from dsc.sequencer.telling import Told
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
 
-_BEGIN = "INSERT INTO runs (plot, arguments, version, header, plots, domain) VALUES (?, ?, ?, ?, ?, ?)"
-_MORE_RECORDS = "UPDATE steps SET records = records || ? WHERE place = (SELECT max(place) FROM steps)"
-_MORE_CHANGE = "UPDATE steps SET change = change || ? WHERE place = (SELECT max(place) FROM steps)"
 WHOLE_EVERY = 256
 """After so many macrosteps one writes all that a restart needs: a restart reads at most as many."""
 
@@ -64,7 +61,6 @@ class RunStore:
         self._run = self._number = 0
         self._records: list[Record] = []
         self.hear: Callable[[Record], None] = self._records.append
-        self._memory: dict[str, str] = {}
         self._short = Shortener(self._put_form)
         self._present = Present(self._short)
 
@@ -91,22 +87,22 @@ class RunStore:
         (open_runs,) = self.writing.connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
         if open_runs:
             raise StoreError("the store has an unfinished run, which can be resumed", place=Place(str(self.path)))
-        self.writing.connection.execute("DELETE FROM memory")
         self._number, self._present = 0, Present(self._short)
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
         row = (
             plot, text_of(self._short(arguments)), self._knowledge.version, text_of(self._header), text_of(plots),
             text_of(self._domain),
         )  # fmt: skip
-        self._run = self.writing.connection.execute(_BEGIN, row).lastrowid or 0
-        return serials_before(self.writing.connection, self._run)
+        earlier = RunArchive(self.writing.connection, self.path)
+        serials = earlier.serials_before(len(earlier.runs()) + 1)
+        self._run = self.writing.begin(*row)
+        return serials
 
     def late(self, late: LateMessage, due: float) -> None:
         """Something was handed in that comes later, at second `due` of run time."""
         self._present.put(late, self._number, due)
         if self._number:  # else it goes with the first macrostep
-            self.writing.require_right()
-            self.writing.connection.execute(_MORE_CHANGE, (self._present.change(),))
+            self.writing.more(change=self._present.change())
 
     def step(
         self,
@@ -116,6 +112,7 @@ class RunStore:
         reactor: Reactor,
         under_way: Collection[Told] = (),
         refused: Collection[Told] = (),
+        memories: Iterable[tuple[str, Any]] = (),
     ) -> None:
         """A macrostep; `message` is `None` for the first, in which the plot was started, and for leaving it.
 
@@ -126,6 +123,7 @@ class RunStore:
             reactor: after it.
             under_way: what components were told before and have not taken yet.
             refused: what they were told before and did not take.
+            memories: what components have to remember, by name.
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
@@ -135,26 +133,17 @@ class RunStore:
             self._present.taken(message)
         self._present.asked(output, self._number, now, reactor)
         self._present.reached(reactor)
+        self._present.remember(memories)
         change = self._present.change(whole=self._number % WHOLE_EVERY == 1)
         self.writing.step(
-            self._run, self._number, now, self.writing.before, version, state.serials, text_of(form),
+            self._run, self._number, float(now), self.writing.before, version, state.serials, text_of(form),
             _paths_text(state.configuration()), change, self._new_records(),
         )  # fmt: skip
         self.writing.before = version  # the next macrostep may be part of the same transaction
 
-    def memory(self, component: str, memory: Any) -> None:
-        """What a component has to remember; it is written if it is not what it was."""
-        text = text_of(memory)
-        if self._memory.get(component) != text:
-            self.writing.connection.execute("INSERT OR REPLACE INTO memory VALUES (?, ?)", (component, text))
-            self._memory[component] = text
-
     def end(self, *, finished: bool, problem: str | None) -> None:
         """The run is over."""
-        self.writing.require_right()
-        ended = text_of({"finished": finished, "problem": problem})
-        self.writing.connection.execute(_MORE_RECORDS, (self._new_records(),))
-        self.writing.connection.execute("UPDATE runs SET ended = ? WHERE run = ?", (ended, self._run))
+        self.writing.end(self._run, text_of({"finished": finished, "problem": problem}), self._new_records())
 
     def take_up(self, library: Library) -> Kept:
         """The unfinished run as it is now, to be gone on with; to be called outside `writing`.
@@ -163,7 +152,7 @@ class RunStore:
             StoreError: there is none, or it cannot be read.
             ChangedError: the plots or the domain are not those with which it was begun.
         """
-        with archive(self.path) as runs:
+        with archive(self.path, again=True) as runs:  # the knowledge was opened before
             run = unfinished(runs)
             require_unchanged(runs, run, library, self._domain)
             kept = read(runs, run, library)

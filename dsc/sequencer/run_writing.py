@@ -7,12 +7,23 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-from dsc.sequencer.run_tables import FORMAT, TABLES, require_format
+from dsc.sequencer.run_tables import CHAIN, FORMAT, TABLES, require_tables_of_runs
 from knowledge_base.errors import Place, StoreError
+from knowledge_base.journal.integrity import NOTHING, Tip, link, put_ends
 from knowledge_base.store import KnowledgeBase
 
 _RIGHT = "SELECT 1 FROM fence WHERE epoch = ?"
-_STEP = "INSERT INTO steps SELECT NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM fence WHERE epoch = ?"
+_STEP = "INSERT INTO steps SELECT NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM fence WHERE epoch = ?"
+_LAST = """SELECT run, number, time, before, version, serials, message, configuration, change, records, knowledge,
+    place FROM steps ORDER BY place DESC LIMIT 1"""
+_BEFORE = """SELECT digest FROM steps WHERE place = ? AND run = ?
+    UNION ALL SELECT digest FROM runs WHERE run = ? LIMIT 1"""
+_MORE = """UPDATE steps SET change = change || ?, records = records || ?, digest = ?
+    WHERE place = (SELECT max(place) FROM steps)"""
+_SEAL = "SELECT run, seal FROM runs ORDER BY run DESC LIMIT 1"
+_BEGIN = """INSERT INTO runs (run, plot, arguments, version, header, plots, domain, digest)
+    VALUES (?, ?, ?, ?, ?, ?, ?, ?)"""
+_END = "UPDATE runs SET ended = ?, steps = ?, seal = ? WHERE run = ?"
 Boundary = Literal["before commit", "after commit"]
 """Where a process that dies makes a difference: either nothing of the macrostep was, or nothing has left yet."""
 
@@ -37,14 +48,17 @@ class Writing:
     def __init__(self, knowledge: KnowledgeBase, path: Path) -> None:
         self.begun = self.lost = False
         self.before = 0
+        self._digest = NOTHING
+        self._last: tuple[bytes, tuple[Any, ...]] = NOTHING, ()
         self._knowledge = knowledge
         self._path = path
         self._listeners: list[Callable[[Boundary], None]] = []
         self._together = knowledge.together()
         with self._together as self.connection:
-            require_format(self.connection, path)
-            for statement in TABLES:
-                self.connection.execute(statement)
+            if not require_tables_of_runs(self.connection, path):
+                for statement in TABLES.values():
+                    self.connection.execute(statement)
+                put_ends(self.connection, [(CHAIN, Tip(0, NOTHING))])
             (epoch,) = self.connection.execute("SELECT max(epoch) FROM fence").fetchone()
             self.connection.execute("DELETE FROM fence")
             self._epoch = (epoch or 0) + 1
@@ -78,9 +92,48 @@ class Writing:
         """Raise `StoreError` if another sequencer has taken the run over."""
         self._require(self.connection.execute(_RIGHT, (self._epoch,)).fetchone() is not None)
 
+    def begin(self, *row: Any) -> int:
+        """The row of a run without its number, which is returned; errors as for `require_right`."""
+        self.require_right()
+        last, seal = self.connection.execute(_SEAL).fetchone() or (0, NOTHING)
+        self._digest = link(seal, last + 1, *row)
+        self.connection.execute(_BEGIN, (last + 1, *row, self._digest))
+        put_ends(self.connection, [(CHAIN, None)])
+        return int(last) + 1
+
     def step(self, *row: Any) -> None:
         """The row of a macrostep without its place; errors as for `require_right`, which it makes needless."""
-        self._require(self.connection.execute(_STEP, (*row, self._epoch)).rowcount == 1)
+        knowledge = self._knowledge.digest
+        before = self._digest or self._continued()
+        digest = link(before + knowledge, *row)
+        self._require(self.connection.execute(_STEP, (*row, knowledge, digest, self._epoch)).rowcount == 1)
+        self._last = before + knowledge, row
+        self._digest = digest
+
+    def more(self, change: str = "", records: str = "") -> None:
+        """Add to the last macrostep; errors as for `require_right`."""
+        self.require_right()
+        self._digest = self._digest or self._continued()
+        before, row = self._last
+        row = *row[:-2], row[-2] + change, row[-1] + records
+        self._digest = link(before, *row)
+        self.connection.execute(_MORE, (change, records, self._digest))
+        self._last = before, row
+
+    def end(self, run: int, ended: str, records: str) -> None:
+        """The end of a run, with the last records; errors as for `require_right`."""
+        self.more(records=records)
+        (steps,) = self.connection.execute("SELECT max(place) FROM steps").fetchone()
+        seal = link(self._digest, steps, ended)
+        self.connection.execute(_END, (ended, steps, seal, run))
+        put_ends(self.connection, [(CHAIN, Tip(steps, seal))])
+
+    def _continued(self) -> bytes:
+        """The digest of the last macrostep that an earlier program has written, which is the last one now."""
+        *row, knowledge, place = self.connection.execute(_LAST).fetchone()
+        (before,) = self.connection.execute(_BEFORE, (place - 1, row[0], row[0])).fetchone()
+        self._last = before + knowledge, tuple(row)
+        return link(before + knowledge, *row)
 
     def _require(self, right: object) -> None:
         if not right:

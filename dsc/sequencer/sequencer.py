@@ -319,9 +319,9 @@ class Sequencer:
     def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:
         assert self.store is not None  # noqa: S101
         telling = self.dispatcher.telling
-        self.store.step(self.clock.now(), message, output, self._reactor, telling.under_way, telling.refused())
-        for component, memory in self.dispatcher.memories():
-            self.store.memory(component, memory)
+        memories = self.dispatcher.memories()
+        now, refused = self.clock.now(), telling.refused()
+        self.store.step(now, message, output, self._reactor, telling.under_way, refused, memories)
 
     def _carry_out(self, output: Iterable[Output]) -> None:
         try:

@@ -14,7 +14,7 @@ from dsc.dynamic.library import Library
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_tables import StepRow, archive
 from dsc.trace import Record
-from knowledge_base.errors import InputError
+from knowledge_base.errors import DamagedStoreError, InputError
 from knowledge_base.facts import Fact
 from knowledge_base.store import KnowledgeBase
 
@@ -61,9 +61,12 @@ def kept_run(store: Path) -> Iterator[KeptRun]:
 
 
 def violations(store: Path, invariants: Iterable[Invariant]) -> list[str]:
-    """All that is wrong with the last run of a store; raises `StoreError` if there is none."""
-    with kept_run(store) as run:
-        return [wrong for invariant in invariants for wrong in invariant(run)]
+    """All that is wrong with the last run of a store, or that the store is damaged; `StoreError` if there is none."""
+    try:
+        with kept_run(store) as run:
+            return [wrong for invariant in invariants for wrong in invariant(run)]
+    except DamagedStoreError as error:
+        return [error.message]
 
 
 def comes_to_an_end(seconds: float) -> Invariant:

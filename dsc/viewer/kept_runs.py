@@ -26,7 +26,7 @@ def following_run(path: Path) -> Iterator[RecordLog]:
 
     def look() -> bool:
         nonlocal place
-        with archive(path) as runs:
+        with archive(path, again=True) as runs:
             for here, line in runs.lines(run.number, place):
                 if (record := Record.from_line(line)).seq > len(log):  # a macrostep may get more at its end
                     log.hear(record)

@@ -20,6 +20,7 @@ for command in (
     telling.retract,
     following.watch,
     following.history,
+    following.check,
     asking.at,
     telling.compact,
 ):

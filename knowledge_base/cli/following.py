@@ -42,6 +42,18 @@ def history(
     print_table(["version", "time", "author", "change"], rows)
 
 
+def check(store: Store, json: Json = False) -> None:
+    """Look whether a store's knowledge is what was written into it; all of it is read. Runs: `dsc runs check`."""
+    from knowledge_base.journal.archive import Archive
+
+    archive = Archive(store.resolve(), None)
+    last = archive.require_all()
+    if json:
+        print_json({"oldest": archive.oldest(), "newest": last})
+        return
+    typer.echo(f"versions {archive.oldest()} to {last}: as they were written")
+
+
 def watch(
     store: Store,
     pattern: Pattern = None,

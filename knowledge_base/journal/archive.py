@@ -14,17 +14,35 @@ from knowledge_base.exchange.forms import FORM_ERRORS, delta_of, schema_of, worl
 from knowledge_base.facts import Change
 from knowledge_base.journal.file import reading
 from knowledge_base.journal.history import Version, Writer, gone, too_early
+from knowledge_base.journal.integrity import (
+    NOTHING,
+    Ends,
+    Tip,
+    damaged,
+    link,
+    require_link,
+    require_sound,
+    require_tables,
+)
+from knowledge_base.journal.making import TABLES
 from knowledge_base.world.compatibility import require_extension
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
-_JOURNAL = "SELECT version, time, author, delta FROM changes WHERE version > ? AND version <= ? ORDER BY version"
+_JOURNAL = """SELECT version, time, author, delta, digest FROM changes WHERE version > ? AND version <= ?
+    ORDER BY version"""
 _LAST = "SELECT max(version) FROM (SELECT version FROM changes UNION ALL SELECT version FROM snapshots)"
 _BOTH_THERE = "SELECT EXISTS (SELECT 1 FROM schemas) AND EXISTS (SELECT 1 FROM snapshots)"
-_BY_KEY = (
-    "SELECT version, keys.time, keys.author, coalesce(keys.delta, changes.delta) "
-    "FROM keys LEFT JOIN changes USING (version) WHERE key = ?"
-)
+_DIGEST_AT = """SELECT digest FROM changes WHERE version = :version
+    UNION ALL SELECT head FROM snapshots WHERE version = :version"""
+_KEYS = """SELECT number, key, version, keys.time, keys.author, coalesce(keys.delta, changes.delta), context,
+    keys.digest, coalesce((SELECT digest FROM keys AS before WHERE before.number = keys.number - 1), x'')
+    FROM keys LEFT JOIN changes USING (version)"""
+_TIPS = {
+    "schemas": "SELECT rowid, digest FROM schemas ORDER BY rowid DESC LIMIT 1",
+    "keys": "SELECT number, digest FROM keys ORDER BY number DESC LIMIT 1",
+}
+_SNAPSHOTS = "SELECT version, time, world, head, digest FROM snapshots"
 
 
 class Archive:
@@ -35,7 +53,7 @@ class Archive:
         schema: an extension of the store's own, which is taken when it is `None`.
 
     Raises:
-        StoreError: the file is not there, not a store, or cannot be read.
+        StoreError: the file is not there, not a store, damaged, or cannot be read.
         SchemaMismatchError: the store was written with a schema that `schema` does not extend.
     """
 
@@ -43,6 +61,7 @@ class Archive:
         self._path = path
         self._place = Place(str(path))
         with self._reading() as connection:
+            self.require_whole(connection)
             written = self.written_schema(connection)
             self._written = self._schema_hash(connection)
         if schema is not None:
@@ -58,6 +77,12 @@ class Archive:
         """The last world that was committed."""
         with self._reading() as connection:
             return self._world(connection, self._last(connection))
+
+    @property
+    def digest(self) -> bytes:
+        """Of the newest version, and so of everything before it."""
+        with self._reading() as connection:
+            return self._digest_at(connection, self._last(connection))
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:  # noqa: ARG002
         """Refused.
@@ -108,12 +133,13 @@ class Archive:
             found = connection.execute(
                 "SELECT version FROM changes WHERE time <= ? ORDER BY version DESC LIMIT 1", (time,)
             ).fetchone()
-            if found is not None:
-                return int(found[0])
-            oldest, begin = connection.execute("SELECT min(version), time FROM snapshots").fetchone()
-            if time < begin:
+            oldest, last = _oldest(connection), self._last(connection)
+            reached = oldest if found is None else int(found[0])
+            for _ in self._changes(connection, max(oldest, reached - 1), min(last, reached + 1)):
+                pass  # the change and the one after it are what was written, their times too
+            if found is None and time < self._snapshot(connection, oldest)[1]:
                 raise too_early(time, oldest, self._place)
-            return int(oldest)
+            return reached
 
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002
         """Refused.
@@ -126,12 +152,57 @@ class Archive:
     def close(self) -> None:
         """Nothing is kept open."""
 
-    def written_schema(self, connection: sqlite3.Connection) -> Schema:
-        """The schema that the store has now."""
+    def require_whole(self, connection: sqlite3.Connection) -> None:
+        """Look whether the store has the tables that a store has, and its chains end where they ended.
+
+        Rows are judged when they are read. A store that was not closed is judged page by page: it may be the copy of
+        one that was written meanwhile, or what a crash has left.
+
+        Raises:
+            DamagedStoreError: it is not what was written.
+        """
+        require_tables(connection, self._path, TABLES)
+        ends = Ends(connection, self._path)
+        if not ends.closed:
+            require_sound(connection, self._path)
         (parts,) = connection.execute(_BOTH_THERE).fetchone()
         if not parts:
-            raise StoreError("the store is damaged: its schema or its first world is gone", place=self._place)
-        (text,) = connection.execute("SELECT declarations FROM schemas ORDER BY rowid DESC LIMIT 1").fetchone()
+            raise damaged(self._path, "its schema or its first world is gone")
+        (first,) = connection.execute("SELECT min(version) FROM changes").fetchone()
+        if first is not None and first != _oldest(connection) + 1:
+            raise damaged(self._path, f"version {_oldest(connection) + 1} is missing")
+        if ends.closed:
+            for chain, tip in self._tips(connection):
+                ends.require(chain, tip)
+
+    def require_all(self) -> int:
+        """Read every row, and let SQLite look at every page; takes time in proportion to the file.
+
+        Returns:
+            The last version.
+
+        Raises:
+            DamagedStoreError: something is not what was written.
+        """
+        with self._reading() as connection:
+            require_sound(connection, self._path)
+            self.require_whole(connection)
+            last = self._last(connection)
+            for (version,) in connection.execute("SELECT version FROM snapshots").fetchall():
+                state = self._snapshot_state(connection, version)[0]
+                if version == _oldest(connection):
+                    for change in self._changes(connection, version, last):
+                        state.commit(change.delta)
+            for row in connection.execute(f"{_KEYS} ORDER BY number"):
+                self._key(row)
+        return last
+
+    def written_schema(self, connection: sqlite3.Connection) -> Schema:
+        """The schema that the store has now."""
+        digest, text = NOTHING, ""
+        for number, row in enumerate(connection.execute("SELECT * FROM schemas ORDER BY rowid"), 1):
+            version, name, text, found = row
+            digest = require_link(self._path, f"schema {number}", found, (digest,), version, name, text)
         try:
             return schema_of(json.loads(text))
         except FORM_ERRORS as error:
@@ -146,20 +217,50 @@ class Archive:
             yield connection
 
     def _world(self, connection: sqlite3.Connection, version: int) -> Version:
-        snapshot = connection.execute(
-            "SELECT version, time, world FROM snapshots WHERE version <= ? ORDER BY version DESC LIMIT 1", (version,)
+        row = connection.execute(
+            "SELECT version FROM snapshots WHERE version <= ? ORDER BY version DESC LIMIT 1", (version,)
         ).fetchone()
-        if snapshot is None:
+        if row is None:
             raise gone(version, _oldest(connection), self._place)
-        reached, time, text = snapshot
+        reached = int(row[0])
+        state, time = self._snapshot_state(connection, reached)
         try:
-            state = world_of(json.loads(text), self._schema)
             for change in self._changes(connection, reached, version):
                 state.commit(change.delta)
                 reached, time = change.version, change.time
         except FORM_ERRORS as error:
-            self._unreadable(f"what follows version {reached}", error)
+            self._unreadable(f"the change to version {reached + 1}", error)
         return Version(state, reached, time)
+
+    def _snapshot_state(self, connection: sqlite3.Connection, version: int) -> tuple[WorldState, float]:
+        text, time = self._snapshot(connection, version)
+        try:
+            return world_of(json.loads(text), self._schema), time
+        except FORM_ERRORS as error:
+            self._unreadable(f"the snapshot of version {version}", error)
+
+    def _snapshot(self, connection: sqlite3.Connection, version: int) -> tuple[str, float]:
+        """The text of a world that is kept as a whole, and its time."""
+        _, time, text, head, digest = connection.execute(f"{_SNAPSHOTS} WHERE version = ?", (version,)).fetchone()
+        name = f"the snapshot of version {version}"
+        require_link(self._path, name, digest, (head, schema_at(connection, version)), version, time, text)
+        made = connection.execute("SELECT digest FROM changes WHERE version = ?", (version,)).fetchone()
+        if made is not None and made[0] != head:
+            raise damaged(self._path, f"{name} does not belong here")
+        return text, time
+
+    def _tips(self, connection: sqlite3.Connection) -> Iterator[tuple[str, Tip]]:
+        """Where the chains of knowledge end; the ends of all others belong to those who write them."""
+        last = self._last(connection)
+        yield "changes", Tip(last, self._digest_at(connection, last))
+        for chain, question in _TIPS.items():
+            yield chain, Tip(*(connection.execute(question).fetchone() or (0, NOTHING)))
+
+    def _digest_at(self, connection: sqlite3.Connection, version: int) -> bytes:
+        row = connection.execute(_DIGEST_AT, {"version": version}).fetchone()
+        if row is None or not isinstance(row[0], bytes):
+            raise damaged(self._path, f"version {version} is missing")
+        return row[0]
 
     def _last(self, connection: sqlite3.Connection) -> int:
         return int(connection.execute(_LAST).fetchone()[0])
@@ -173,21 +274,36 @@ class Archive:
         return list(self._changes(connection, since, until))
 
     def _changes(self, connection: sqlite3.Connection, since: int, until: int) -> Iterator[Change]:
-        expected = since
-        for row in connection.execute(_JOURNAL, (since, until)):
+        if since >= until:
+            return
+        expected, digest = since, self._digest_at(connection, since)
+        (_, schema), *later = _schemas(connection)
+        for version, time, author, text, found in connection.execute(_JOURNAL, (since, until)):
             expected += 1
-            if row[0] != expected:
+            if version != expected:
                 break
-            yield self._change(row)
+            while later and later[0][0] <= version:
+                _, schema = later.pop(0)
+            name = f"the change to version {version}"
+            digest = require_link(self._path, name, found, (digest, schema), version, time, author, text)
+            yield self._change((version, time, author, text))
         else:
             if expected == until:
                 return
             expected += 1
-        raise StoreError(f"the store is damaged: version {expected} is missing", place=self._place)
+        raise damaged(self._path, f"version {expected} is missing")
 
     def _by_key(self, connection: sqlite3.Connection, key: str) -> Change | None:
-        row = connection.execute(_BY_KEY, (key,)).fetchone()
-        return self._change(row) if row is not None else None
+        row = connection.execute(f"{_KEYS} WHERE key = ?", (key,)).fetchone()
+        return self._key(row) if row is not None else None
+
+    def _key(self, row: Any) -> Change:
+        """The change that a key stands for."""
+        number, key, version, time, author, delta, context, digest, before = row
+        name = f"key {number} ('{key}')"
+        change = link(context, version, time, author, delta) if isinstance(context, bytes) else None
+        require_link(self._path, name, digest, (before, change), number, key, version, time, author)
+        return self._change((version, time, author, delta))
 
     def _change(self, row: Any) -> Change:
         version, time, author, text = row
@@ -197,8 +313,20 @@ class Archive:
             self._unreadable(f"the change to version {version}", error)
 
     def _unreadable(self, what: str, error: Exception) -> NoReturn:
-        raise StoreError(f"the store is damaged: {what} cannot be read", place=self._place) from error
+        raise damaged(self._path, f"{what} cannot be read") from error
 
 
 def _oldest(connection: sqlite3.Connection) -> int:
     return int(connection.execute("SELECT min(version) FROM snapshots").fetchone()[0])
+
+
+def _schemas(connection: sqlite3.Connection) -> list[tuple[int, bytes]]:
+    """The digest of each schema, with the first version that was made with it."""
+    rows = connection.execute("SELECT version, digest FROM schemas WHERE typeof(digest) = 'blob' ORDER BY rowid")
+    return [(version, digest) for version, digest in rows if isinstance(version, int)] or [(0, NOTHING)]
+
+
+def schema_at(connection: sqlite3.Connection, version: int) -> bytes:
+    """The digest of the schema with which that version was made."""
+    first, *later = _schemas(connection)
+    return next((digest for since, digest in reversed(later) if since <= version), first[1])

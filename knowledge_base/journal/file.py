@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from knowledge_base.errors import Place, StoreError
+from knowledge_base.errors import DamagedStoreError, Place, StoreError
 from knowledge_base.journal.neighbours import INDEX, LOG, regular, require_no_strangers, unlocked
 from knowledge_base.journal.still import changed, is_still, open_still, stamp_of
 from knowledge_base.pddl.files import files_beside
@@ -20,7 +20,7 @@ Durability = Literal["memory", "process", "power"]
 """What a commit outlives: nothing; the death of the process; a power cut (as far as the disk is honest)."""
 
 APPLICATION_ID = 0x6473636B  # "dsck", by which a file is known as ours (SQLite's application_id)
-FORMAT = 2
+FORMAT = 3
 PATIENCE_S = 1.0
 """How long to wait for others who lock the file; there should be none."""
 
@@ -38,7 +38,16 @@ def reported(path: Path, doing: str) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as error:
-        raise StoreError(f"cannot {doing} the store: {error}", place=Place(str(path))) from error
+        kind = DamagedStoreError if _means_damage(error) else StoreError
+        raise kind(f"cannot {doing} the store: {error}", place=Place(str(path))) from error
+
+
+def _means_damage(error: sqlite3.Error) -> bool:
+    """Whether SQLite says that the file is malformed, or text in it is no UTF-8 (which is Python's own finding)."""
+    code = getattr(error, "sqlite_errorcode", None)
+    if code is None:
+        return "UTF-8" in str(error)
+    return code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 
 @contextmanager

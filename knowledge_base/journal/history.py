@@ -28,6 +28,11 @@ class Version:
 class History(Protocol):
     """Keeps changes. Methods that ask may be called by any thread; `append` is called by one at a time."""
 
+    @property
+    def digest(self) -> bytes:
+        """Of the newest version, and so of everything before it; empty where nothing is kept for long."""
+        ...
+
     def newest(self) -> Version:
         """The world to go on with; it belongs to the caller."""
         ...

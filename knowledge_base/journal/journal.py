@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -10,7 +11,7 @@ from pathlib import Path
 from knowledge_base.errors import ConflictError, InputError, Place, StoreError
 from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
-from knowledge_base.journal.archive import Archive
+from knowledge_base.journal.archive import Archive, schema_at
 from knowledge_base.journal.checkpoints import CHECKPOINTS
 from knowledge_base.journal.file import (
     Durability,
@@ -21,6 +22,7 @@ from knowledge_base.journal.file import (
     writing,
 )
 from knowledge_base.journal.history import Version, Writer
+from knowledge_base.journal.integrity import NOTHING, SIZE, Tip, link, mark_closed, put_ends, require_sound
 from knowledge_base.journal.lock import WriterLock
 from knowledge_base.journal.making import making
 from knowledge_base.journal.transaction import Group, Transaction
@@ -35,9 +37,11 @@ They are read back in a fraction of a second. A world that is longer than this i
 characters of changes as it has itself: so snapshots at most double the file and the work.
 """
 
-_INSERT_CHANGE = "INSERT INTO changes VALUES (?, ?, ?, ?)"
-_INSERT_KEY = "INSERT INTO keys VALUES (?, ?, ?, ?, ?)"
-_INSERT_SNAPSHOT = "INSERT OR IGNORE INTO snapshots SELECT version, time, :world FROM changes WHERE version = :version"
+_INSERT_CHANGE = "INSERT INTO changes VALUES (?, ?, ?, ?, ?)"
+_INSERT_KEY = "INSERT INTO keys VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+_LAST_KEY = "SELECT number, digest FROM keys ORDER BY number DESC LIMIT 1"
+_LAST_SCHEMA = "SELECT digest FROM schemas ORDER BY rowid DESC LIMIT 1"
+_INSERT_SNAPSHOT = "INSERT OR IGNORE INTO snapshots VALUES (?, ?, ?, ?, ?)"
 _LAST_SNAPSHOT = "SELECT version, length(world) FROM snapshots ORDER BY version DESC LIMIT 1"
 _SIZE_SINCE = "SELECT coalesce(sum(length(delta)), 0) FROM changes WHERE version > ?"
 _FORGET = (
@@ -77,6 +81,7 @@ class Journal(Archive):
         if not is_there(path) and schema is None:
             raise _no_schema(path)
         self._place = Place(str(path))
+        self._head = self._schema_digest = NOTHING
         self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
         self._durability = durability
         self._writers = WriterLock(path)
@@ -84,7 +89,8 @@ class Journal(Archive):
             if new or not is_there(path):
                 _make(path, schema, durability, clock())
             self._connection = writing(path, durability)
-            self._transaction = Transaction(self._connection, path, durability)
+            self._token = os.urandom(SIZE)
+            self._transaction = Transaction(self._connection, path, durability, self._token)
             self._group = Group(self._transaction, self._place)
             try:
                 self._prepare(schema, clock)
@@ -104,21 +110,27 @@ class Journal(Archive):
         if along is not None and not callable(along):
             raise InputError(f"what writes along is a function of a connection, not {along!r}")
         delta = compact(delta_form(change.delta))
+        time, context = float(change.time), self._head + self._schema_digest
+        digest = link(context, change.version, time, change.author, delta)
         snapshot = None if self._tail < max(SNAPSHOT_AFTER, self._snapshot_size) else compact(world_form(before))
         with self._part() as connection:
             if snapshot is not None:
                 self._put_snapshot(snapshot, change.version - 1)
             if change.delta:
-                connection.execute(_INSERT_CHANGE, (change.version, change.time, change.author, delta))
+                connection.execute(_INSERT_CHANGE, (change.version, time, change.author, delta, digest))
             if key is not None:
+                number, previous = connection.execute(_LAST_KEY).fetchone() or (0, NOTHING)
+                said = (number + 1, key, change.version, time, change.author)
                 kept = None if change.delta else delta
-                connection.execute(_INSERT_KEY, (key, change.version, change.time, change.author, kept))
+                connection.execute(_INSERT_KEY, (*said, kept, context, link(previous + digest, *said)))
             if along is not None:
                 with _guarded(connection):
                     along(connection)
         if snapshot is not None:
             self._tail, self._snapshot_size = 0, len(snapshot)
         self._tail += len(delta)
+        if change.delta:
+            self._head = digest
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
         """Write what is appended in the block, and what else the block writes, in one transaction."""
@@ -138,9 +150,15 @@ class Journal(Archive):
         """
         raise ConflictError(f"{self._place}: version {version} is the newest, as this is the store's only writer")
 
+    @property
+    def digest(self) -> bytes:
+        """Of the newest version, and so of everything before it."""
+        return self._head
+
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  the file knows
         """Make version `keep_since` the oldest: a snapshot of it takes the place of all before."""
         with self._reading() as connection:
+            require_sound(connection, self._path)  # pages are moved about
             world = compact(world_form(self._world(connection, keep_since).state))
         with self._transaction as connection:
             self._put_snapshot(world, keep_since)
@@ -156,6 +174,7 @@ class Journal(Archive):
     def close(self) -> None:
         """Let others write; nothing stays beside the file."""
         CHECKPOINTS.leave(self._path)
+        self._end()
         moved = not self._transaction.is_in_place()
         if moved:  # SQLite puts the log only into a file that is in its place
             with suppress(sqlite3.Error):  # it is closed already
@@ -165,14 +184,25 @@ class Journal(Archive):
             delete_empty_log(self._path)
         self._writers.release()
 
+    def _end(self) -> None:
+        """Say where the chains end; if that cannot be written, the store is as after a crash."""
+        if self._transaction.marked and self._group.behind is None:
+            with suppress(StoreError), self._transaction as connection:
+                if mark_closed(connection, self._token):
+                    put_ends(connection, self._tips(connection))
+        self._transaction.marked = False
+
     def _lay_out_log(self) -> None:
         if self._durability == "power":
             lay_out_log(self._path)
 
     def _prepare(self, schema: Schema | None, clock: Callable[[], float]) -> None:
         with reported(self._path, "read"):
+            self.require_whole(self._connection)
             written = self.written_schema(self._connection)
             self._schema = schema or written
+            (self._schema_digest,) = self._connection.execute(_LAST_SCHEMA).fetchone()
+            self._head = self._digest_at(self._connection, self._last(self._connection))
             if schema_hash(self._schema) != schema_hash(written):
                 self._extend(written, clock)
             self._measure()
@@ -183,15 +213,21 @@ class Journal(Archive):
         last = self.newest()
         require_functional(last.state, self._place)
         constants = missing_constants(last.state, self._place)
+        row = (last.version + 1, max(last.time, float(clock())), "schema", compact(delta_form(constants)))
         with self._transaction as connection:
-            _put_schema(connection, self._schema, last.version + bool(constants))
+            schema = _put_schema(connection, self._schema, last.version + 1, self._schema_digest)
+            head = self._head
             if constants:
-                row = (last.version + 1, max(last.time, clock()), "schema", compact(delta_form(constants)))
-                connection.execute(_INSERT_CHANGE, row)
+                head = link(head + schema, *row)
+                connection.execute(_INSERT_CHANGE, (*row, head))
+        self._schema_digest, self._head = schema, head
 
     def _put_snapshot(self, world: str, version: int) -> None:
         """Keep the world of a version that is in the journal, or in a snapshot already."""
-        self._connection.execute(_INSERT_SNAPSHOT, {"version": version, "world": world})
+        found = self._connection.execute("SELECT time, digest FROM changes WHERE version = ?", (version,)).fetchone()
+        if found is not None:
+            time, head = found
+            _put_world(self._connection, version, time, world, head, schema_at(self._connection, version))
 
     def _measure(self) -> None:
         version, self._snapshot_size = self._connection.execute(_LAST_SNAPSHOT).fetchone()
@@ -255,14 +291,25 @@ def _make(path: Path, schema: Schema | None, durability: Durability, time: float
     if schema is None:  # somebody has just taken it away
         raise _no_schema(path)
     with making(path, durability) as connection:
-        _put_schema(connection, schema, 0)
-        world = compact(world_form(WorldState(schema)))
-        connection.execute("INSERT INTO snapshots VALUES (0, ?, ?)", (time, world))
+        first = _put_schema(connection, schema, 0, NOTHING)
+        head = os.urandom(SIZE)  # so that no row of another store fits this one
+        _put_world(connection, 0, float(time), compact(world_form(WorldState(schema))), head, first)
+        put_ends(connection, {"changes": Tip(0, head), "schemas": Tip(1, first), "keys": Tip(0, NOTHING)}.items())
 
 
-def _put_schema(connection: sqlite3.Connection, schema: Schema, version: int) -> None:
+def _put_schema(connection: sqlite3.Connection, schema: Schema, version: int, before: bytes) -> bytes:
+    """Keep a schema, with which the next change is made, after the one with that digest; its own digest."""
     row = (version, schema_hash(schema), compact(schema_form(schema)))
-    connection.execute("INSERT INTO schemas VALUES (?, ?, ?)", row)
+    digest = link(before, *row)
+    connection.execute("INSERT INTO schemas VALUES (?, ?, ?, ?)", (*row, digest))
+    return digest
+
+
+def _put_world(
+    connection: sqlite3.Connection, version: int, time: float, world: str, head: bytes, schema: bytes
+) -> None:
+    digest = link(head + schema, version, time, world)
+    connection.execute(_INSERT_SNAPSHOT, (version, time, world, head, digest))
 
 
 def _require_text(*words: str) -> None:

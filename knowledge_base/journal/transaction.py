@@ -14,6 +14,7 @@ from types import TracebackType
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.checkpoints import CHECKPOINTS
 from knowledge_base.journal.file import Durability, reported
+from knowledge_base.journal.integrity import mark_open
 
 TIDY_UP_AFTER = 500
 """Commits after which the file is tidied up; SQLite itself would after a thousand pages, and they take one or two."""
@@ -26,12 +27,18 @@ class Transaction:
         connection: that of the one who writes.
         path: the store.
         durability: what a commit outlives.
+        token: of this writer, with which its first commit says that the store is open.
+
+    Attributes:
+        marked: whether it has said so.
 
     Raises:
         StoreError: on entering or leaving, it cannot be written; nothing of the block is.
     """
 
-    def __init__(self, connection: sqlite3.Connection, path: Path, durability: Durability) -> None:
+    def __init__(self, connection: sqlite3.Connection, path: Path, durability: Durability, token: bytes) -> None:
+        self.marked = False
+        self._token = token
         self._connection = connection
         self._path = path
         self._durability = durability
@@ -79,6 +86,8 @@ class Transaction:
         connection = self._connection
         changed = connection.total_changes != self._rows
         self._commits += changed
+        if changed and not self.marked:
+            mark_open(connection, self._token)
         if self._durability == "power" or not changed or self._commits % TIDY_UP_AFTER:
             connection.execute("COMMIT")
         elif not CHECKPOINTS.is_behind(self._path):
@@ -89,6 +98,7 @@ class Transaction:
             CHECKPOINTS.leave(self._path)
             with suppress(sqlite3.Error):  # it is committed; what cannot be tidied up now is later
                 connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+        self.marked = self.marked or changed
 
 
 class Group:

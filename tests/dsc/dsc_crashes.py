@@ -7,6 +7,8 @@ is committed and whenever the robot has done something; each copy can be resumed
 from __future__ import annotations
 
 import shutil
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,11 +20,12 @@ from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_tables import archive
+from dsc.sequencer.run_tables import CHAIN, archive
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.trace import Trace
 from knowledge_base.facts import Delta, Fact, fact
+from knowledge_base.journal.integrity import Tip, link, put_ends
 from knowledge_base.store import KnowledgeBase
 
 
@@ -108,6 +111,22 @@ class Run:
 
     def outcome(self):
         return self.end, self.at, self.steps, self.facts, self.robot.done
+
+
+def forged(path: Path, *statements: str, **parameters: str) -> None:
+    """Change the macrosteps of a store's last run as a program with an error would write them: with digests that fit."""
+    with closing(sqlite3.connect(path)) as connection, connection:
+        for statement in statements:
+            connection.execute(statement, parameters)
+        run, digest = connection.execute("SELECT run, digest FROM runs ORDER BY run DESC LIMIT 1").fetchone()
+        rows = connection.execute("SELECT * FROM steps WHERE run = ? ORDER BY place", (run,)).fetchall()
+        for place, *row, knowledge, _ in rows:
+            digest = link(digest + knowledge, *row)
+            connection.execute("UPDATE steps SET digest = ? WHERE place = ?", (digest, place))
+        (ended,) = connection.execute("SELECT ended FROM runs WHERE run = ?", (run,)).fetchone()
+        seal = None if ended is None else link(digest, place, ended)
+        connection.execute("UPDATE runs SET seal = ?, steps = ? WHERE run = ?", (seal, seal and place, run))
+        put_ends(connection, [(CHAIN, Tip(place, seal) if seal else None)])
 
 
 def copied(folder: Path, to: Path) -> Path:

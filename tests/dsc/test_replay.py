@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
-import sqlite3
 
 import pytest
 from dsc_charts import plot
-from dsc_crashes import Crashes, Run
+from dsc_crashes import Crashes, Run, forged
 from dsc_kept_charts import CHARTS, handed_in
 from dsc_runs import SCHEMA
 from typer.testing import CliRunner
@@ -78,11 +77,12 @@ def test_a_chart_that_does_not_start_what_answered_diverges(tmp_path):
     assert "not started at all" in str(replay(run.path, library=other).divergence)
 
 
-def test_a_record_that_was_tampered_with_is_noticed(tmp_path):
+ELSEWHERE = """UPDATE steps SET configuration = '["e"]' WHERE number = 2"""
+
+
+def test_a_macrostep_that_led_elsewhere_is_noticed(tmp_path):
     run = Run(tmp_path, [GUARDED])
-    with sqlite3.connect(run.path) as file:
-        file.execute("UPDATE steps SET configuration = ? WHERE number = 2", ('["e"]',))
-    file.close()
+    forged(run.path, ELSEWHERE)
     assert replay(run.path).divergence.step == 2
 
 
@@ -119,9 +119,7 @@ def test_a_run_with_a_problem_shows_it(tmp_path):
 
 def test_a_divergence_has_its_own_exit_status(tmp_path):
     run = Run(tmp_path, [GUARDED])
-    with sqlite3.connect(run.path) as file:
-        file.execute("UPDATE steps SET configuration = ? WHERE number = 2", ('["e"]',))
-    file.close()
+    forged(run.path, ELSEWHERE)
     replayed = command("replay", run.path)
     assert replayed.exit_code == 1
     assert replayed.output == "run 1: 1 steps as they were, then step 2: the configuration was: e; now: a\n"

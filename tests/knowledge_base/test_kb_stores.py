@@ -132,16 +132,16 @@ FOREIGN = {
     "text": (lambda p: p.write_text("(define (domain d))\n" * 100), "file is not a database"),
     "other database": (lambda p: (p.unlink(), database(p, "CREATE TABLE t (x)")), "no knowledge store"),
     "other application": (lambda p: (p.unlink(), database(p, "PRAGMA application_id = 7")), "no knowledge store"),
-    "later format": (lambda p: database(p, "PRAGMA user_version = 9"), "format 9, this program reads format 2"),
+    "later format": (lambda p: database(p, "PRAGMA user_version = 9"), "format 9, this program reads format 3"),
     "folder": (lambda p: (p.unlink(), p.mkdir()), "'world.kb' is a folder, not a regular file"),
-    "schema": (lambda p: database(p, "UPDATE schemas SET declarations = '[1]'"), "the schema cannot be read"),
-    "change": (lambda p: database(p, "UPDATE changes SET delta = '{' WHERE version = 2"), "the change to version 2 cannot be read"),
+    "schema": (lambda p: database(p, "UPDATE schemas SET declarations = '[1]'"), "schema 1 is not what was written"),
+    "change": (lambda p: database(p, "UPDATE changes SET delta = '{' WHERE version = 2"), "the change to version 2 is not what was written"),
     "change of nothing known": (
         lambda p: database(p, """UPDATE changes SET delta = '{"removed_nodes": ["ghost"]}' WHERE version = 2"""),
-        "what follows version 1 cannot be read",
+        "the change to version 2 is not what was written",
     ),
     "gap": (lambda p: database(p, "DELETE FROM changes WHERE version = 1"), "version 1 is missing"),
-    "snapshot": (lambda p: database(p, "UPDATE snapshots SET world = '{}'"), "what follows version 0 cannot be read"),
+    "snapshot": (lambda p: database(p, "UPDATE snapshots SET world = '{}'"), "the snapshot of version 0 is not what was written"),
     "pages": (scribble, "cannot read the store: database disk image is malformed|cannot (open|read) the store"),
 }  # fmt: skip
 

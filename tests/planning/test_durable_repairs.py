@@ -167,7 +167,7 @@ def test_what_the_planner_has_answered_is_not_lost_when_something_else_was_heard
     checked = 0
     for path, robot in kept.copies[1:]:
         with archive(path) as runs:
-            (memory,) = runs.connection.execute("SELECT memory FROM memory WHERE component = 'planner'").fetchone() or ("",)
+            memory = runs.standing().memory.get("planner", "")
         if '"plan_invalid"' in memory:
             kept.check(path, robot)
             checked += 1

@@ -1,0 +1,132 @@
+"""Whether a store has what was written, all of it and nothing else: chained digests, and the ends of the chains.
+
+Each row of a journal carries a digest of the row before it and of its own content. A row that is edited, missing,
+inserted or moved breaks the chain there. `ends` says where a chain ends; it is written when a store is closed, so only
+a store that was not closed (a crash, or a writer at work) can lack its last rows unnoticed: SQLite's log ends there.
+The digests find damage; they are no signature, since they need no secret.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Mapping
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from knowledge_base.errors import DamagedStoreError, Place
+
+SIZE: Final = 16
+"""Bytes of a digest."""
+NOTHING: Final = b""
+"""The digest before the first row of a chain."""
+ENDS = "CREATE TABLE ends (chain TEXT PRIMARY KEY, count INTEGER, digest BLOB) WITHOUT ROWID"
+_OPEN = "open"
+_PUT_END = "INSERT OR REPLACE INTO ends VALUES (?, ?, ?)"
+_SHOWN = 3
+"""Problems of SQLite's own check that a message shows."""
+
+
+class Tip(NamedTuple):
+    """The end of a chain: how many rows it has, and the digest of the last."""
+
+    rows: int
+    digest: bytes
+
+
+def link(before: bytes, *values: Any) -> bytes:
+    """The digest of a row.
+
+    Args:
+        before: the digest of the row before it, and of what else the row depends on.
+        values: its columns as SQLite gives them back; a REAL is a float.
+    """
+    return blake2b(before + "\0".join(map(str, values)).encode(), digest_size=SIZE).digest()
+
+
+def damaged(path: Path, what: str) -> DamagedStoreError:
+    """The error about a store whose content is not what was written."""
+    return DamagedStoreError(f"the store is damaged: {what}", place=Place(str(path)))
+
+
+def require_link(path: Path, row: str, digest: object, before: tuple[Any, ...], *values: Any) -> bytes:
+    """The digest of a row that was read.
+
+    Args:
+        path: the store.
+        row: names the row.
+        digest: the one that stands in it.
+        before: the parts of what `link` takes as `before`.
+        values: the row's columns.
+
+    Raises:
+        DamagedStoreError: the digest is not that of its content after the row before it.
+    """
+    try:
+        expected = link(b"".join(before), *values)
+    except (TypeError, UnicodeError):  # a part that is no digest
+        expected = None
+    if expected is None or digest != expected:
+        raise damaged(path, f"{row} is not what was written, or does not belong here")
+    return expected
+
+
+def require_tables(connection: sqlite3.Connection, path: Path, tables: Mapping[str, str]) -> None:
+    """Raise `DamagedStoreError` unless these tables are there, by name, made with exactly that statement."""
+    there = dict(connection.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'").fetchall())
+    for name, statement in tables.items():
+        if name not in there:
+            raise damaged(path, f"the table '{name}' is missing")
+        if there[name] != statement:
+            raise damaged(path, f"the table '{name}' is declared as '{there[name]}'")
+
+
+def require_sound(connection: sqlite3.Connection, path: Path) -> None:
+    """Raise `DamagedStoreError` if SQLite's own check finds anything wrong with the pages of the file."""
+    problems = [str(problem) for (problem,) in connection.execute(f"PRAGMA integrity_check({_SHOWN})")]
+    if problems != ["ok"]:
+        raise damaged(path, "; ".join(" ".join(problem.split()) for problem in problems))
+
+
+class Ends:
+    """The ends of the chains of a file, as they were written last.
+
+    Attributes:
+        closed: whether the last writer has closed the store, so that these ends hold.
+        tips: those that are said, by chain.
+    """
+
+    def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
+        rows = {str(chain): (count, digest) for chain, count, digest in connection.execute("SELECT * FROM ends")}
+        self._path = path
+        self.closed = _OPEN not in rows
+        self.chains = frozenset(rows) - {_OPEN}
+        self.tips = {chain: Tip(*row) for chain, row in rows.items() if chain != _OPEN and row[1] is not None}
+        if not rows:
+            raise damaged(path, "the table 'ends' is empty")
+
+    def require(self, chain: str, found: Tip) -> None:
+        """Raise `DamagedStoreError` if the chain ends elsewhere."""
+        said = self.tips.get(chain)
+        if said is None:
+            raise damaged(self._path, f"the table 'ends' does not say where '{chain}' ends")
+        if said != found:
+            where = f"row {said.rows} was the last, now it is row {found.rows}"
+            if said.rows == found.rows:
+                where = f"row {found.rows} is not the one that was written last"
+            raise damaged(self._path, f"the table '{chain}' does not end where it ended: {where}")
+
+
+def put_ends(connection: sqlite3.Connection, tips: Iterable[tuple[str, Tip | None]]) -> None:
+    """Say where chains end; `None` is not known, as long as somebody writes."""
+    connection.executemany(_PUT_END, [(chain, *(tip or (None, None))) for chain, tip in tips])
+
+
+def mark_open(connection: sqlite3.Connection, token: bytes) -> None:
+    """Say that a writer is at work, from whose commit on the ends do not hold."""
+    connection.execute(_PUT_END, (_OPEN, None, token))
+
+
+def mark_closed(connection: sqlite3.Connection, token: bytes) -> bool:
+    """Say that the ends hold again; nothing is done, and the answer is `False`, if another one is the writer now."""
+    return connection.execute("DELETE FROM ends WHERE chain = ? AND digest = ?", (_OPEN, token)).rowcount == 1
