@@ -55,7 +55,7 @@ class _Action:
     heard: int = 0
 
     def hear(self, heard: int) -> None:
-        """The user has so much of what was said: there is room for more, and the eldest need not be kept."""
+        """The user has so much of what was said: there is room for more, and the oldest need not be kept."""
         assert self.reports is not None  # noqa: S101
         for number in range(self.heard, min(heard, len(self.said))):
             if number >= MOST_KEPT:

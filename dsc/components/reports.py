@@ -53,6 +53,8 @@ class Reports:
 
     def flush(self) -> None:
         """Post what waits aside; what was observed comes with the first of them."""
+        if not self._aside:
+            return
         aside, self._aside = self._aside, {}
         observed, self._observed = _as_one(self._observed), []
         for event, (attributes, conflated) in aside.items():

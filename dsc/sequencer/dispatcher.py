@@ -52,6 +52,7 @@ from knowledge_base.errors import InputError, UnknownNameError, described
 DEFAULT_WITHIN = 300.0
 """Seconds a skill may take if the trigger does not say: every wait has a bound."""
 _MOST_FAULTS = 100
+"""Things that went wrong and are said at the end."""
 
 
 class Dispatcher:
@@ -208,7 +209,7 @@ class Dispatcher:
     def report_taken(self, start: Start) -> None:
         """A report of a skill has been taken, so that there is room for another."""
         running = self._running.get(start.action_id)
-        if running is not None:
+        if running is not None and running.reports is not None:
             running.reports.taken()
 
     def dismiss(self, start: Start) -> None:
@@ -281,9 +282,10 @@ class Dispatcher:
         within = self._within(start)
         due = within + (self._clock.now() if earlier is None else earlier.began)
         limit = TimeLimit(partial(self._overdue, start), self._clock, due)
-        running = _Running(start, within, limit, Reports(partial(self._report, start)))
+        running = _Running(start, within, limit)
         running.task = asyncio.get_running_loop().create_task(self._execute(component, running, earlier))
-        running.task.add_done_callback(partial(self._over, running))
+        running.over = partial(self._over, running)
+        running.task.add_done_callback(running.over)
         self._running[start.action_id] = running
         self.activity.look(start.component)
         limit.begin(running.task)
@@ -306,7 +308,8 @@ class Dispatcher:
     def _answer(self, running: _Running, outcome: Outcome) -> None:
         """Post how a skill ended, once; until that has succeeded its time limit stands."""
         if not running.answered:
-            running.reports.flush()
+            if running.reports is not None:
+                running.reports.flush()
             self._post(SkillMessage(running.start, outcome, final=True))
             running.answered = True
             running.limit.end()
@@ -318,8 +321,9 @@ class Dispatcher:
             self._answer(running, broken(running.start, described(why)))
 
     async def _execute(self, component: Component, running: _Running, earlier: Earlier | None) -> None:
-        outcome = await self._outcome(component, running, earlier)
-        self._answer(running, outcome)
+        self._answer(running, await self._outcome(component, running, earlier))
+        assert running.task is not None  # noqa: S101
+        running.task.remove_done_callback(running.over)  # each takes a turn of the loop
 
     async def _outcome(self, component: Component, running: _Running, earlier: Earlier | None) -> Outcome:
         start, within, limit, heard = running.start, running.within, running.limit, 0
@@ -329,6 +333,7 @@ class Dispatcher:
             if heard:
                 heard -= 1
             elif start.action_id in self._running:
+                running.reports = running.reports or Reports(partial(self._report, start))
                 running.reports.put(declared(component, start, outcome))
 
         support = Support(self._roster, self.activity, component)
@@ -368,14 +373,15 @@ class Dispatcher:
 
 @dataclass(slots=True)
 class _Running:
-    """A skill that is carried out, the seconds that it may take, and whether it has answered."""
+    """A skill that is carried out, the seconds that it may take, what it reports, and whether it has answered."""
 
     start: Start
     within: float
     limit: TimeLimit
-    reports: Reports
+    reports: Reports | None = None
     answered: bool = False
     task: asyncio.Task[None] | None = None
+    over: Callable[[asyncio.Task[None]], None] = lambda _: None
 
 
 async def _forgotten(component: Component, action_id: str) -> None:
