@@ -189,10 +189,10 @@ def test_what_ecmascript_would_convert_or_not_find_is_refused_by_name(body, mess
 
 def test_attributes_of_events_from_outside_are_declared_with_the_types_that_the_chart_needs():
     body = """<datamodel><data id="n" expr="0"/></datamodel><state id="s">
-      <transition event="e" cond="_event.data.level &gt; 3 &amp;&amp; _event.data.who == 'me'"><assign location="n" expr="_event.data.n"/></transition>
+      <transition event="e" cond="_event.data.level &gt; 3 &amp;&amp; _event.data.who == 'me'"><assign location="n" expr="_event.data.Count"/></transition>
       <transition event="f" cond="_event.data.x !== 1"/></state>"""
     read = scxml(body)
-    assert read.receives == {"e": {"level": "number", "who": "text", "n": "number"}, "f": {"x": "number"}}
+    assert read.receives == {"e": {"level": "number", "who": "text", "count": "number"}, "f": {"x": "number"}}
     assert validate_plot(read, Library([read])) == []
 
 

@@ -47,12 +47,14 @@ class Data:
     Attributes:
         kinds: variable -> kinds of its values; `None` while they are worked out: nothing is checked then.
         sent: the events that the chart fires.
-        received: events from outside -> attributes that the chart reads -> their types.
+        received: events from outside -> attributes that the chart reads, in lower case -> their types.
+        spelt: those attributes -> their spelling.
     """
 
     kinds: dict[str, Kinds] | None = None
     sent: list[Sent] = field(default_factory=list)
     received: dict[str, dict[str, str]] = field(default_factory=dict)
+    spelt: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +105,10 @@ class Scope:
             elif attribute not in sent.carries:
                 raise _refused(f"'{what}' is undefined for the event '{sent.event}', which has other data", place)
         for event in self._outside():
-            known = next((name for name in self.data.received[event] if name.lower() == attribute.lower()), attribute)
+            known = self.data.spelt.setdefault(attribute.lower(), attribute)
             if known != attribute:
                 raise _refused(f"'{what}' is spelt '{known}' elsewhere, and names are folded to lower case", place)
-            self.data.received[event].setdefault(attribute, "")
+            self.data.received[event].setdefault(attribute.lower(), "")
 
     def want(self, term: Term, kind: str) -> bool:
         """Whether a term has this kind; an attribute from outside is declared to have it."""
@@ -127,10 +129,9 @@ class Scope:
             return False
         for event in events:
             declared = self.data.received[event]
-            name = next((name for name in declared if name.lower() == attribute), attribute)
-            if declared.setdefault(name, kind) not in {"", kind}:
+            if declared.get(attribute, "") not in {"", kind}:
                 return False
-            declared[name] = kind
+            declared[attribute] = kind
         return bool(events)
 
     def _kinds_of_attribute(self, attribute: str) -> Kinds:

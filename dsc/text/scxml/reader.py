@@ -296,4 +296,4 @@ def _only(element: Element) -> Element:
 
 def _declared(attributes: Mapping[str, str]) -> dict[str, str]:
     """Attributes with their types; one that is only compared for equality may be anything."""
-    return {name.lower(): kind or "symbol" for name, kind in attributes.items()}
+    return {name: kind or "symbol" for name, kind in attributes.items()}
