@@ -1,68 +1,119 @@
-"""Who is let in: who has the token, on this machine, from the page itself. Everybody else gets `403` and a reason."""
+"""Access to the page: by token any number of times, by code once, then by cookie; all else gets `403` and a reason."""
 
 from __future__ import annotations
 
 import hmac
-from http.cookies import CookieError, SimpleCookie
+import secrets
+import time
+from collections.abc import Callable, Iterator
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MUST_HAVE_ORIGIN = frozenset({"POST", "PUT", "PATCH", "DELETE"})
+CODE_LIFE_S = 60.0
+"""A browser that starts slowly still finds its code alive."""
+COOKIE = "dsc-view-"
+"""Followed by the port: cookies belong to a machine, not to a port of it."""
+MOST_WRONG_CODES = 20
+"""Tabs that a browser restores bring codes of programs that have ended; more than these are guesses."""
+MOST_PARAMETERS = 20
+MISSING = "the token is missing or wrong; open the address that was printed"
+USED = (
+    f"this link is used up: it opens one browser, once, within {CODE_LIFE_S:.0f} seconds; open the address that was "
+    "printed. If nobody of yours has used the link, end the program: somebody else on this machine has"
+)
+
+
+class Keys:
+    """The keys of one page: a token for people and programs, a code for one browser, a cookie for every browser.
+
+    The code exists because every user of a machine can read its command lines, and a browser gets its address there.
+
+    Args:
+        token: opens any number of times.
+        code: opens once, within `CODE_LIFE_S` from now; `None` if no browser is opened.
+        now: the seconds of a clock that never goes back.
+
+    Attributes:
+        cookie: the value of the cookie; it opens any number of times, and differs from the token.
+    """
+
+    def __init__(self, token: str, code: str | None, now: Callable[[], float] = time.monotonic) -> None:
+        self.cookie = secrets.token_urlsafe(24)
+        self._token, self._code, self._now = token, code, now
+        self._ends = now() + CODE_LIFE_S
+        self._wrong = 0
+
+    def is_token(self, given: str) -> bool:
+        """Whether this is the token."""
+        return _same(given, self._token)
+
+    def is_cookie(self, given: str) -> bool:
+        """Whether this is the value of the cookie."""
+        return _same(given, self.cookie)
+
+    def redeem(self, given: str) -> bool:
+        """Whether this is the code, still alive; if so it is dead from now on, as it is after too many wrong ones."""
+        alive = self._code is not None and self._now() < self._ends
+        right = _same(given, self._code or "") and alive
+        self._wrong += not right
+        if right or self._wrong >= MOST_WRONG_CODES or not alive:
+            self._code = None
+        return right
 
 
 class Access:
-    """Checks token, Host and Origin in front of an application, for HTTP and sockets alike.
+    """Checks key, Host and Origin in front of an application, for HTTP and sockets alike.
 
     A page somewhere in the web can make a browser ask this program, also under another name (DNS rebinding):
-    hence Host and Origin, besides a token that only who started the program knows.
+    hence Host and Origin, besides the keys.
     """
 
-    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+    def __init__(self, app: ASGIApp, keys: Keys, port: int) -> None:
         self._app = app
-        self._token = token
+        self._keys = keys
         self._hosts = (f"127.0.0.1:{port}", f"localhost:{port}")
-        self._cookie = f"dsc-view-{port}"
+        self._cookie = f"{COOKIE}{port}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let the request pass, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        reason = self._reason_to_refuse(scope)
+        headers = Headers(scope=scope)
+        has_cookie = any(self._keys.is_cookie(value) for value in cookies(headers, self._cookie))
+        reason = self._wrong_sender(scope, headers) or (None if has_cookie else self._wrong_key(scope))
         if reason is None:
-            await self._app(scope, receive, self._with_headers(scope, send))
+            await self._app(scope, receive, self._with_headers(headers, send, with_cookie=not has_cookie))
         elif scope["type"] == "websocket":
             await receive()  # the request to connect; closing before accepting answers 403
             await send({"type": "websocket.close", "code": 1008, "reason": reason})
         else:
             await _refuse(send, reason)
 
-    def _reason_to_refuse(self, scope: Scope) -> str | None:
-        headers = Headers(scope=scope)
+    def _wrong_sender(self, scope: Scope, headers: Headers) -> str | None:
         host, origin = headers.get("host", ""), headers.get("origin")
         if host not in self._hosts:
             return "this Host is not served"
         needs_origin = scope["type"] == "websocket" or scope["method"] in MUST_HAVE_ORIGIN
         if origin != f"http://{host}" and (origin is not None or needs_origin):
             return "this Origin is not served"
-        if not any(hmac.compare_digest(given.encode(), self._token.encode()) for given in self._given(scope, headers)):
-            return "the token is missing or wrong; open the address that was printed"
         return None
 
-    def _given(self, scope: Scope, headers: Headers) -> list[str]:
-        """The tokens that come with the request: in its address, in its cookie."""
-        found = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
-        cookie: SimpleCookie = SimpleCookie()
-        try:
-            cookie.load(headers.get("cookie", ""))
-        except CookieError:
-            return found
-        return [*found, *(morsel.value for name, morsel in cookie.items() if name == self._cookie)]
+    def _wrong_key(self, scope: Scope) -> str | None:
+        given = _parameters(scope)
+        if any(self._keys.is_token(token) for token in given.get("token", ())):
+            return None
+        codes = given.get("code", ())
+        if not codes:
+            return MISSING
+        is_page = scope["type"] == "http" and scope["method"] == "GET" and scope["path"] == "/"
+        return None if is_page and self._keys.redeem(codes[0]) else USED
 
-    def _with_headers(self, scope: Scope, send: Send) -> Send:
-        host = Headers(scope=scope).get("host", "")
+    def _with_headers(self, asked: Headers, send: Send, *, with_cookie: bool) -> Send:
+        host = asked.get("host", "")
         policy = (
             f"default-src 'self'; connect-src 'self' ws://{host}; img-src 'self' data: blob:; "
             "style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'"
@@ -75,14 +126,45 @@ class Access:
                 headers["X-Content-Type-Options"] = "nosniff"
                 headers["Referrer-Policy"] = "no-referrer"
                 headers["Cache-Control"] = "no-store"
-                headers.append("Set-Cookie", f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/")
+                if with_cookie:
+                    cookie = f"{self._cookie}={self._keys.cookie}; HttpOnly; SameSite=Strict; Path=/"
+                    headers.append("Set-Cookie", cookie)
             await send(message)
 
         return sending
 
 
+def cookies(headers: Headers, name: str) -> Iterator[str]:
+    """Every value that comes under a name, among whatever cookies other programs of this machine have set.
+
+    Browsers send the cookies of all ports of a machine, so that names may come twice and values be no cookies at all.
+    """
+    for line in headers.getlist("cookie"):
+        for part in line.split(";"):
+            found, _, value = part.partition("=")
+            if found.strip() == name:
+                yield value.strip().strip('"')
+
+
+def _parameters(scope: Scope) -> dict[str, list[str]]:
+    try:
+        return parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=MOST_PARAMETERS)
+    except ValueError:
+        return {}
+
+
+def _same(given: str, wanted: str) -> bool:
+    """Compare in a time that does not tell where they differ."""
+    return hmac.compare_digest(given.encode(errors="replace"), wanted.encode())
+
+
 async def _refuse(send: Send, reason: str) -> None:
     text = reason.encode()
-    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(text)).encode())]
+    headers = [
+        (b"content-type", b"text/plain; charset=utf-8"),
+        (b"content-length", str(len(text)).encode()),
+        (b"cache-control", b"no-store"),
+        (b"referrer-policy", b"no-referrer"),
+    ]
     await send({"type": "http.response.start", "status": 403, "headers": headers})
     await send({"type": "http.response.body", "body": text})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Protocol, TypeVar
 
@@ -33,7 +33,11 @@ class Page(Protocol):
 
     @property
     def url(self) -> str:
-        """What to open."""
+        """The address for people, to be printed."""
+
+    @property
+    def one_time_url(self) -> str:
+        """The address for a browser's command line."""
 
     def start(self) -> None:
         """Answer from now on."""
@@ -56,7 +60,8 @@ def page(shown: P, *, opens: bool) -> Iterator[P]:
     if opens:
         import webbrowser
 
-        webbrowser.open(shown.url)
+        with suppress(webbrowser.Error):  # the address is printed: people can open it themselves
+            webbrowser.open(shown.one_time_url)
     try:
         yield shown
     finally:

@@ -1,4 +1,4 @@
-"""Where a page is to be had: a port of this machine, and the token that is the only key to it."""
+"""The entrance to a page: a port of this machine, the token that opens it, and a code that opens it once."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ class Entrance:
 
     Attributes:
         listening: the socket; who comes before it is served waits.
-        token: what a request must know.
+        token: a key that opens the page any number of times.
+        code: a key that opens the page once, soon after it is served.
     """
 
     listening: socket.socket
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
+    code: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
 
     @classmethod
     def on(cls, port: int = 0) -> Entrance:
-        """Listen there, with a new token; port 0 picks a free one.
+        """Listen there, with new keys; port 0 picks a free one.
 
         Raises:
             InputError: somebody else listens there.
@@ -46,5 +48,10 @@ class Entrance:
 
     @property
     def url(self) -> str:
-        """What to open."""
+        """The address for people: it opens the page as often as they like."""
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
+
+    @property
+    def one_time_url(self) -> str:
+        """The address for a browser's command line, which others can read: it opens the page once."""
+        return f"http://127.0.0.1:{self.port}/?code={self.code}"

@@ -42,21 +42,25 @@ class LivePage:
 
     Attributes:
         control: the hands that the run is to be put in; `None` if it may only be looked at.
-        url: what to open.
+        url: the address for people.
+        one_time_url: the address for a browser's command line.
         port: of the address.
-        token: in the address, the only key.
+        token: in the address for people, a key that stays.
     """
 
     def __init__(self, first_line: str, entrance: Entrance, *, control: bool = False) -> None:
         self.control = Control(self._tell_paused) if control else None
-        self.url, self.port, self.token = entrance.url, entrance.port, entrance.token
+        self.url, self.one_time_url = entrance.url, entrance.one_time_url
+        self.port, self.token = entrance.port, entrance.token
         self._entrance = entrance
         self._lines: SimpleQueue[str] = SimpleQueue()
         self._process: subprocess.Popen[str] | None = None
         self._threads: list[Thread] = []
         self._gone = False
         socket = entrance.listening.fileno()
-        self._tell({"begin": first_line, "socket": socket, "token": entrance.token, "control": control})
+        # Keys go through the pipe: every user of the machine can read command lines.
+        keys = {"token": entrance.token, "code": entrance.code}
+        self._tell({"begin": first_line, "socket": socket, **keys, "control": control})
 
     def start(self) -> None:
         """Answer from now on; who comes at once waits until the process is there."""

@@ -1,8 +1,8 @@
 """The process that serves the page of a run in another process: lines of its trace come in, commands go out.
 
 Lines on standard input are records as in a trace, or something else to be told: `begin` (first, with the `socket` to
-serve, its `token`, and whether there is `control`), `paused`, an `answer` to a command, `end`. Lines on standard output
-are commands of who looks, with a number. The end of the input is that of the page.
+serve, its keys `token` and `code`, and whether there is `control`), `paused`, an `answer` to a command, `end`. Lines
+on standard output are commands of who looks, with a number. The end of the input is that of the page.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def main() -> None:
     begin = json.loads(lines.readline())
     log = RecordLog(begin["begin"], live=True)
     hands = FarHands(sys.stdout, log.wake)
-    entrance = Entrance(socket(fileno=begin["socket"]), begin["token"])
+    entrance = Entrance(socket(fileno=begin["socket"]), begin["token"], begin["code"])
     viewer = Viewer(log, entrance, hands if begin["control"] else None)
     viewer.start()
     take_in(lines, log, hands)

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import logging
+import sys
 import threading
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import h11
 import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
-from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from dsc.viewer.access import Access
+from dsc.viewer.access import COOKIE, Access, Keys
 from dsc.viewer.answers import Answers
+from dsc.viewer.asked import CONTROL, FACTS, MOST_BYTES, QUERY, Form, asked
 from dsc.viewer.control import Hands
 from dsc.viewer.entrance import Entrance
 from dsc.viewer.records import RecordLog
@@ -28,8 +35,12 @@ from dsc.viewer.stream import Stream
 from knowledge_base.errors import InputError
 
 STATIC = Path(__file__).parent / "static"
-MOST_ASKED = 1 << 20
-"""Bytes of a request's body."""
+MOST_HEADER_BYTES = 1 << 20
+"""Browsers send the cookies of all programs of this machine: as many as a browser keeps."""
+MOST_DIGITS = 15
+"""Of a record's number."""
+COMPLAIN_EVERY_S = 10.0
+"""Failures in between say nothing."""
 
 
 class Viewer:
@@ -41,39 +52,50 @@ class Viewer:
         control: the run, if whoever looks may change it.
 
     Attributes:
-        url: what to open.
+        url: the address for people.
+        one_time_url: the address for a browser's command line.
         port: of the address.
-        token: in the address, the only key.
+        token: in the address for people, a key that stays.
     """
 
     def __init__(self, log: RecordLog, entrance: Entrance, control: Hands | None = None) -> None:
         self._log, self._control, self._socket = log, control, entrance.listening
-        self.url, self.port, self.token = entrance.url, entrance.port, entrance.token
+        self.url, self.one_time_url = entrance.url, entrance.one_time_url
+        self.port, self.token = entrance.port, entrance.token
+        self._keys = Keys(entrance.token, entrance.code)
         self._answers = Answers(log)
+        self._calm = Calm(self._routed())
         self._rounds = Rounds(log, self._status)
         config = uvicorn.Config(
             self.application(),
             lifespan="off",
+            http=_Protocol,
+            h11_max_incomplete_event_size=MOST_HEADER_BYTES,
             ws_max_size=1 << 16,
             ws_per_message_deflate=False,  # nothing leaves this machine, so that it would only cost
-            log_level="error",
+            log_config=None,
+            log_level=logging.CRITICAL + 1,  # what strangers send is no news for a terminal
             access_log=False,
         )
         self._server = uvicorn.Server(config)
-        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]}, daemon=True)
+        self._thread = threading.Thread(target=self._serve, daemon=True)
 
     def application(self) -> ASGIApp:
         """The application behind the check of who may come in."""
+        return Access(self._calm, self._keys, self.port)
+
+    def _routed(self) -> ASGIApp:
+        controlled = self._forbidden if self._control is None else self._asked(self._control.obey, CONTROL)
         routes = [
             Route("/", self._page),
-            Route("/record/{seq:int}", self._record),
-            Route("/query", self._asked(self._answers.query), methods=["POST"]),
-            Route("/facts", self._asked(self._answers.facts), methods=["POST"]),
-            Route("/control", self._controlled, methods=["POST"]),
+            Route("/record/{seq:str}", self._record),
+            Route("/query", self._asked(self._answers.query, QUERY), methods=["POST"]),
+            Route("/facts", self._asked(self._answers.facts, FACTS), methods=["POST"]),
+            Route("/control", controlled, methods=["POST"]),
             WebSocketRoute("/socket", self._stream),
             Mount("/", StaticFiles(directory=STATIC, check_dir=False)),
         ]
-        return Access(Starlette(routes=routes), self.token, self.port)
+        return Starlette(routes=routes)
 
     def start(self) -> None:
         """Answer from now on, in a thread of its own."""
@@ -92,6 +114,16 @@ class Viewer:
             self._thread.join(timeout=5)
         self._socket.close()
 
+    def _failed(self, _: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
+        self._calm.complain(context.get("exception"))
+
+    def _serve(self) -> None:
+        asyncio.run(self._serve_quietly())
+
+    async def _serve_quietly(self) -> None:
+        asyncio.get_running_loop().set_exception_handler(self._failed)
+        await self._server.serve(sockets=[self._socket])
+
     async def _page(self, _: Request) -> Response:
         page = STATIC / "index.html"
         if not page.exists():
@@ -99,29 +131,27 @@ class Viewer:
         return FileResponse(page)
 
     async def _record(self, request: Request) -> Response:
+        number = request.path_params["seq"]
+        if not number.isdecimal() or len(number) > MOST_DIGITS:
+            return _wrong(InputError("a record has a number"))
         try:
-            return Response(self._log.line(request.path_params["seq"]), media_type="application/json")
+            return Response(self._log.line(int(number)), media_type="application/json")
         except InputError as error:
             return _wrong(error)
 
-    def _asked(self, answer: Callable[[Mapping[str, Any]], Any]) -> Callable[[Request], Any]:
-        async def asked(request: Request) -> Response:
+    def _asked(self, answer: Callable[[Mapping[str, Any]], Any], form: Form) -> Callable[[Request], Any]:
+        async def answering(request: Request) -> Response:
             try:
-                said = await run_in_threadpool(answer, await _body(request))
+                return _json(await run_in_threadpool(answer, asked(await _body(request), form)))
             except InputError as error:
                 return _wrong(error)
-            return JSONResponse(said)
+            except RecursionError:
+                return _wrong(InputError("this is nested too deeply"))
 
-        return asked
+        return answering
 
-    async def _controlled(self, request: Request) -> Response:
-        control = self._control
-        if control is None:
-            return PlainTextResponse("this run may only be looked at; see --allow-control", status_code=403)
-        try:
-            return JSONResponse(await run_in_threadpool(control.obey, await _body(request)))
-        except InputError as error:
-            return _wrong(error)
+    async def _forbidden(self, _: Request) -> Response:
+        return PlainTextResponse("this run may only be looked at; see --allow-control", status_code=403)
 
     async def _stream(self, socket: WebSocket) -> None:
         await socket.accept()
@@ -131,20 +161,55 @@ class Viewer:
         return {"ended": not self._log.live, "paused": self._control.paused if self._control else None}
 
 
-async def _body(request: Request) -> Mapping[str, Any]:
-    body = b""
+class Calm:
+    """An application whose failures cost one request, and the terminal a line now and then, never a traceback."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+        self._complained = -COMPLAIN_EVERY_S
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let the application answer; it has said 500 where it failed."""
+        try:
+            await self._app(scope, receive, send)
+        except (ClientDisconnect, OSError):
+            pass  # whoever asked is gone
+        except Exception as error:  # noqa: BLE001  a traceback would be uvicorn's answer
+            self.complain(error)
+
+    def complain(self, error: BaseException | None) -> None:
+        """Say in a line what failed, unless something was said lately."""
+        if error is not None and time.monotonic() - self._complained >= COMPLAIN_EVERY_S:
+            self._complained = time.monotonic()
+            sys.stderr.write(f"the page: {type(error).__name__}: {error}"[:300].replace("\n", " ") + "\n")
+
+
+class _Protocol(H11Protocol):
+    """HTTP as uvicorn speaks it, whose sockets are not refused for the cookies of other programs."""
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        """Hand over to the socket's protocol, which takes lines of 8 KB at most, without foreign cookies."""
+        self.headers = [(name, _own(value) if name == b"cookie" else value) for name, value in self.headers]
+        super().handle_websocket_upgrade(event)
+
+
+def _own(cookie: bytes) -> bytes:
+    return b";".join(part for part in cookie.split(b";") if part.lstrip().startswith(COOKIE.encode()))
+
+
+async def _body(request: Request) -> bytes:
+    body = bytearray()
     async for chunk in request.stream():
         body += chunk
-        if len(body) > MOST_ASKED:
-            raise InputError(f"a request has at most {MOST_ASKED} bytes")
-    try:
-        said = json.loads(body)
-    except ValueError:
-        said = None
-    if not isinstance(said, dict):
-        raise InputError("a request is one JSON object")
-    return said
+        if len(body) > MOST_BYTES:
+            raise InputError(f"a request has at most {MOST_BYTES} bytes")
+    return bytes(body)
+
+
+def _json(said: Any, status: int = 200) -> Response:
+    """JSON in ASCII: half a character is no UTF-8; numbers that JSON lacks are as in a trace."""
+    return Response(json.dumps(said), status_code=status, media_type="application/json")
 
 
 def _wrong(error: InputError) -> Response:
-    return JSONResponse({"error": str(error)}, status_code=400)
+    return _json({"error": str(error)}, 400)

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from dsc.viewer.rounds import Rounds
 
 FORMAT = "dsc-view/1"
+UNSUPPORTED = 1003
+"""The code with which a socket is closed on which something else is said than can be answered."""
 
 
 class Stream:
@@ -48,11 +50,16 @@ class Stream:
 
     async def _read(self) -> None:
         while True:
-            wanted = await self._socket.receive_json()
+            try:
+                wanted = await self._socket.receive_json()
+            except (ValueError, KeyError, RecursionError):  # no JSON, no text, nested too deeply
+                wanted = None
             seq = wanted.get("want") if isinstance(wanted, dict) else None
-            if isinstance(seq, int) and seq >= 1:
-                self._cursor = seq
-                self._rounds.wake()
+            if isinstance(seq, bool) or not isinstance(seq, int) or seq < 1:
+                await self._socket.close(UNSUPPORTED, 'the page says {"want": NUMBER} and nothing else')
+                return
+            self._cursor = seq
+            self._rounds.wake()
 
     def offer(self, status: dict[str, Any]) -> None:
         """Begin to send what is new, records and how the run is, unless something is still on its way."""
