@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Protocol, TypeVar
 
 import typer
 
+if TYPE_CHECKING:
+    from dsc.viewer.records import RecordLog
+
+MOST_COMPLAINTS = 5
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Where to listen on this machine; 0 picks a free port.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
 
@@ -24,8 +28,20 @@ def view_command(
     from dsc.viewer.opening import records_of
     from dsc.viewer.server import Viewer
 
-    with records_of(file) as log, page(Viewer(log, Entrance.on(port)), opens=not no_open) as viewer:
-        until_interrupt(viewer)
+    with records_of(file) as log:
+        _complain(file, log)
+        with page(Viewer(log, Entrance.on(port)), opens=not no_open) as viewer:
+            until_interrupt(viewer)
+
+
+def _complain(file: Path, log: RecordLog) -> None:
+    """Name on the terminal the records that the page cannot show."""
+    for complaint in log.complaints[:MOST_COMPLAINTS]:
+        typer.echo(complaint, err=True)
+    if (more := len(log.complaints) - MOST_COMPLAINTS) > 0:
+        typer.echo(f"{file}: {more} more records are damaged", err=True)
+    if not log.live and len(log) == 0:
+        typer.echo(f"{file}: there are no records", err=True)
 
 
 class Page(Protocol):

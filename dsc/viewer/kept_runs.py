@@ -10,6 +10,7 @@ from dsc.sequencer.run_tables import archive
 from dsc.trace import Record, header
 from dsc.viewer.following import followed
 from dsc.viewer.records import RecordLog
+from knowledge_base.errors import Place, StoreError
 
 
 @contextmanager
@@ -28,7 +29,7 @@ def following_run(path: Path) -> Iterator[RecordLog]:
         nonlocal place
         with archive(path, again=True) as runs:
             for here, line in runs.lines(run.number, place):
-                if (record := Record.from_line(line)).seq > len(log):  # a macrostep may get more at its end
+                if (record := _record(line, len(log), path)).seq > len(log):  # a macrostep may get more at its end
                     log.hear(record)
                 place = here
             return runs.run(run.number).ended is None
@@ -39,3 +40,10 @@ def following_run(path: Path) -> Iterator[RecordLog]:
     else:
         log.end()
         yield log
+
+
+def _record(line: str, last: int, path: Path) -> Record:
+    try:
+        return Record.from_line(line)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise StoreError(f"a record after record {last} is damaged: {error!r}", place=Place(str(path))) from None

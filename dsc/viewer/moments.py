@@ -61,10 +61,16 @@ class Replay(Generic[_S]):
             start = min(count // CHECKPOINT_EVERY, len(self._checkpoints) - 1)
             state = self._copy(self._checkpoints[start])
             for number in range(start * CHECKPOINT_EVERY, count):
-                state = self._advance(state, self._log.record(self._seqs[number]))
+                state = self._advanced(state, self._seqs[number])
                 if (number + 1) % CHECKPOINT_EVERY == 0 and (number + 1) // CHECKPOINT_EVERY == len(self._checkpoints):
                     self._checkpoints.append(self._copy(state))
             return state
+
+    def _advanced(self, state: _S, seq: int) -> _S:
+        try:
+            return self._advance(state, self._log.record(seq))
+        except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+            raise InputError(f"record {seq} is damaged, and what follows from it is not known: {error!r}") from None
 
     def _scan(self, seq: int) -> None:
         """Find the records that matter, up to `seq`; their type stands at the beginning of the line."""

@@ -3,27 +3,48 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from dsc.trace import FORMAT, Record, header
+from pydantic_core import from_json
+
+from dsc.trace import FORMAT, VERSION, Record, header
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.pddl.files import read_text
 
 MOST_RECORDS = 2000
 MOST_CHARACTERS = 400_000
 """What goes out at once at most: a browser takes it in without a stutter."""
+DAMAGED = "damaged"
+"""The type of a record that stands for one that cannot be read."""
+MOST_SHOWN = 200
+"""Characters of a damaged line."""
+_T = re.compile(r'"t": (-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)')
+_NO_CHARACTER = re.compile("[\ud800-\udfff]")
 
 
 class RecordLog:
     """The lines of a trace; the record with number `seq` is line `seq`, counted from 1 behind the header.
 
     One thread appends, any thread reads. Nothing is ever taken away, so that readers need no queues of their own.
+
+    Attributes:
+        header: the first line of the trace, as data.
+        complaints: the damages found in the file, one line each.
     """
 
-    def __init__(self, first_line: str | None = None, lines: Iterable[str] = (), *, live: bool = False) -> None:
+    def __init__(
+        self,
+        first_line: str | None = None,
+        lines: Iterable[str] = (),
+        *,
+        live: bool = False,
+        complaints: Sequence[str] = (),
+    ) -> None:
+        self.complaints = complaints
         self.header: dict[str, Any] = json.loads(first_line or header())
         self._lines = list(lines)
         self._live = live
@@ -96,33 +117,99 @@ class RecordLog:
         return self._lines[seq - 1]
 
     def record(self, seq: int) -> dict[str, Any]:
-        """The record as data; errors as for `line`."""
-        found: dict[str, Any] = json.loads(self.line(seq))
+        """The record as data; errors as for `line`, and if the line is no JSON."""
+        try:
+            found: dict[str, Any] = json.loads(self.line(seq))
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"record {seq} is damaged: {error}") from None
         return found
 
 
 def read_trace(path: Path) -> RecordLog:
-    """The records of a trace file.
+    """The records of a trace file; a damaged line is a record of type `damaged`, named in `complaints` of the log.
 
     Raises:
         InputError: there is no such file, or it cannot be read.
-        ParseError: it is no trace, or a line of it is damaged.
+        ParseError: it is no trace, one of another version, or records are missing, doubled or in another order.
     """
-    first, *lines = read_text(path).split("\n")
+    first, *lines = read_text(path, errors="surrogateescape").split("\n")
     _require_header(first, path)
-    while lines and not lines[-1]:
-        lines.pop()
-    for number, line in enumerate(lines, 1):
-        if not (line.startswith(f'{{"seq": {number}, ') and line.endswith("}")):
-            raise ParseError(f"this is not record {number} of a trace", place=Place(str(path), number + 1))
-    return RecordLog(first, lines)
+    complaints: list[str] = []
+    return RecordLog(first, _numbered(lines, path, complaints), complaints=complaints)
+
+
+def damaged(seq: int, t: float, line: int, why: str, text: str) -> str:
+    """The record that stands for one that cannot be read, as its line."""
+    said = {"line": line, "why": why, "text": text[:MOST_SHOWN]}
+    return json.dumps({"seq": seq, "t": t, "type": DAMAGED, "cause": None, **said})
+
+
+def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterator[str]:
+    """The lines of records without a gap; between two that can be read, damaged ones stand for what is lost."""
+    last, t, lost = 0, 0.0, list[tuple[int, str]]()
+
+    def substitutes(count: int) -> Iterator[str]:
+        for place, (number, line) in enumerate(lost, 1):
+            why = _why_unreadable(line)
+            name = f"record {last + place}" if place <= count else "a line that is no record"
+            complaints.append(f"{path}:{number}: {name} is damaged: {why}")
+            if place <= count:
+                yield damaged(last + place, t, number, why, line.encode(errors="replace").decode())
+
+    for number, line in enumerate(lines, 2):
+        seq = _seq_of(line, last + 1)
+        if seq is not None and 0 <= seq - last - 1 <= len(lost):
+            yield from substitutes(seq - last - 1)
+            found = _T.search(line, 0, MOST_SHOWN)
+            last, t, lost = seq, float(found[1]) if found else t, []
+            yield line
+        elif line.strip():
+            lost.append((number, line))
+    for place, (number, line) in enumerate(lost, 1):
+        if _seq_of(line, 0) is not None:  # a sound one in a wrong place: more is wrong than some lines
+            raise ParseError(f"this is not record {last + place} of a trace", place=Place(str(path), number))
+    yield from substitutes(len(lost))
+
+
+def _seq_of(line: str, expected: int) -> int | None:
+    """The number of the record in a line; `None` if there is none, as far as its two ends tell."""
+    if line.endswith("}") and (line.isascii() or not _NO_CHARACTER.search(line)):
+        if line.startswith(f'{{"seq": {expected}, '):
+            return expected
+        seq = said.get("seq") if isinstance(said := _parsed(line), dict) else None
+        return seq if isinstance(seq, int) and not isinstance(seq, bool) else None
+    return None
+
+
+def _why_unreadable(line: str) -> str:
+    if _NO_CHARACTER.search(line):
+        return "it has bytes that are no UTF-8"
+    said = _parsed(line)
+    if isinstance(said, str):
+        return f"it ends in the middle ({said})" if not line.endswith("}") else f"it is no JSON ({said})"
+    return (
+        "it is no record with a number" if said is None else f"it says that it is record {said.get('seq')}"[:MOST_SHOWN]
+    )
+
+
+def _parsed(line: str) -> Any:
+    """What the line says if that is an object, the reason if it is no JSON, else `None`."""
+    try:
+        said = from_json(line)
+    except ValueError as error:
+        return str(error)
+    return said if isinstance(said, dict) else None
 
 
 def _require_header(line: str, path: Path) -> None:
-    try:
-        said = json.loads(line)
-    except ValueError:
-        said = None
+    said, begins = _parsed(line), f'{{"format": "{FORMAT}", …}}'
+    place = Place(str(path), 1)
+    if not line.strip():
+        raise ParseError(f"the file is empty, or its first line is; a trace begins with {begins}", place=place)
+    if isinstance(said, str) and FORMAT in line:
+        raise ParseError(f"the first line of this trace is damaged: {said}", place=place)
     if not isinstance(said, dict) or said.get("format") != FORMAT:
-        begins = f'{{"format": "{FORMAT}", …}}'
-        raise ParseError(f"neither a store nor a trace, which begins with {begins}", place=Place(str(path), 1))
+        raise ParseError(f"neither a store nor a trace, which begins with {begins}", place=place)
+    if said.get("version") != VERSION:
+        found = json.dumps(said.get("version"))[:MOST_SHOWN]
+        raise ParseError(f"a trace of version {found}; this program reads version {VERSION}", place=place)

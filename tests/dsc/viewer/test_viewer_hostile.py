@@ -78,6 +78,10 @@ class Page:
         )
         self._runner = asyncio.Runner()
 
+    def close(self) -> None:
+        self._runner.run(self._client.aclose())
+        self._runner.close()
+
     def get(self, path: str, **how):
         return self._runner.run(self._client.get(path, **how))
 
@@ -87,7 +91,9 @@ class Page:
 
 @pytest.fixture(scope="module")
 def page(viewer):
-    return Page(viewer)
+    page = Page(viewer)
+    yield page
+    page.close()
 
 
 @pytest.fixture
