@@ -4,7 +4,7 @@ import { useEffect, useState } from "react";
 import { Chart } from "./panes/Chart";
 import { Graph } from "./panes/Graph";
 import { Controls } from "./panes/Controls";
-import { Header } from "./panes/Header";
+import { Header, Notice } from "./panes/Header";
 import { Knowledge } from "./panes/Knowledge";
 import { PlanPane } from "./panes/PlanPane";
 import { Timeline } from "./panes/Timeline";
@@ -31,7 +31,10 @@ export function Page() {
   const tabs = control ? ([...TABS, "Control"] as const) : TABS;
   return (
     <div className={`page ${kind}`}>
-      <Header />
+      <div className="top">
+        <Header />
+        <Notice />
+      </div>
       {kind === "run" && <Turn><World /></Turn>}
       {kind === "run" && <Turn><PlanPane /></Turn>}
       <Turn>{kind === "store" ? <Graph /> : <Chart />}</Turn>

@@ -8,7 +8,7 @@ export function useKeys(): void {
     const pressed = (event: KeyboardEvent) => {
       if (event.ctrlKey || event.metaKey || event.altKey || writes(event.target)) return;
       if (document.querySelector("dialog[open]")) return; // the keys are its own, Esc too
-      const act = KEYS[event.shiftKey && event.key.startsWith("Arrow") ? `Shift+${event.key}` : event.key];
+      const act = KEYS.get(event.shiftKey && event.key.startsWith("Arrow") ? `Shift+${event.key}` : event.key);
       if (!act || (event.key === " " && event.target instanceof HTMLButtonElement)) return;
       event.preventDefault();
       act();
@@ -20,7 +20,7 @@ export function useKeys(): void {
 
 const now = () => session.get().moment.seq;
 
-const KEYS: Readonly<Record<string, () => void>> = {
+const KEYS: ReadonlyMap<string, () => unknown> = new Map(Object.entries<() => unknown>({
   " ": () => session.play(!(session.get().playing || session.get().following)),
   ArrowRight: () => session.step(1),
   ArrowLeft: () => session.step(-1),
@@ -35,7 +35,7 @@ const KEYS: Readonly<Record<string, () => void>> = {
   Home: () => session.goTo(0),
   End: () => session.goTo(session.history.last),
   Escape: () => session.select(null),
-};
+}));
 
 function writes(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;

@@ -25,6 +25,8 @@ export interface Shown {
   readonly connected: boolean;
   readonly paused: string | null;
   readonly header: Readonly<Record<string, unknown>>;
+  /** Why what the program says cannot be shown as it is. */
+  readonly wrong: string | null;
   readonly expected: number;
   readonly selection: Selection | null;
 }
@@ -39,7 +41,7 @@ export class Session {
   readonly history = new History();
   private shown: Shown = {
     moment: beginning(), last: 0, playing: false, speed: 10, following: false, live: false, control: false,
-    connected: false, paused: null, header: {}, expected: 0, selection: null,
+    connected: false, paused: null, header: {}, wrong: null, expected: 0, selection: null,
   };
   private readonly listeners = new Set<() => void>();
   private drawing = 0;
@@ -59,7 +61,7 @@ export class Session {
       wanted: () => this.history.last + 1,
       hello: (said: Hello) => {
         const following = said.live && this.wanted === null && (this.history.last === 0 || this.shown.following);
-        this.set({ header: said.header, live: said.live, control: said.control, expected: said.last, connected: true, following });
+        this.set({ header: said.header, wrong: strange(said), live: said.live, control: said.control, expected: said.last, connected: true, following });
       },
       status: (said: Status) => this.set({ live: said.live, paused: said.paused, expected: said.last }),
       records: (from, records) => {
@@ -67,6 +69,7 @@ export class Session {
         if (!this.waits()) this.later();
       },
       lost: () => this.set({ connected: false }),
+      wrong: (why) => this.set({ wrong: `The program said something that the page cannot read: ${why}` }),
     });
   }
 
@@ -169,6 +172,16 @@ export class Session {
     if (coming && coming.t - this.clock > 2 * this.shown.speed) this.clock = coming.t - 2 * this.shown.speed;
     return Math.max(seq, this.history.seqAt(this.clock));
   }
+}
+
+/** Of the protocol, and of the trace: what the page was made for. */
+const FORMAT = "dsc-view/1";
+const VERSION = 1;
+
+function strange({ format, header }: Hello): string | null {
+  if (format !== FORMAT) return `The program speaks ${String(format)}, this page ${FORMAT}: load it again.`;
+  const { version = VERSION } = header;
+  return version === VERSION ? null : `The trace has version ${String(version)}; this page shows version ${VERSION}.`;
 }
 
 export const session = new Session();

@@ -4,6 +4,7 @@ import { createContext, useContext, useEffect, useState, useSyncExternalStore, t
 import { flushSync } from "react-dom";
 import { beginning, type Moment } from "./core/moment";
 import { Turns, type Pane } from "./core/turns";
+import { Boundary } from "./Boundary";
 
 export const turns = new Turns<Moment>(beginning(), {
   now: () => performance.now(),
@@ -36,7 +37,8 @@ const Here = createContext<Moment | null>(null);
 /** A pane: what is inside shows the moment of its last turn. */
 export function Turn({ children }: { children: ReactNode }) {
   const [shown] = useState(() => new Shown());
-  return <Here value={useSyncExternalStore(shown.subscribe, shown.get)}>{children}</Here>;
+  const moment = useSyncExternalStore(shown.subscribe, shown.get);
+  return <Here value={moment}><Boundary about={moment}>{children}</Boundary></Here>;
 }
 
 /** The moment that the pane shows. */

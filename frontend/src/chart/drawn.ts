@@ -59,7 +59,7 @@ function progressOf(plans: readonly Plan[]): Map<string, StepState> {
   const found = new Map<string, StepState>();
   for (const plan of plans) {
     if (plan.ended !== null || plan.at === null) continue;
-    for (const [name, step] of plan.names) found.set(joinPath(plan.at, name), plan.steps[step]!.state);
+    for (const [name, step] of plan.names) found.set(joinPath(plan.at, name), plan.steps[step]?.state ?? "waiting");
   }
   return found;
 }

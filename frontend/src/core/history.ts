@@ -4,13 +4,15 @@ import { advance, beginning, copyOf, type Moment } from "./moment";
 import type { PlotForm } from "./plots";
 import { whole } from "./reading";
 import type { DecisionRec, EndRec, Rec } from "./records";
+import { damaged, isDamaged, type Damaged } from "./sound";
 
 /** Records that are replayed at most to get to a moment. */
 export const CHECKPOINT_EVERY = 500;
 
 export type Mark = "failure" | "plan" | "decision" | "step" | "knowledge" | "scene";
 
-const MARKS: Readonly<Record<string, Mark>> = {
+const MARKS: ReadonlyMap<string, Mark> = new Map(Object.entries({
+  damaged: "failure",
   rule: "failure",
   "plan.broken": "failure",
   "plan.none": "failure",
@@ -22,7 +24,7 @@ const MARKS: Readonly<Record<string, Mark>> = {
   step: "step",
   knowledge: "knowledge",
   scene: "scene",
-};
+} satisfies Record<string, Mark>));
 
 export class History {
   readonly plots = new Map<string, PlotForm>();
@@ -31,7 +33,9 @@ export class History {
   };
   private readonly records: Rec[] = [];
   private readonly checkpoints: Moment[] = [beginning()];
-  private readonly tip = beginning();
+  /** The damaged records found so far. */
+  readonly damages: Damaged[] = [];
+  private tip = beginning();
   private kept = beginning();
 
   /** Number of the last record. */
@@ -41,24 +45,37 @@ export class History {
 
   /** Take in records that follow those that are there; what is there already is passed over. */
   append(from: number, records: readonly Rec[]): void {
-    for (const rec of records.slice(Math.max(0, this.last + 1 - from))) {
-      if (rec.seq !== this.last + 1) return;
-      this.records.push(rec);
-      this.note(rec);
-      advance(this.tip, rec, this.plots);
-      if (rec.seq % CHECKPOINT_EVERY === 0) this.checkpoints.push(copyOf(this.tip));
+    for (const given of records.slice(Math.max(0, this.last + 1 - from))) {
+      if (given.seq !== this.last + 1) return;
+      this.take(isDamaged(given) && !Number.isFinite(given.t) ? { ...given, t: this.tip.t } as Damaged : given);
+      if (given.seq % CHECKPOINT_EVERY === 0) this.checkpoints.push(copyOf(this.tip));
     }
   }
 
   record(seq: number): Rec | undefined {
     const rec = this.records[seq - 1];
-    return rec && (this.records[seq - 1] = whole(rec));
+    const found = rec && (this.records[seq - 1] = whole(rec));
+    if (found && found !== rec && isDamaged(found)) this.damages.push(found);
+    return found;
+  }
+
+  private take(rec: Rec): void {
+    this.records.push(rec);
+    try {
+      this.note(rec);
+      advance(this.tip, rec, this.plots);
+    } catch (error) { // sound by itself, but not after those before it: it is left out, here and when going back
+      const left = damaged(rec.seq, `it does not follow from what was before (${String(error).slice(0, 120)})`, rec.type, rec.t);
+      this.records[rec.seq - 1] = left;
+      this.damages.push(left);
+      this.tip = this.at(rec.seq);
+    }
   }
 
   /** The moment after the record; nobody else holds it. */
   at(seq: number): Moment {
     const wanted = Math.max(0, Math.min(seq, this.last));
-    const checkpoint = this.checkpoints[Math.floor(wanted / CHECKPOINT_EVERY)]!;
+    const checkpoint = this.checkpoints[Math.min(Math.floor(wanted / CHECKPOINT_EVERY), this.checkpoints.length - 1)]!;
     const ahead = this.kept.seq <= wanted && this.kept.seq >= checkpoint.seq;
     const moment = ahead ? this.kept : copyOf(checkpoint);
     for (let next = moment.seq; next < wanted; next++) advance(moment, this.records[next]!, this.plots);
@@ -104,18 +121,19 @@ export class History {
   /** What led to a record, itself first. */
   causes(seq: number): Rec[] {
     const found: Rec[] = [];
-    for (let rec = this.record(seq); rec && found.length < 12; rec = rec.cause === null ? undefined : this.record(rec.cause)) {
+    for (let rec = this.record(seq); rec && found.length < 12 && !found.includes(rec); rec = rec.cause === null ? undefined : this.record(rec.cause)) {
       found.push(rec);
     }
     return found;
   }
 
   private note(rec: Rec): void {
+    if (isDamaged(rec)) this.damages.push(rec);
     if (rec.type === "plot") {
       const { hash, plot } = rec as Rec & { hash: string; plot: PlotForm };
       this.plots.set(hash, plot);
     }
-    const mark = MARKS[rec.type] ?? (rec.type === "end" && (rec as EndRec).problem ? "failure" : undefined);
+    const mark = MARKS.get(rec.type) ?? (rec.type === "end" && (rec as EndRec).problem ? "failure" : undefined);
     if (mark) this.marks[mark].push(rec.seq);
   }
 }

@@ -80,11 +80,14 @@ export function copyOf(moment: Moment): Moment {
 export function advance(moment: Moment, rec: Rec, plots: Plots): void {
   moment.seq = rec.seq;
   moment.t = rec.t;
-  const change = CHANGES[rec.type];
+  const change = CHANGES.get(rec.type);
   if (change) change(moment, rec as never, plots);
 }
 
-const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots) => void>> = {
+type Change = (moment: Moment, rec: never, plots: Plots) => void;
+
+/** A map: types of records are any words, `constructor` as well. */
+const CHANGES: ReadonlyMap<string, Change> = new Map(Object.entries<Change>({
   step: stepped,
   world: worldBegins,
   knowledge: knowledgeChanged,
@@ -97,7 +100,7 @@ const CHANGES: Readonly<Record<string, (moment: Moment, rec: never, plots: Plots
   "plan.found": planFound,
   "plan.ordered": planOrdered,
   "plan.skipped": stepsSkipped,
-};
+}));
 
 /** A skill begins, or is cancelled since its state was left. */
 function acted(moment: Moment, rec: ActionRec): void {
@@ -143,7 +146,7 @@ function planFound(moment: Moment, rec: PlanFoundRec): void {
 /** What is going to be carried out: the plan found, or what is left of the one before. */
 function planOrdered(moment: Moment, rec: PlanOrderedRec): void {
   const number = announced(moment, rec, rec.plot, rec.steps);
-  moment.plans[number] = withOrder(moment.plans[number]!, rec.steps, rec.links);
+  moment.plans[number] = withOrder(moment.plans[number]!, rec.steps, rec.links ?? []);
 }
 
 /** The number of the plan of a name; a new one if nobody spoke of it. */

@@ -52,9 +52,9 @@ export interface DecisionRec extends Rec {
   readonly state: string;
   readonly chosen: string | null;
   readonly satisfied: boolean;
-  readonly arguments: Named;
-  readonly version: number;
-  readonly candidates: readonly Candidate[];
+  readonly arguments?: Named;
+  readonly version?: number;
+  readonly candidates?: readonly Candidate[];
 }
 
 export interface KnowledgeRec extends Rec {
@@ -99,7 +99,7 @@ export interface PlanOrderedRec extends Rec {
   readonly plot: string;
   readonly steps: readonly string[];
   /** Who brings about what for whom: step number (0: it holds already), fact, step number (one past the last: goal). */
-  readonly links: readonly (readonly [number, string, number])[];
+  readonly links?: readonly (readonly [number, string, number])[];
 }
 
 export interface PlanBrokenRec extends Rec {

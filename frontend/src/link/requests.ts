@@ -1,5 +1,6 @@
 /** What the page asks the program beyond records. */
 
+import { parsed } from "../core/reading";
 import type { Explanation, Fact, Value } from "../core/records";
 
 export interface Answer {
@@ -26,7 +27,7 @@ export const query = (seq: number, expression: string) => ask<Answer>("query", {
 export const control = (command: object) => ask<{ ok: boolean; breaks?: readonly Break[] }>("control", command);
 
 async function ask<T>(what: string, body: object): Promise<T> {
-  return (await (await post(what, body)).json()) as T;
+  return parsed(await (await post(what, body)).text()) as T;
 }
 
 async function post(what: string, body: object): Promise<Response> {

@@ -20,6 +20,7 @@ const EDGES = { way: WayEdge };
 /** From so many states on, a small map says where one is. */
 const MAPPED = 60;
 const MAP = { width: 130, height: 96 };
+const NOTHING: Layout = { boxes: new Map(), lines: new Map() };
 const PLAIN: View = { focus: "", open: new Map(), all: new Set() };
 
 export function Chart() {
@@ -86,13 +87,14 @@ function pathOf(selection: Selection | null, moment: Moment): string | null {
 
 /** The layout of what is visible, or of what was until it is there. */
 function useLayout(shown: Visible): Layout | null {
-  const [done, setDone] = useState<{ key: string; layout: Layout } | null>(null);
+  const [done, setDone] = useState<{ key: string; layout: Layout; wrong?: string } | null>(null);
   const key = useMemo(() => signature(shown), [shown]);
+  if (done?.wrong !== undefined && done.key === key) throw new Error(`the chart cannot be laid out: ${done.wrong}`);
   const known = done?.key === key ? done.layout : knownLayout(shown);
   useEffect(() => {
     if (known || shown.nodes.length === 0) return;
     let wanted = true;
-    const forget = turns.whenCalm(() => void layoutOf(shown).then((layout) => wanted && layout && setDone({ key, layout })));
+    const forget = turns.whenCalm(() => void layoutOf(shown).then((layout) => wanted && layout && setDone({ key, layout }), (error: unknown) => wanted && setDone({ key, layout: NOTHING, wrong: String(error) })));
     return () => {
       wanted = false;
       forget();

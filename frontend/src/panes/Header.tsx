@@ -1,6 +1,6 @@
 /** Which run this is, and how it stands. */
 
-import { useShown } from "../session";
+import { session, useShown } from "../session";
 import { Help } from "./Help";
 
 export function Header() {
@@ -20,5 +20,30 @@ export function Header() {
       </span>
       <Help />
     </header>
+  );
+}
+
+/** Damaged records that are named; the rest is counted. */
+const NAMED = 3;
+
+/** What is not as it should be with the trace, in words: nothing is passed over in silence. */
+export function Notice() {
+  const { wrong, live, last, expected, connected } = useShown();
+  const { damages } = session.history;
+  const empty = connected && !live && last === 0 && expected === 0;
+  if (wrong === null && damages.length === 0 && !empty) return null;
+  return (
+    <div className="notice" role="alert">
+      {wrong !== null && <p>{wrong}</p>}
+      {empty && <p>There are no records: the trace ends after its first line.</p>}
+      {damages.slice(0, NAMED).map((rec) => (
+        <p key={rec.seq}>
+          <button className="link" onClick={() => session.goTo(rec.seq, { kind: "record", seq: rec.seq })}>{`Record ${rec.seq}`}</button>
+          {` (line ${rec.line}) is damaged: ${rec.why}.`}
+        </p>
+      ))}
+      {damages.length > NAMED && <p>{`${damages.length - NAMED} more records are damaged.`}</p>}
+      {damages.length > 0 && <p className="quiet">The rest is shown; what these records changed is missing from there on.</p>}
+    </div>
   );
 }

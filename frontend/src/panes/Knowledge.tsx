@@ -118,7 +118,7 @@ function Answers({ seq, text }: { seq: number; text: string }) {
           <thead><tr>{answer.variables.map((name) => <th key={name} scope="col">{`?${name}`}</th>)}</tr></thead>
           <tbody>
             {answer.answers.slice(0, MOST).map((one, i) => (
-              <tr key={i}>{answer.variables.map((name) => <td key={name}><Thing id={String(one[name])} known /></td>)}</tr>
+              <tr key={i}>{answer.variables.map((name) => <td key={name}><Thing id={Object.hasOwn(one, name) ? String(one[name]) : "?"} known /></td>)}</tr>
             ))}
           </tbody>
         </table>

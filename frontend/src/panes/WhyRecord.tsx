@@ -2,9 +2,10 @@
 
 import { deciding } from "../core/explanations";
 import type { Candidate, DecisionRec, KnowledgeRec, PlanBrokenRec, PlanFoundRec, Rec, RuleRec, StepRec, Value } from "../core/records";
+import type { Damaged } from "../core/sound";
 import { breaker } from "../core/why";
 import { session } from "../session";
-import { changed, Facts, inShort, RecordLink, Tree, Values } from "./parts";
+import { CELL, changed, Facts, inShort, jsonOf, RecordLink, Tree, Values } from "./parts";
 
 export function WhyRecord({ rec }: { rec: Rec }) {
   switch (rec.type) {
@@ -14,6 +15,7 @@ export function WhyRecord({ rec }: { rec: Rec }) {
     case "knowledge": return <Change rec={rec as KnowledgeRec} />;
     case "step": return <StepTaken rec={rec as StepRec} />;
     case "rule": return <Rule rec={rec as RuleRec} />;
+    case "damaged": return <Lost rec={rec as Damaged} />;
     default: return <Plain rec={rec} />;
   }
 }
@@ -33,12 +35,12 @@ export function Decision({ rec }: { rec: DecisionRec }) {
       <Head rec={rec}>
         <button className="link" onClick={() => session.select({ kind: "state", path: rec.state })}>{rec.state}</button>
         {rec.satisfied ? " had nothing to do: its goal holds." : rec.chosen === null ? ": no candidate fits." : <>{" chose "}<b>{rec.chosen}</b></>}
-        <span className="quiet">{` · knowledge version ${rec.version}`}</span>
+        {rec.version !== undefined && <span className="quiet">{` · knowledge version ${rec.version}`}</span>}
       </Head>
-      <Values values={rec.arguments} />
+      <Values values={rec.arguments ?? {}} />
       {rec.chosen === "achieve" && <p className="quiet">No designed candidate fits, and there is a goal: a plan is asked for.</p>}
       <div role="tree" aria-label="Candidates">
-        {rec.candidates.map((one) => <CandidateView key={one.plot} one={one} chosen={one.plot === rec.chosen} />)}
+        {(rec.candidates ?? []).map((one) => <CandidateView key={one.plot} one={one} chosen={one.plot === rec.chosen} />)}
       </div>
     </div>
   );
@@ -114,19 +116,28 @@ function StepTaken({ rec }: { rec: StepRec }) {
   );
 }
 
+function Lost({ rec }: { rec: Damaged }) {
+  return (
+    <div aria-label="Damaged record">
+      <Head rec={rec}>{`Line ${rec.line} of the trace is damaged: ${rec.why}. What it changed is missing from here on.`}</Head>
+      <h3>What stands there</h3>
+      <code className="block">{rec.text}</code>
+    </div>
+  );
+}
+
 function Plain({ rec }: { rec: Rec }) {
   const { seq: _seq, t: _t, type: _type, cause: _cause, ...rest } = rec;
-  const small = Object.entries(rest).filter(([, value]) => JSON.stringify(value).length < 400);
   return (
     <>
       <Head rec={rec}>{inShort(rec)}</Head>
       <table className="values">
-        <tbody>{small.map(([name, value]) => <tr key={name}><th scope="row">{name}</th><td>{said(value as Value)}</td></tr>)}</tbody>
+        <tbody>{Object.entries(rest).map(([name, value]) => <tr key={name}><th scope="row">{name}</th><td>{said(value as Value)}</td></tr>)}</tbody>
       </table>
     </>
   );
 }
 
 function said(value: Value): string {
-  return typeof value === "string" ? value : JSON.stringify(value);
+  return typeof value === "string" && value.length <= CELL ? value : jsonOf(value);
 }

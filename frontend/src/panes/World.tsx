@@ -1,6 +1,6 @@
 /** The world from above, as a domain's `scene` records describe it: metres, y upwards. */
 
-import { memo } from "react";
+import { memo, useMemo } from "react";
 import type { SceneRec, Thing } from "../core/records";
 import { session } from "../session";
 import { useMoment } from "../turn";
@@ -12,7 +12,8 @@ const CLOSE = 0.18;
 
 export function World() {
   const moment = useMoment();
-  const things = moment.scene === null ? [] : (session.history.record(moment.scene) as SceneRec).things;
+  const scene = moment.scene === null ? undefined : session.history.record(moment.scene);
+  const things = useMemo(() => (scene?.type === "scene" ? drawable((scene as SceneRec).things) : []), [scene]);
   const busy = new Set([...moment.working.values()].flatMap((one) => Object.values(one.arguments ?? {}).map(String)));
   const ever = session.history.marks.scene.length > 0;
   return (
@@ -21,6 +22,13 @@ export function World() {
       {things.length === 0 ? <p className={`quiet note ${ever ? "" : "none"}`}>{ever ? "Nothing has been seen yet." : "This run draws no world."}</p> : <Scene things={things} busy={busy} moving={driving(busy, things)} />}
     </section>
   );
+}
+
+/** Things that have a place; what else is not said of them is what is usual. */
+function drawable(things: readonly Partial<Thing>[]): Thing[] {
+  const said = (thing: object) => Object.fromEntries(Object.entries(thing).filter(([, value]) => value !== null && value !== undefined));
+  return things.filter((thing) => typeof thing.x === "number" && typeof thing.y === "number")
+    .map((thing) => ({ shape: "", label: thing.id, ...said(thing) }) as Thing);
 }
 
 /** Where the robot is on its way to. */

@@ -3,11 +3,20 @@
 import { Fragment } from "react";
 import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
   type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
+import type { Damaged } from "../core/sound";
 import { session } from "../session";
 import { seconds } from "./Timeline";
 
+/** In a line; what is longer is cut: a pane would stand still over it. */
+const LINE = 300;
+
 /** What a record says, in a line. */
 export function inShort(rec: Rec): string {
+  const said = inWords(rec);
+  return said.length > LINE ? `${said.slice(0, LINE)}…` : said;
+}
+
+function inWords(rec: Rec): string {
   switch (rec.type) {
     case "event": return `${(rec as EventRec).name} from ${(rec as EventRec).source}`;
     case "action": {
@@ -26,6 +35,7 @@ export function inShort(rec: Rec): string {
     case "rule": return (rec as RuleRec).rule;
     case "plan.found": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
     case "plan.broken": return (rec as PlanBrokenRec).reason;
+    case "damaged": return (rec as Damaged).why;
     case "end": return (rec as EndRec).problem ?? "finished";
     default: return "";
   }
@@ -44,7 +54,7 @@ function news(rec: KnowledgeRec): string {
 
 export function RecordLink({ rec }: { rec: Rec }) {
   return (
-    <button className={`record ${rec.type.replace(".", "-")}`} onClick={() => session.goTo(rec.seq, { kind: "record", seq: rec.seq })}>
+    <button className={`record ${/^[a-z.]{1,20}$/.test(rec.type) ? rec.type.replace(".", "-") : ""}`} onClick={() => session.goTo(rec.seq, { kind: "record", seq: rec.seq })}>
       <span className="type">{rec.type}</span>
       <span className="said"><Broken text={inShort(rec)} /></span>
       <span className="quiet">{seconds(rec.t)}</span>
@@ -111,8 +121,21 @@ export function Values({ values }: { values: Named }) {
 function shortly(value: unknown): string {
   if (typeof value === "string") return value;
   if (value !== null && typeof value === "object" && "plot" in value) return `the plot ${String(value.plot)}`;
-  return JSON.stringify(value);
+  return jsonOf(value);
 }
+
+/** JSON that fits in a cell; what is nested too deeply is said to be. */
+export function jsonOf(value: unknown): string {
+  try {
+    const text = JSON.stringify(value) ?? "";
+    return text.length > CELL ? `${text.slice(0, CELL)}…` : text;
+  } catch {
+    return "nested too deeply";
+  }
+}
+
+/** Characters in a cell. */
+export const CELL = 400;
 
 export function Facts({ title, sign, facts }: { title: string; sign: string; facts: readonly string[] }) {
   if (facts.length === 0) return null;
