@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dsc.viewer.records import RecordLog
 
 MOST_COMPLAINTS = 5
+"""Damaged records named on the terminal; the rest is counted."""
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Where to listen on this machine; 0 picks a free port.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
 

@@ -146,9 +146,11 @@ def damaged(seq: int, t: float, line: int, why: str, text: str) -> str:
 
 def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterator[str]:
     """The lines of records without a gap; between two that can be read, damaged ones stand for what is lost."""
-    last, t, lost = 0, 0.0, list[tuple[int, str]]()
+    last, before, lost = 0, "", list[tuple[int, str]]()
 
     def substitutes(count: int) -> Iterator[str]:
+        found = _T.search(before, 0, MOST_SHOWN)
+        t = float(found[1]) if found else 0.0
         for place, (number, line) in enumerate(lost, 1):
             why = _why_unreadable(line)
             name = f"record {last + place}" if place <= count else "a line that is no record"
@@ -159,9 +161,10 @@ def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterat
     for number, line in enumerate(lines, 2):
         seq = _seq_of(line, last + 1)
         if seq is not None and 0 <= seq - last - 1 <= len(lost):
-            yield from substitutes(seq - last - 1)
-            found = _T.search(line, 0, MOST_SHOWN)
-            last, t, lost = seq, float(found[1]) if found else t, []
+            if lost:
+                yield from substitutes(seq - last - 1)
+                lost = []
+            last, before = seq, line
             yield line
         elif line.strip():
             lost.append((number, line))

@@ -10,9 +10,8 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h11
 import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -33,6 +32,9 @@ from dsc.viewer.records import RecordLog
 from dsc.viewer.rounds import Rounds
 from dsc.viewer.stream import Stream
 from knowledge_base.errors import InputError
+
+if TYPE_CHECKING:
+    import h11
 
 STATIC = Path(__file__).parent / "static"
 MOST_HEADER_BYTES = 1 << 20

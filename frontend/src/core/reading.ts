@@ -31,7 +31,7 @@ function wholeIn(line: string, number: number): Rec {
   try {
     return sound(parsed(line), number);
   } catch (error) {
-    return damaged(number, `it is no JSON (${(error as Error).message.slice(0, 120)})`, line);
+    return damaged(number, `it is no JSON (${(error as Error).message.replace(/ \(line 1 column \d+\)$/, "").slice(0, 120)})`, line);
   }
 }
 

@@ -179,7 +179,7 @@ SOUND = {"seq": 1, "expression": "(on ?x table)", "do": "event", "name": "x"}
 @pytest.mark.parametrize(("path", "field"), [(path, field) for path, fields in FIELDS.items() for field in fields])
 def test_a_field_of_another_type_is_refused_or_taken_never_a_failure(page, path, field) -> None:
     for value in ODD:
-        for said in ({**SOUND, field: value}, {field: value}, {**SOUND, "do": "unbreak", field: value}):
+        for said in ({**SOUND, field: value}, {"do": "unbreak", field: value}):
             answer = page.post(path, json=said)
             assert answer.status_code in (200, 400), (said, answer.text)
             assert answer.status_code == 200 or set(answer.json()) == {"error"}
@@ -195,13 +195,13 @@ JSON = st.recursive(
 )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(path=st.sampled_from(list(FIELDS)), said=JSON | st.fixed_dictionaries(dict.fromkeys(SOUND, JSON)))
 def test_any_json_is_answered(page, path, said) -> None:
     assert page.post(path, content=json.dumps(said)).status_code in (200, 400)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(path=st.sampled_from(list(FIELDS)), body=st.binary(max_size=60))
 def test_any_bytes_are_answered(page, path, body) -> None:
     assert page.post(path, content=body).status_code == 400
