@@ -34,14 +34,26 @@ def require_content(content: object, result: str, what: object, place: Place | N
 
     Raises:
         SchemaError: it is of another type.
-        InputError: a number that is not finite.
+        InputError: a number that is not finite, or a text that no file can hold.
     """
     if not _is(content, result):
         raise SchemaError(f"{what} is {_SAID[result]}, not {content!r}", place=place)
     numbers = content if isinstance(content, tuple) else (content,)
     for number in numbers:
-        if not isinstance(number, str):
+        if isinstance(number, str):
+            require_writable(number, what, place)
+        else:
             require_finite(number, what, place)
+
+
+def require_writable(text: str, what: object, place: Place | None = None) -> None:
+    """Raise `InputError` for a text with half characters (surrogates), for which UTF-8 has nothing."""
+    if text.isascii():
+        return
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"{what} is text that can be written to a file, not {text!a}", place=place) from None
 
 
 def require_finite(number: float, what: object, place: Place | None = None) -> None:

@@ -5,8 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-# What can be written without quotes and is read back as the same text (names are folded to lower case).
-_PLAIN_NAME = re.compile(r"[^\s()\";?:]+[^\s()\";?]*")
+# What can be written without quotes and is read back as the same text (names are folded to lower case); a `-` in front
+# parts a name from its type in typed lists.
+_PLAIN_NAME = re.compile(r"[^\s()\";?:-][^\s()\";?]*")
+_NOT_IN_NAMES = re.compile(r"[\s()\";?]+")
+LONGEST_NAME = 255
+"""Characters of the name of a thing."""
+A_NAME_IS = (
+    f"a name has 1 to {LONGEST_NAME} printable characters in lower case without blanks, parentheses, quotes, ';' and"
+    " '?'; it begins with neither '-' nor ':' and is no number, nor true, false or #t"
+)
+_TIME_PASSED = "#t"
+"""How much time has passed, in PDDL+."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?")
 TRUTH_VALUES: Mapping[str, bool] = {"true": True, "false": False}
 """The two words that are read as truth values, not as names."""
@@ -22,10 +32,22 @@ def is_plain_name(text: str) -> bool:
     return (
         _PLAIN_NAME.fullmatch(text) is not None
         and text == text.lower()
+        and text.isprintable()
         and not is_number(text)
         and text not in TRUTH_VALUES
-        and text != "-"
     )
+
+
+def is_name(text: str) -> bool:
+    """Whether a thing can be called that, in PDDL files too; see `A_NAME_IS`."""
+    return len(text) <= LONGEST_NAME and is_plain_name(text) and text != _TIME_PASSED
+
+
+def nearest_name(text: str) -> str | None:
+    """The text made a name: `red-cup` for `Red Cup`; `None` if nothing of it can be in one."""
+    plain = "".join(c for c in _NOT_IN_NAMES.sub("-", text[:LONGEST_NAME].lower()) if c.isprintable())
+    name = plain.strip("-").lstrip(":-")
+    return name if is_name(name) else None
 
 
 def value_text(value: str | float | tuple[float, ...], *, quoted: bool = False) -> str:
@@ -38,5 +60,5 @@ def value_text(value: str | float | tuple[float, ...], *, quoted: bool = False) 
         return repr(value)
     if not quoted and is_plain_name(value):
         return value
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r")
     return f'"{escaped}"'

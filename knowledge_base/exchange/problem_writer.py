@@ -5,11 +5,11 @@ from __future__ import annotations
 from knowledge_base.errors import InputError
 from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.facts import Content, Fact
-from knowledge_base.language.expression import TRUE, Expression
+from knowledge_base.language.expression import KEYWORDS, TRUE, Expression
 from knowledge_base.language.parser import LONGEST_NUMBER
 from knowledge_base.language.printer import to_text
 from knowledge_base.language.vocabulary import Signature
-from knowledge_base.spelling import is_plain_name, value_text
+from knowledge_base.spelling import is_name, value_text
 from knowledge_base.world.state import WorldState
 
 
@@ -29,10 +29,11 @@ def problem_to_text(
         InputError: a name that PDDL cannot spell, such as one with blanks or capitals, or a number that is
             too long for a file.
     """
-    for word in (name, domain, *state.nodes):
-        if not is_plain_name(word):
-            raise InputError(f"{word!r} cannot be a name in PDDL, which has lower case and no blanks there")
     schema = state.schema
+    heads = {fact.predicate for fact in (*state.facts, *state.values)}
+    for word in (name, domain, *state.nodes, *set(state.nodes.values()), *heads):
+        if not is_name(word) or (word in KEYWORDS and word in heads):
+            raise InputError(f"{word!r} cannot be a name in PDDL, which has lower case and no blanks there")
     said = [_fact(fact, schema.predicate(fact.predicate)) for fact in state.facts]
     values = [
         f"(= {_fact(fluent, schema.function(fluent.predicate))} {_written(content, quoted=True)})"

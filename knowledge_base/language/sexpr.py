@@ -1,10 +1,10 @@
 r"""Text to nested groups of words: the outer form of all PDDL text.
 
 A word is a run of characters other than blanks, parentheses, quotes and semicolons, and `?` begins a new one
-(`(on?x ?y)` is found in files); `;` starts a comment; `"..."` is text with the escapes `\"`, `\\` and `\n`. Reading
-is iterative; nesting is limited to `MAX_DEPTH` because everything that follows recurses, and nobody writes conditions
-that deep. Compiling nested quantifiers takes most, seven Python frames for each, so that with a caller that has used
-150 of the 1,000 frames Python allows, about 120 would be the end.
+(`(on?x ?y)` is found in files); `;` starts a comment; `"..."` is text with the escapes `\"`, `\\`, `\n`, `\r`.
+Reading is iterative; nesting is limited to `MAX_DEPTH` because everything that follows recurses, and nobody writes
+conditions that deep. Compiling nested quantifiers takes most, seven Python frames for each, so that with a caller
+that has used 150 of the 1,000 frames Python allows, about 120 would be the end.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ _TOKEN = re.compile(
 _HALF = re.compile("[\udc80-\udcff]")  # what a file's other bytes are read as
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
+_ENDS = {"n": "\n", "r": "\r"}  # of lines: as they are, a file's reader could make one of the other
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,5 +113,5 @@ def _word(kind: str, token: str, place: Place) -> Word:
         raise ParseError(f"'{token}' has a control character", place=place)
     if kind == "word":
         return Word(token, place)
-    plain = _ESCAPE.sub(lambda m: "\n" if m[1] == "n" else m[1], token[1:-1])
+    plain = _ESCAPE.sub(lambda m: _ENDS.get(m[1], m[1]), token[1:-1])
     return Word(plain, place, quoted=True)

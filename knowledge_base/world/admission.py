@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from knowledge_base.content import require_content, require_finite
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.content import require_content, require_finite, require_writable
+from knowledge_base.errors import MAX_NAME, InputError, SchemaError, UnknownNameError, shortened
 from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.check import check_arity, value_fits
 from knowledge_base.language.expression import TypedVariable
 from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
 from knowledge_base.language.world import World
+from knowledge_base.spelling import A_NAME_IS, is_name, nearest_name
 from knowledge_base.world.functional import require_single
 
 
@@ -22,7 +23,7 @@ def check_delta(delta: Delta, world: World) -> None:
         UnknownNameError: an undeclared type, predicate or function, or a thing that is not there.
         SchemaError: a wrong number of arguments, a wrong type, a second type for a thing, a second fact of a
             functional predicate, a value that a source feeds.
-        InputError: a number that is not finite, a name that is empty.
+        InputError: a number that is not finite, a new thing's name that PDDL cannot say.
     """
     admission = _Admission(delta, world)
     # Facts may be removed together with the things they are about.
@@ -80,6 +81,12 @@ class _Admission:
             raise InputError(f"a thing's name is text that is not empty, not {name!r}")
         self.schema.require_type(type_name)
         known = None if name in self.delta.removed_nodes else self.world.type_of(name)
+        if known is None and not is_name(name):  # older stores may have such things
+            meant = nearest_name(name)
+            raise InputError(
+                f"{shortened(repr(name), MAX_NAME)} cannot be the name of a thing: {A_NAME_IS}",
+                found=name, valid=[meant] if meant else (),
+            )  # fmt: skip
         if known is not None and known != type_name:
             raise SchemaError(f"'{name}' is of type '{known}' and cannot become '{type_name}'")
 
@@ -96,8 +103,11 @@ class _Admission:
         """It is no thing of the right type, so it is a value or a mistake."""
         wanted = parameter.types or (ROOT_TYPE,)
         if value_fits(value, wanted):
-            if not isinstance(value, str):
-                require_finite(value, f"the argument '?{parameter.name}' of {fact.predicate}")
+            what = f"the argument '?{parameter.name}' of {fact.predicate}"
+            if isinstance(value, str):
+                require_writable(value, what)
+            else:
+                require_finite(value, what)
             return
         expected = f"the argument '?{parameter.name}' of {fact} is of type {' or '.join(wanted)}"
         if known is not None:

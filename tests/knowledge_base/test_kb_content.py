@@ -306,7 +306,6 @@ def test_a_problem_has_the_goal_and_text_in_quotes(kb):
 @pytest.mark.parametrize(
     ("delta", "how", "message"),
     [
-        (Delta(nodes={"Cup 7": "cup"}), {}, "'Cup 7' cannot be a name in PDDL"),
         (Delta(values={fact("age", "cup1"): 10**50}), {}, "at most 40 characters"),
         (Delta(), {"domain": "My kitchen"}, "'My kitchen' cannot be a name"),
         (Delta(), {"goal": "(on ?x map)"}, "not bound"),
