@@ -18,15 +18,16 @@ from dsc.model.states import (
 )
 from dsc.model.transitions import Source
 from dsc.text.diagram.captions import block_texts, full_text, labelled, seconds_text
+from dsc.text.targets import require_targets
 
 
 def to_mermaid(plot: ActionPlot) -> str:
-    """The plot as a Mermaid state diagram."""
+    """The plot as a Mermaid state diagram; raises `UnknownNameError` if it leads to a state that it has not."""
     return "\n".join(["stateDiagram-v2", *_Writer(plot, hulls_have_rows=False).lines()]) + "\n"
 
 
 def to_plantuml(plot: ActionPlot) -> str:
-    """The plot as a PlantUML state diagram."""
+    """The plot as a PlantUML state diagram; errors as for `to_mermaid`."""
     lines = _Writer(plot, hulls_have_rows=True).lines()
     return "\n".join(["@startuml", f"title {plot.name}", *lines, "@enduml"]) + "\n"
 
@@ -38,6 +39,7 @@ class _Writer:
     """
 
     def __init__(self, plot: ActionPlot, *, hulls_have_rows: bool) -> None:
+        require_targets(plot)
         self._plot, self._hulls_have_rows = plot, hulls_have_rows
         self._alias = {name: f"s{number}" for number, (name, _, _) in enumerate(plot.walk(), start=1)}
 

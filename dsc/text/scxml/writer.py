@@ -24,6 +24,7 @@ from dsc.text.scxml.document import NAMESPACE
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.expressions import expression_text, identifier, term_text
 from dsc.text.scxml.kinds import NO_VALUE
+from dsc.text.targets import require_targets
 from knowledge_base.language.expression import Constant, Term, free_variables
 
 
@@ -32,7 +33,9 @@ def to_scxml(plot: ActionPlot) -> str:
 
     Raises:
         NotExpressibleError: the plot uses something that SCXML has nothing for.
+        UnknownNameError: it leads to a state that it has not.
     """
+    require_targets(plot)
     for what, there in (("parameters", plot.parameters), ("outputs", plot.outputs), ("rules", plot.rules),
                         ("handlers", plot.handlers),
                         ("outcome events", plot.emits), ("condition", plot.when),
