@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import sys
 from collections.abc import Callable
@@ -10,7 +9,7 @@ from enum import StrEnum
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -27,13 +26,11 @@ if TYPE_CHECKING:
     from domains.clean_up_table.report import Report
     from dsc.sequencer.sequencer import Sequencer
     from knowledge_base.errors import InputError
+    from knowledge_base.outputs import Output
     from knowledge_base.store import KnowledgeBase
 
 BAD_INPUT, NOT_WRITTEN, NOBODY_READS = 2, 74, 141
 """Exit statuses of every command; the last two are EX_IOERR of sysexits.h and what a shell gives for a broken pipe."""
-
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
-"""What writing can fail with though the file could be opened."""
 
 
 class _Commands(TyperGroup):
@@ -114,7 +111,9 @@ def run(
     ] = None,
     real_time: Annotated[bool, typer.Option("--real-time", help="Let time pass as on the wall.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
-    trace: Annotated[Path | None, typer.Option(help="Write every record to this file (JSON lines).")] = None,
+    trace: Annotated[
+        Path | None, typer.Option(help="Write every record to this file (JSON lines); - is standard output.")
+    ] = None,
     store: Annotated[Path | None, typer.Option(help="Keep the run in this new file: it can be resumed.")] = None,
     durability: Annotated[Durability, typer.Option(help="With a store, what the run outlives.")] = Durability.process,
     resume: Annotated[Path | None, typer.Option(help="Go on with the run that was broken off in this store.")] = None,
@@ -130,8 +129,12 @@ def run(
     from domains.clean_up_table.deployment import PROFILES, deploy, resumed
     from domains.clean_up_table.scenario import Scenario
     from dsc.text.profiles import find_profile
+    from dsc.trace import BEGINS
     from knowledge_base.errors import InputError, UnknownNameError
+    from knowledge_base.outputs import Output
 
+    file = None if profile is None or not Path(profile).suffix else Path(profile)
+    output = None if trace is None else Output(trace, "--trace", scenario, file, store, resume, over=BEGINS)
     if resume is not None:
         beginning = {
             "WORLD": world, "--scenario": scenario, "--seed": seed, "--faults": faults, "--store": store,
@@ -149,7 +152,7 @@ def run(
         chosen = Scenario.load(scenario) if scenario is not None else Scenario.default()
         robot = None if profile is None else find_profile(profile, PROFILES)
         deployed = deploy(chosen, seed, faults, store=store, durability=durability.value, profile=robot)
-    follow = partial(_followed, deployed, simulated=not real_time, quiet=json, trace=trace)
+    follow = partial(_followed, deployed, simulated=not real_time, quiet=json, trace=output)
     with deployed:
         if not view:
             report = follow()
@@ -186,7 +189,7 @@ def _followed(
     *,
     simulated: bool,
     quiet: bool,
-    trace: Path | None,
+    trace: Output | None,
     prepare: Callable[[Sequencer], None] | None = None,
 ) -> Report:
     """Run, showing progress unless `quiet`, and writing the trace."""
@@ -199,7 +202,7 @@ def _followed(
 
     with ExitStack() as stack:
         if trace is not None:
-            stream = stack.enter_context(_opened(trace))
+            stream = stack.enter_context(trace.stream())
             stream.write(header(**deployed.header()) + "\n")
             deployed.executive.listen(write_to(stream))
         console = Console()
@@ -210,15 +213,6 @@ def _followed(
         elif not quiet:
             deployed.executive.listen(PlainProgress(typer.echo))
         return deployed.run(simulated=simulated, prepare=prepare)
-
-
-def _opened(path: Path) -> TextIO:
-    from knowledge_base.errors import InputError
-
-    try:
-        return path.open("w", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write the trace to '{path}': {error.strerror}") from None
 
 
 def _print(report: Report, *, as_json: bool) -> None:
@@ -242,9 +236,12 @@ def main() -> None:
     except BrokenPipeError:
         sys.exit(NOBODY_READS)
     except OSError as error:
+        from knowledge_base.outputs import FULL
+
         if error.errno not in FULL:
             raise
-        typer.echo(f"dsc: cannot write: {error.strerror}", err=True)
+        named = "" if error.filename is None else f" '{error.filename}'"
+        typer.echo(f"dsc: cannot write{named}: {error.strerror}", err=True)
         sys.exit(NOT_WRITTEN)
     finally:
         _drop_unwritten()

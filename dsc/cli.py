@@ -93,20 +93,24 @@ def show(
     from dsc.text.diagram import draw
     from dsc.text.plots import load_plot, plot_to_yaml
     from knowledge_base.errors import UnknownNameError
+    from knowledge_base.outputs import Output
 
+    out = None if svg is None else Output(svg, "--svg", file)
     plot = load_plot(file)
     library, broken = _neighbours(file, plot)
+    if out is not None:
+        out.keep(*_files(library))
     try:
         shown = library.expanded(plot) if expanded else plot
-        drawing = draw(plot, library) if svg is not None else ""
+        drawing = "" if out is None else draw(plot, library)
     except UnknownNameError as error:
         # A plot that is not there may be in a file that cannot be read; then that is what to say.
         raise (broken or [error])[0] from None
-    if svg is not None:
-        _write(svg, drawing)
+    if out is not None:
+        out.write(drawing)
     if yaml:
         typer.echo(plot_to_yaml(shown), nl=False)
-    elif svg is None:
+    elif out is None:
         _print_tree(shown)
 
 
@@ -123,10 +127,12 @@ def import_(
     from dsc.text.plots import plot_to_yaml
     from dsc.text.scxml.reader import parse_scxml
     from dsc.validation import raise_findings, validate_plot
+    from knowledge_base.outputs import Output
 
+    output = Output(out, "--out", file)
     plot = parse_scxml(read_file(file), str(file))
     raise_findings(validate_plot(plot, Library([plot])))
-    _write(out, plot_to_yaml(plot))
+    output.write(plot_to_yaml(plot))
 
 
 @app.command()
@@ -141,16 +147,23 @@ def export(
     from dsc.text.scxml.writer import to_scxml
     from dsc.text.state_diagram import to_mermaid, to_plantuml
     from knowledge_base.errors import InputError
+    from knowledge_base.outputs import Output
+
+    def to_svg(plot: ActionPlot) -> str:
+        library, _ = _neighbours(file, plot)
+        output.keep(*_files(library))
+        return draw(plot, library)
 
     forms: dict[str, Callable[[ActionPlot], str]] = {
         "scxml": to_scxml,
         "mermaid": to_mermaid,
         "plantuml": to_plantuml,
-        "svg": lambda plot: draw(plot, _neighbours(file, plot)[0]),
+        "svg": to_svg,
     }
     if to not in forms:
         raise InputError(f"there is no form '{to}'", found=to, valid=forms)
-    _write(out, forms[to](load_plot(file)))
+    output = Output(out, "--out", file)
+    output.write(forms[to](load_plot(file)))
 
 
 @app.command()
@@ -167,7 +180,9 @@ def diff(
 
     from dsc.text.diagram.svg import above
     from dsc.text.difference import differences, draw_difference
+    from knowledge_base.outputs import Output
 
+    out = None if svg is None else Output(svg, "--svg", old, new)
     before, after = _load(old), _load(new)
     found = differences(before, after)
     if json:
@@ -175,8 +190,8 @@ def diff(
     else:
         for difference in found:
             typer.echo(str(difference))
-    if svg is not None:
-        _write(svg, above(*draw_difference(before, after)))
+    if out is not None:
+        out.write(above(*draw_difference(before, after)))
     raise typer.Exit(1 if found else 0)
 
 
@@ -192,13 +207,11 @@ def clone(
     ] = None,
 ) -> None:
     """Clone a plot for another robot, with all plots that it depends on; clones that were made before are used."""
-    from dsc.text.cloning import clone_files
+    from dsc.text.cloning import clone_files, write_clones
 
     found = clone_files(file, prefix, into, profile or ())
-    for target in {target.parent for target in found.texts}:
-        target.mkdir(parents=True, exist_ok=True)
-    for target, text in found.texts.items():
-        _write(str(target), text)
+    write_clones(found)
+    for target in found.texts:
         typer.echo(f"made {target}")
     for target in found.kept:
         typer.echo(f"kept {target}, which was made before")
@@ -278,16 +291,10 @@ def _as_data(file: Path, finding: Finding) -> dict[str, Any]:
     }
 
 
-def _write(target: str, text: str) -> None:
-    from knowledge_base.errors import InputError, Place
-
-    if target == "-":
-        typer.echo(text, nl=False)
-        return
-    try:
-        Path(target).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write the file: {error.strerror}", place=Place(target)) from None
+def _files(library: Library) -> list[Path]:
+    """Where its plots were read."""
+    places = [plot.place(("plot",)) for plot in library]
+    return [Path(place.source) for place in places if place is not None and place.source]
 
 
 def _print_json(data: object) -> None:

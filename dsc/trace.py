@@ -15,6 +15,8 @@ from dsc.json_text import text_of
 
 FORMAT = "dsc-trace"
 VERSION = 1
+BEGINS = f'{{"format": "{FORMAT}"'
+"""How each trace file begins."""
 
 
 class Record(NamedTuple):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from domains.cli import main
+from knowledge_base import Delta, KnowledgeBase, Schema
 
 TABLE = Path(__file__).parent.parent / "domains" / "clean_up_table"
 
@@ -90,7 +92,7 @@ def test_nothing_people_get_wrong_gives_a_traceback(dsc, tmp_path):
         (["run", "clean-up-table", "--scenario", tmp_path / "none.yaml"], "there is no file"),
         (["run", "clean-up-table", "--scenario", file("a.yaml", "table:\n  cupz: 4\n")], "a.yaml:2:3: unknown key 'cupz'; did you mean 'cups'?"),
         (["run", "clean-up-table", "--scenario", file("b.yaml", "table: {items: {x: mug}}\n")], "b.yaml:1"),
-        (["run", "clean-up-table", "--trace", tmp_path / "no" / "where.jsonl"], "cannot write the trace"),
+        (["run", "clean-up-table", "--trace", tmp_path / "no" / "where.jsonl"], "--trace: cannot write"),
         (["plot", "check", file("c.yaml", PLOT.format(**{**good, "use": "recognize"}))], "did you mean 'recognise'?"),
         (["plot", "check", file("d.yaml", PLOT.format(**{**good, "target": "endet"}))], "d.yaml:6"),
         (["plot", "check", file("e.yaml", PLOT.format(**{**good, "third": "recognizd: ended"}))], "does not handle its outcome 'not_possible'"),
@@ -180,3 +182,94 @@ def test_the_installed_command_answers():
     )
     assert done.returncode == 0
     assert "Dynamic State Charts" in done.stdout
+
+
+# --- files that commands write
+
+PLOTS = TABLE / "plots"
+
+
+def outputs(folder):
+    """Each option that names a file to be written, with a command that would write it."""
+    problem = folder / "problem.pddl"
+    (folder / "domain.pddl").write_text((TABLE / "domain.pddl").read_text())
+    problem.write_text("(define (problem p) (:domain clean-up-table) (:objects red - cup) (:init) (:goal (not (tidy red))))")
+    chart = folder / "chart.scxml"
+    chart.write_text('<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0"><final id="end"/></scxml>')
+    shutil.copytree(PLOTS, folder, dirs_exist_ok=True)
+    plot = folder / "report.yaml"
+    return {
+        "--trace": ["run", "clean-up-table", "--json"],
+        "--plot": ["plan", folder / "domain.pddl", problem],
+        "--svg": ["plot", "show", plot],
+        "plot diff --svg": ["plot", "diff", plot, PLOTS / "search.yaml"],
+        "plot import --out": ["plot", "import", chart],
+        "plot export --out": ["plot", "export", plot, "--to", "svg"],
+        "kb export --to": ["kb", "export", problem],
+        "kb draw --to": ["kb", "draw", problem],
+    }
+
+
+@pytest.fixture
+def store(tmp_path):
+    path = tmp_path / "kept.db"
+    with KnowledgeBase.open(Schema.from_pddl(TABLE / "domain.pddl"), path) as kb:
+        kb.apply(Delta(nodes={"red": "cup"}), "test")
+    return path
+
+
+def test_no_option_writes_over_a_store_or_what_belongs_to_it(dsc, tmp_path, store):
+    (tmp_path / "hard.svg").hardlink_to(store)
+    before = store.read_bytes()
+    for option, words in outputs(tmp_path).items():
+        for path in (tmp_path / "hard.svg", f"{store}-wal"):
+            status, out, err = dsc(*words, option.split()[-1], path)
+            assert (status, "store" in out + err) == (2, True), (option, path, out, err)
+    assert store.read_bytes() == before
+    assert not any(Path(f"{store}{end}").exists() for end in ("-wal", "-lock"))
+
+
+def test_no_option_writes_over_what_the_command_reads(dsc, tmp_path):
+    for option, words in outputs(tmp_path).items():
+        files = [word for word in words if isinstance(word, Path) and word.parent == tmp_path]
+        files += [tmp_path / "domain.pddl"] if words[0] == "kb" else []
+        files += [tmp_path / "drive_planned.yaml"] if "svg" in f"{option} {words}" and "diff" not in words else []
+        for file in files:
+            before = file.read_bytes()
+            (link := tmp_path / "link").symlink_to(file)
+            status, out, err = dsc(*words, option.split()[-1], link)
+            assert (status, "for something else" in out + err) == (2, True), (option, file, out, err)
+            link.unlink()
+            assert file.read_bytes() == before
+
+
+def test_a_trace_is_no_file_that_the_run_keeps_and_nothing_has_run_then(dsc, tmp_path):
+    kept = tmp_path / "run.db"
+    (tmp_path / "link.db").symlink_to(kept)
+    for trace in (kept, f"{kept}-world", f"{kept}-world-wal", tmp_path / "link.db"):
+        status, _, err = dsc("run", "clean-up-table", "--store", kept, "--trace", trace)
+        assert (status, "--trace: cannot write" in err) == (2, True)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["link.db"]
+    (tmp_path / "notes.txt").write_text("my notes")
+    assert dsc("run", "clean-up-table", "--store", kept, "--trace", tmp_path / "notes.txt")[0] == 2
+    assert (tmp_path / "notes.txt").read_text() == "my notes"
+    assert not kept.exists()
+
+
+def test_a_trace_can_go_to_standard_output_and_over_an_older_trace(dsc, tmp_path):
+    status, out, _ = dsc("run", "clean-up-table", "--json", "--trace", "-")
+    *records, report = map(json.loads, out.splitlines())
+    assert (status, records[0]["format"], records[-1]["type"]) == (0, "dsc-trace", "end")
+    assert report["goal_reached"] is True
+    file = tmp_path / "run.jsonl"
+    file.write_text(out)
+    dsc("run", "clean-up-table", "--json", "--trace", file)
+    assert [json.loads(line) for line in file.read_text().splitlines()] == records
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
+def test_an_output_on_a_full_medium_is_named(dsc, tmp_path):
+    for option, words in outputs(tmp_path).items():
+        status, out, err = dsc(*words, option.split()[-1], "/dev/full")
+        named = "" if option == "--trace" else " '/dev/full'"
+        assert (status, err) == (74, f"dsc: cannot write{named}: No space left on device\n"), out

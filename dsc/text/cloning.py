@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -17,6 +18,7 @@ from dsc.text.neighbours import Neighbours
 from dsc.text.plots import load_plot, parse_plot, plot_to_yaml
 from dsc.text.profiles import load_profile, profile_to_yaml
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
+from knowledge_base.outputs import Output, write_all
 
 _KEY = r"""["']?[\w\-]+["']?\s*:\s*"""
 
@@ -45,7 +47,7 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
 
     Raises:
         InputError: a file cannot be read or is there already, a plot uses one that is not there, the prefix makes no
-            name, or a clone that was made before does not fit any more.
+            name, two clones would be one file, or a clone that was made before does not fit any more.
     """
     if not re.fullmatch(r"[a-zA-Z_][\w\-]*", prefix):
         raise SchemaError(f"no name begins with '{prefix}': letters, digits, _ and -, a letter first", found=prefix)
@@ -64,17 +66,42 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
     new = {clone.name: clone for clone in clones}
     names = {one.name: prefix + one.name for one in library if prefix + one.name in (*new, *(p.name for p in made))}
     originals = {name: library.plot(old) for old, name in names.items() if name in new}
-    texts = {folder / f"{prefix}{_stem(one)}.yaml": _text(one, new[name], names) for name, one in originals.items()}
-    for target in texts:
-        if target.exists():
+    texts: dict[Path, str] = {}
+    for name, one in originals.items():
+        target = folder / f"{prefix}{_stem(one)}.yaml"
+        if os.path.lexists(target):
             raise InputError("the file is there already, and holds no clone", place=Place(str(target)))
-    for profile in profiles:
-        told = cloned_profile(load_profile(profile), prefix, names)
-        if not (folder / f"{prefix}{profile.name}").exists():
-            texts[folder / f"{prefix}{profile.name}"] = profile_to_yaml(told)
+        _add(texts, target, _text(one, new[name], names))
     kept = [path for path, one in there.items() if one.name in names.values()]
-    kept += [folder / f"{prefix}{one.name}" for one in profiles if folder / f"{prefix}{one.name}" not in texts]
+    for profile in profiles:
+        target = folder / f"{prefix}{profile.name}"
+        text = profile_to_yaml(cloned_profile(load_profile(profile), prefix, names))
+        if os.path.lexists(target):
+            kept.append(target)
+        else:
+            _add(texts, target, text)
     return Clones(texts, tuple(kept))
+
+
+def write_clones(clones: Clones) -> None:
+    """Write the files, all or none, and make their folder if it is missing.
+
+    Raises:
+        InputError: the folder cannot be made, or a file not be written.
+        OSError: there is no room.
+    """
+    for folder in {target.parent for target in clones.texts}:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"cannot make the folder '{folder}': {error.strerror}") from None
+    write_all({Output(target, "clone"): text for target, text in clones.texts.items()})
+
+
+def _add(texts: dict[Path, str], target: Path, text: str) -> None:
+    if target in texts:
+        raise InputError("two clones would be this file; rename a plot's file or a profile", place=Place(str(target)))
+    texts[target] = text
 
 
 def _plots_in(folder: Path) -> Iterator[tuple[Path, ActionPlot]]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from knowledge_base.cli.sources import Domain, Source, Store, is_store, opened, writable
+from knowledge_base.cli.sources import Domain, Source, Store, domain_of, opened, writable
+
+if TYPE_CHECKING:
+    from knowledge_base.outputs import Output
 
 
 class Form(StrEnum):
@@ -18,7 +21,8 @@ class Form(StrEnum):
     PDDL = "pddl"
 
 
-To = Annotated[Path | None, typer.Option("--to", metavar="FILE", help="Write here.  [default: standard output]")]
+To = Annotated[Path, typer.Option("--to", metavar="FILE", help="Write here; - is standard output.")]
+STANDARD_OUTPUT = Path("-")
 
 
 def import_(
@@ -38,41 +42,45 @@ def import_(
 
 def export(
     source: Source,
-    to: To = None,
+    to: To = STANDARD_OUTPUT,
     form: Annotated[Form | None, typer.Option("--as", help="The form.  [default: by FILE's ending, else json]")] = None,
     domain: Domain = None,
 ) -> None:
     """Write a world as JSON (lossless, with its schema) or as the start of a PDDL problem."""
+    from knowledge_base.spelling import nearest_name
+
+    output = _output(to, source, domain)
     with opened(source, domain) as (kb, problem):
-        pddl = form is Form.PDDL or (form is None and to is not None and to.suffix == ".pddl")
-        text = kb.to_pddl(problem.domain if problem else "world", source.stem) if pddl else kb.to_json()
-    _write(text, to)
+        pddl = form is Form.PDDL or (form is None and to.suffix == ".pddl")
+        name = nearest_name(source.stem) or "world"
+        text = kb.to_pddl(problem.domain if problem else "world", name) if pddl else kb.to_json()
+    _write(output, text)
 
 
 def draw(
     source: Source,
     thing: Annotated[str | None, typer.Argument(metavar="[THING]", help="Draw what is around this thing.")] = None,
     hops: Annotated[int, typer.Option(min=0, help="How many arcs away from THING.")] = 1,
-    to: To = None,
+    to: To = STANDARD_OUTPUT,
     domain: Domain = None,
 ) -> None:
     """Draw a world's graph, or the neighbourhood of THING, as SVG."""
     from knowledge_base.drawing import draw as drawn
 
+    output = _output(to, source, domain)
     with opened(source, domain) as (kb, _):
-        _write(drawn(kb, thing, hops), to)
+        text = drawn(kb, thing, hops)
+    _write(output, text)
 
 
-def _write(text: str, to: Path | None) -> None:
-    from knowledge_base.errors import InputError
+def _output(to: Path, source: Path, domain: Path | None) -> Output:
+    """Where it goes, which must be another place than it comes from."""
+    from knowledge_base.outputs import Output
 
-    if to is None:
-        typer.echo(text)
-        return
-    if is_store(to):
-        raise InputError(f"'{to}' is a store, with its history; nothing else is written in its place")
-    try:
-        to.write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write '{to}': {error.strerror}") from None
-    typer.echo(f"wrote {to}")
+    return Output(to, "--to", source, domain or domain_of(source))
+
+
+def _write(output: Output, text: str) -> None:
+    output.write(text if text.endswith("\n") else text + "\n")
+    if output.path != STANDARD_OUTPUT:
+        typer.echo(f"wrote {output.path}")

@@ -81,6 +81,11 @@ def is_store(path: Path) -> bool:
     return is_database(path)
 
 
+def domain_of(problem: Path) -> Path:
+    """Where a problem's domain is, if nobody names it."""
+    return problem.parent / "domain.pddl"
+
+
 def _opened(source: Path, domain: Path | None) -> Opened:
     from knowledge_base.pddl.files import read_text
     from knowledge_base.store import KnowledgeBase
@@ -110,7 +115,7 @@ def _problem(source: Path, domain: Path | None) -> Opened:
 def _beside(problem: Path) -> Path:
     from knowledge_base.errors import InputError
 
-    domain = problem.parent / "domain.pddl"
+    domain = domain_of(problem)
     if not domain.exists():
         raise InputError(f"there is no '{domain}' beside the problem; name its domain with --domain")
     return domain

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,7 +33,9 @@ def plan_command(
     ] = None,
     seconds: Annotated[float, typer.Option(min=0.0, help="Stop posing and planning after this long.")] = 10.0,
     parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can go side by side.")] = False,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete; - is standard output.")
+    ] = None,
     explain: Annotated[
         bool, typer.Option("--explain", help="Say what each step is for, or why there is no plan.")
     ] = False,
@@ -44,13 +45,13 @@ def plan_command(
 
     Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
     """
+    from knowledge_base.outputs import Output
     from planning.cli.notes import valueless
     from planning.patience import OutOfPatienceError
     from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
     from planning.posing.constructs import why_no_engine
 
-    if plot is not None:
-        _refuse_unwritable(plot)
+    output = None if plot is None else Output(plot, "--plot", *files)
     domain, read, world = read_files(files)
     notes = [*domain.notes, *read.notes]
     try:
@@ -71,8 +72,8 @@ def plan_command(
         notes += _untraced(domain) if parallel or explain or plot else []
         answer |= ordered(order) if parallel else {}
         answer |= purposes(order) if explain else {}
-        if plot is not None:
-            _write_plot(plot, outcome.plan, domain, order if parallel else None)
+        if output is not None:
+            output.write(_plot_text(outcome.plan, domain, order if parallel else None))
     end(status, answer, notes, as_json=as_json)
 
 
@@ -96,25 +97,8 @@ def _untraced(domain: PlanningDomain) -> list[str]:
     return [f"{names}: {why}, so who needs what is not traced, and no robot can carry the plan out"] if form else []
 
 
-def _refuse_unwritable(file: Path) -> None:
-    """Before any search, and without making the file: there may be no plan to put there."""
-    from knowledge_base.errors import InputError
-
-    if file.is_dir():
-        raise InputError(f"cannot write the plot to '{file}': it is a folder")
-    if not file.parent.is_dir():
-        raise InputError(f"cannot write the plot to '{file}': there is no folder '{file.parent}'")
-    if not os.access(file if file.exists() else file.parent, os.W_OK):
-        raise InputError(f"cannot write the plot to '{file}': it may not be written")
-
-
-def _write_plot(file: Path, plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> None:
+def _plot_text(plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> str:
     from dsc.text.plots import plot_to_yaml
-    from knowledge_base.errors import InputError
     from planning.generation.plot import plot_from_plan
 
-    text = plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write the plot to '{file}': {error.strerror}") from None
+    return plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))

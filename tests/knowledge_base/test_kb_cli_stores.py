@@ -217,7 +217,7 @@ def test_content_is_told_and_shown_as_the_language_writes_it(tmp_path) -> None:
 
 def test_nothing_is_written_in_the_place_of_a_store(store, tmp_path) -> None:
     for command in (("export", store), ("draw", store)):
-        with pytest.raises(InputError, match="is a store, with its history"):
+        with pytest.raises(InputError, match=f"--to: cannot write '{store}': the command needs"):
             run(*command, "--to", store)
     assert json.loads(run("show", store, "--json"))["version"] == 1
 
@@ -248,7 +248,8 @@ def test_how_a_query_will_be_looked_up(store) -> None:
     assert json.loads(run("query", store, "(on ?c table)", "--explain", "--json"))["steps"]
 
 
-def test_names_are_printed_so_that_they_are_read_back_and_do_nothing_to_a_terminal(store) -> None:
+def test_names_of_older_stores_are_printed_so_that_they_do_nothing_to_a_terminal(store, monkeypatch) -> None:
+    monkeypatch.setattr("knowledge_base.world.admission.is_name", lambda _: True)
     run("tell", store, '(cup "Red one")', '(on "Red one" table)', '(cup "\x1b[31m")')
     (said,) = [fact for fact in json.loads(run("show", store, "--json"))["facts"] if "Red" in fact]
     assert run("retract", store, said).startswith('- (on "Red one" table)')

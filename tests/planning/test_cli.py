@@ -146,9 +146,9 @@ def test_the_plan_can_be_written_as_a_plot(run, tmp_path):
 
 def test_a_place_where_no_plot_can_be_written_is_refused_before_any_search(run, tmp_path, monkeypatch):
     monkeypatch.setattr("planning.engines.race.PlannerRace", None)
-    with pytest.raises(InputError, match=r"cannot write the plot to .*there is no folder '.*nowhere'"):
+    with pytest.raises(InputError, match=r"--plot: cannot write .*there is no folder '.*nowhere'"):
         run("--plot", str(tmp_path / "nowhere" / "plan.yaml"))
-    with pytest.raises(InputError, match=r"cannot write the plot to .*it is a folder"):
+    with pytest.raises(InputError, match=r"--plot: cannot write .*it is a folder"):
         run("--plot", str(tmp_path))
 
 
