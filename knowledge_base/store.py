@@ -109,14 +109,21 @@ class KnowledgeBase(Observable):
 
     @classmethod
     def from_json(
-        cls, text_or_path: str | Path, schema: Schema | None = None, clock: Now = wall.time
+        cls,
+        text_or_path: str | Path,
+        schema: Schema | None = None,
+        clock: Now = wall.time,
+        *,
+        source: str | None = None,
     ) -> KnowledgeBase:
         """What `to_json` wrote, from its text or a file (a `Path`), at the same version, in memory.
+
+        `source` names a text in messages.
 
         Raises:
             InputError: as `exchange.json.read_json`.
         """
-        state, version = read_json(text_or_path, schema)
+        state, version = read_json(text_or_path, schema, source)
         return cls(state.schema, clock, MemoryHistory(Version(state, version, clock())))
 
     def __enter__(self) -> Self:

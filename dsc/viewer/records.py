@@ -13,7 +13,7 @@ from pydantic_core import from_json
 
 from dsc.trace import FORMAT, VERSION, Record, header
 from knowledge_base.errors import InputError, ParseError, Place
-from knowledge_base.pddl.files import read_text
+from knowledge_base.pddl.files import read_lines
 
 MOST_RECORDS = 2000
 MOST_CHARACTERS = 400_000
@@ -24,6 +24,10 @@ MOST_SHOWN = 200
 """Characters of a damaged line."""
 _T = re.compile(r'"t": (-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)')
 _NO_CHARACTER = re.compile("[\ud800-\udfff]")
+MAX_TRACE_BYTES = 1024 * 1024 * 1024
+"""Of a trace: all its lines are kept in memory."""
+MAX_LINE_BYTES = 64 * 1024 * 1024
+"""Of one line of a trace: the longest record is the first, the whole world."""
 
 
 class RecordLog:
@@ -132,7 +136,8 @@ def read_trace(path: Path) -> RecordLog:
         InputError: there is no such file, or it cannot be read.
         ParseError: it is no trace, one of another version, or records are missing, doubled or in another order.
     """
-    first, *lines = read_text(path, errors="surrogateescape").split("\n")
+    lines = read_lines(path, MAX_TRACE_BYTES, MAX_LINE_BYTES, errors="surrogateescape")
+    first = next(lines, "")
     _require_header(first, path)
     complaints: list[str] = []
     return RecordLog(first, _numbered(lines, path, complaints), complaints=complaints)
@@ -199,7 +204,7 @@ def _parsed(line: str) -> Any:
     """What the line says if that is an object, the reason if it is no JSON, else `None`."""
     try:
         said = from_json(line)
-    except ValueError as error:
+    except (TypeError, ValueError) as error:  # TypeError: half a character
         return str(error)
     return said if isinstance(said, dict) else None
 

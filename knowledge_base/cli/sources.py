@@ -23,6 +23,8 @@ Domain = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
+_MARK = b"\xef\xbb\xbf"  # of byte order, in UTF-8
+
 readers: dict[str, Callable[[Path], KnowledgeBase]] = {}
 """More kinds of sources by the ending of their file, e.g. `.yaml`; upper rooms add theirs."""
 
@@ -87,26 +89,28 @@ def domain_of(problem: Path) -> Path:
 
 
 def _opened(source: Path, domain: Path | None) -> Opened:
-    from knowledge_base.pddl.files import read_text
+    from knowledge_base.exchange.json import MAX_WORLD_BYTES
+    from knowledge_base.pddl.files import MAX_BYTES, decoded, read_bytes, require_size
     from knowledge_base.store import KnowledgeBase
 
     if is_store(source):
         return Opened(KnowledgeBase.open(None, source, read_only=True))
     if source.suffix in readers:
         return Opened(readers[source.suffix](source))
-    text = read_text(source)  # what was asked for comes first: without it nobody cares for its domain
-    if text.lstrip()[:1] == "{":
-        return Opened(KnowledgeBase.from_json(source))
-    return _problem(source, domain)
+    data = read_bytes(source, MAX_WORLD_BYTES)  # once: a pipe gives nothing a second time
+    if data.removeprefix(_MARK).lstrip()[:1] == b"{":
+        return Opened(KnowledgeBase.from_json(decoded(data, source), source=str(source)))
+    require_size(len(data), MAX_BYTES, str(source))
+    return _problem(decoded(data, source, errors="surrogateescape"), source, domain)
 
 
-def _problem(source: Path, domain: Path | None) -> Opened:
-    from knowledge_base.exchange.pddl import read_problem
+def _problem(text: str, source: Path, domain: Path | None) -> Opened:
+    from knowledge_base.exchange.pddl import parse_problem
     from knowledge_base.store import KnowledgeBase
     from knowledge_base.world.schema import Schema
 
     schema = Schema.from_pddl(domain or _beside(source))
-    problem = read_problem(source, schema)
+    problem = parse_problem(text, schema, str(source))
     kb = KnowledgeBase(schema)
     kb.apply(problem.delta(), author=str(source))
     return Opened(kb, problem)

@@ -100,6 +100,11 @@ def read_problem(
         SchemaError: a wrong number of arguments, a wrong type, an object declared in two ways.
     """
     text, source = text_and_source(text_or_path, source)
+    return parse_problem(text, schema, source, domain)
+
+
+def parse_problem(text: str, schema: Schema, source: str | None = None, domain: str | None = None) -> ProblemText:
+    """Read a PDDL problem from its text; arguments and errors as for `read_problem`."""
     definition = read_definition(text, source, "problem", _SECTIONS)
     named = _domain(definition)
     if domain is None or named.folded() == domain:

@@ -29,6 +29,9 @@ _SECTIONS = (
     ":derived",
 )
 
+MOST_IMPLIED = 50
+"""Undeclared types that are taken to be types of their own; each is compared with all that are declared."""
+
 
 @dataclass(frozen=True, slots=True)
 class DeclarationText:
@@ -70,13 +73,16 @@ class DomainText:
     def implied_types(self) -> tuple[TypedName, ...]:
         """Types that are named only as what others are below: they are types of their own.
 
-        One that is written much like a declared type is not among them: that is a typing error.
+        One that is written much like a declared type is not among them: that is a typing error. More than
+        `MOST_IMPLIED` are none, either.
         """
         declared = {"object", *(name for name, _, _ in self.types)}
         used: dict[str, Place] = {}
         for parent, place in ((p, place) for _, parents, place in self.types for p in parents):
             if parent not in declared:
                 used.setdefault(parent, place)
+        if len(used) > MOST_IMPLIED:
+            return ()
         return tuple(TypedName(name, (), place) for name, place in used.items() if not _misspelt(name, declared))
 
     def remarks(self) -> Iterator[str]:

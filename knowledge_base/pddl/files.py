@@ -1,29 +1,118 @@
-"""Text files that people name: read, or refused with a message that helps."""
+"""Files that people name: read up to a bound, or refused with a message that helps.
+
+All readers of texts come here. A device or pipe is read like a file, up to the same bound; a pipe that stays silent is
+refused, so that no reader waits without end.
+"""
 
 from __future__ import annotations
 
+import os
+import select
+import stat
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from knowledge_base.errors import InputError, ParseError, Place
 
+MAX_BYTES = 16 * 1024 * 1024
+"""Of a PDDL file: a million facts. Reading takes about 90 µs for each, and 100 bytes of memory for each byte."""
+WRITER_S = 3.0
+"""Seconds that a pipe is given until somebody writes into it."""
+SILENCE_S = 30.0
+"""Seconds that a pipe or terminal whose writer is there may stay silent."""
+_PIECE = 1 << 20
+_LOOK_S = 0.02
 
-def read_text(path: Path, errors: str = "strict") -> str:
-    """The text of a UTF-8 file; `errors` is what becomes of other bytes, as for `open`.
+
+def read_text(path: Path, errors: str = "strict", most: int | None = None) -> str:
+    """The text of a UTF-8 file, without a byte order mark; `errors` is what becomes of other bytes, as for `open`.
+
+    Args:
+        path: a file, device or pipe.
+        errors: as for `open`.
+        most: bytes that are read at most; `MAX_BYTES` if nothing is said.
 
     Raises:
-        InputError: there is no such file (the nearest file beside it is named), or it cannot be read.
+        InputError: there is no such file (the nearest file beside it is named), it cannot be read, it has more bytes
+            than that, or it is a pipe that stays silent.
         ParseError: it is not UTF-8.
     """
+    return decoded(read_bytes(path, MAX_BYTES if most is None else most), path, errors)
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """All that is in a file, device or pipe, `most` bytes at most; errors as for `read_text`."""
+    return b"".join(_pieces(path, most))
+
+
+def decoded(data: bytes, path: Path, errors: str = "strict") -> str:
+    """The text that the bytes of a file are; raises `ParseError` as `read_text`."""
     try:
-        return path.read_text(encoding="utf-8-sig", errors=errors)
+        return data.decode("utf-8-sig", errors)
+    except UnicodeDecodeError as error:
+        raise _not_utf8(error, path) from None
+
+
+def require_size(size: int, most: int, source: str | None) -> None:
+    """Raise `InputError` for a text of more than `most` bytes."""
+    if size > most:
+        raise InputError(f"the text has {size} bytes; at most {most} are read", place=Place(source))
+
+
+def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> Iterator[str]:
+    """The lines of a UTF-8 file without their ends, one by one; the last one only if it is not empty.
+
+    Args:
+        path: a file, device or pipe.
+        most: bytes that are read at most.
+        longest: bytes of a line at most.
+        errors: as for `open`.
+
+    Raises:
+        InputError: as `read_text`, and for a line that is too long.
+        ParseError: a line is not UTF-8.
+    """
+    number, rest = 0, b""
+    for piece in _pieces(path, most):
+        *whole, rest = (rest + piece).split(b"\n")
+        for line in whole:
+            number += 1
+            yield _line(line, path, number, longest, errors)
+        if len(rest) > longest:
+            break
+    if rest:
+        yield _line(rest, path, number + 1, longest, errors)
+
+
+def _pieces(path: Path, most: int) -> Iterator[bytes]:
+    """The bytes of a file, device or pipe, piece by piece; errors as for `read_text`."""
+    try:
+        # Not blocking: to open a pipe would wait for its writer.
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+        try:
+            about, total = os.fstat(handle), 0
+            if stat.S_ISREG(about.st_mode):
+                require_size(about.st_size, most, str(path))
+            while piece := _piece(handle, path, min(_PIECE, most + 1 - total), begun=total > 0):
+                total += len(piece)
+                require_size(total, most, str(path))
+                yield piece
+        finally:
+            os.close(handle)
     except FileNotFoundError:
         raise InputError(f"there is no file '{path}'", found=path.name, valid=files_beside(path)) from None
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        raise ParseError("the file is not UTF-8 text", place=Place(str(path), line)) from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise InputError(f"cannot read '{path}': {reason}") from None
+        raise _unreadable(path, reason) from None
+
+
+def _not_utf8(error: UnicodeDecodeError, path: Path, line: int = 1) -> ParseError:
+    """The error for bytes that are no text; `line` is that of the first byte."""
+    before = error.object[: error.start]
+    place = Place(str(path), line + before.count(b"\n"), error.start - before.rfind(b"\n"))
+    message = f"the file is not UTF-8: it cannot have the byte 0x{error.object[error.start]:02x} here"
+    return ParseError(message, place=place)
 
 
 def text_and_source(text_or_path: str | Path, source: str | None) -> tuple[str, str | None]:
@@ -43,5 +132,38 @@ def files_beside(path: Path) -> list[str]:
     """The names of the files with the same ending in the same folder: what may have been meant."""
     try:
         return [p.name for p in path.parent.iterdir() if p.suffix == path.suffix]
-    except OSError:
+    except (OSError, ValueError):
         return []
+
+
+def _piece(handle: int, path: Path, size: int, *, begun: bool) -> bytes:
+    """At most `size` bytes of what comes next; nothing at the end.
+
+    A pipe without a writer looks like one at its end, until it has begun.
+    """
+    patience = time.monotonic() + WRITER_S
+    while True:
+        try:
+            piece = os.read(handle, size)
+        except BlockingIOError:
+            if not select.select([handle], [], [], SILENCE_S)[0]:
+                raise _unreadable(path, f"nothing came for {SILENCE_S:g} s") from None
+            continue
+        if piece or begun or not stat.S_ISFIFO(os.fstat(handle).st_mode):
+            return piece
+        if time.monotonic() > patience:
+            raise _unreadable(path, f"it is a pipe, and nobody wrote into it for {WRITER_S:g} s")
+        time.sleep(_LOOK_S)
+
+
+def _line(data: bytes, path: Path, number: int, longest: int, errors: str) -> str:
+    if len(data) > longest:
+        raise InputError(f"a line has at most {longest} bytes", place=Place(str(path), number))
+    try:
+        return data.decode("utf-8-sig" if number == 1 else "utf-8", errors)
+    except UnicodeDecodeError as error:
+        raise _not_utf8(error, path, number) from None
+
+
+def _unreadable(path: Path, reason: str | None) -> InputError:
+    return InputError(f"cannot read the file: {reason}", place=Place(str(path)))

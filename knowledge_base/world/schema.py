@@ -17,6 +17,10 @@ from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature
 from knowledge_base.pddl.domain_text import DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.world.computation import Computed, in_reading_order
 
+MAX_TYPES = 10_000
+MAX_TYPE_DEPTH = 100
+"""Levels of types below `object`: every type knows all those above it."""
+
 Declared = tuple[str, Place | None]
 """A declaration as written, and where."""
 
@@ -53,6 +57,8 @@ class Schema:
     def __post_init__(self) -> None:
         if self.types.get(ROOT_TYPE) not in (None, ROOT_TYPE):
             raise SchemaError("'object' is the type of all things", place=self.places.get(ROOT_TYPE))
+        if len(self.types) > MAX_TYPES:
+            raise SchemaError(f"{len(self.types)} types are declared; a schema has at most {MAX_TYPES}")
         parents = {ROOT_TYPE: None, **{t: p for t, p in self.types.items() if t != ROOT_TYPE}}
         copies: dict[str, Mapping[str, object]] = {
             "types": {t: p or (None if t == ROOT_TYPE else ROOT_TYPE) for t, p in parents.items()},
@@ -263,6 +269,9 @@ class Schema:
         seen: dict[str, None] = {}
         here: str | None = type_name
         while here is not None:
+            if len(seen) > MAX_TYPE_DEPTH:
+                said = f"the type '{type_name}' is more than {MAX_TYPE_DEPTH} levels below 'object'"
+                raise SchemaError(said, place=self.places.get(type_name))
             if here in seen:
                 cycle = " - ".join([*list(seen)[list(seen).index(here) :], here])
                 raise SchemaError(f"types in a circle: {cycle}", place=self.places.get(type_name))
