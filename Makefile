@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer test-viewer screenshots clean
 
 help:   ## this list
@@ -55,6 +55,9 @@ conformance: $(VENV)/.test   ## the SCXML charts of SCION and of the W3C, fetche
 
 sweep-pddl: $(VENV)/.engines   ## the PDDL files that come with unified-planning: read, planned for, plans checked by their validator (WRITE=1 writes the docs)
 	$(BIN)/python -W ignore tests/conformance/pddl_sweep.py $(if $(WRITE),--write)
+
+sweep-files: $(VENV)/.test   ## every command with every kind of file that it is not meant for: no traceback, no wait
+	SWEEP=1 $(BIN)/python -m pytest tests/test_command.py -k kind_of_file
 
 soak: $(VENV)/.run   ## simulated runs of the clean-up table with faults and crashes: does every promise hold? (RUNS=N FIRST=SEED FAULTS=P)
 	$(BIN)/python benchmarks/soak.py --runs $(or $(RUNS),1000) --first $(or $(FIRST),0) --faults $(or $(FAULTS),0.1)

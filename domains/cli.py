@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 
 BAD_INPUT, NOT_WRITTEN, NOBODY_READS = 2, 74, 141
 """Exit statuses of every command; the last two are EX_IOERR of sysexits.h and what a shell gives for a broken pipe."""
+
+NO_FILE = frozenset({errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EACCES, errno.EPERM})
+"""Errors of names that lead to no file, or to one that is somebody else's."""
 
 
 class _Commands(TyperGroup):
@@ -254,12 +258,23 @@ def _command() -> None:
     except Exception as error:
         from knowledge_base.errors import InputError
 
-        wrong = _misused(error) if as_json else error
+        wrong = _unusable(error) or (_misused(error) if as_json else error)
         if not isinstance(wrong, InputError):
             raise
         _tell(wrong, as_json=as_json)
         sys.exit(BAD_INPUT)
     sys.exit(status)
+
+
+def _unusable(error: Exception) -> InputError | None:
+    """What is wrong with a file that a word of the command names, if the operating system refused that."""
+    from knowledge_base.errors import InputError
+
+    if isinstance(error, RuntimeError) and isinstance(error.__context__, OSError):
+        error = error.__context__  # Python 3.11 says so where links lead to each other
+    if not isinstance(error, OSError) or error.errno not in NO_FILE or error.filename is None:
+        return None
+    return InputError(f"cannot use '{error.filename}': {error.strerror}", found=str(error.filename))
 
 
 def _misused(error: Exception) -> Exception:

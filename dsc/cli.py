@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -270,7 +271,7 @@ def _schema(file: Path, domain: Path | None) -> Schema | None:
 
     if domain is not None:
         return Schema.from_pddl(domain)
-    folder = file.resolve().parent
+    folder = Path(os.path.realpath(file)).parent
     places = (folder / "domain.pddl", folder.parent / "domain.pddl")
     found = next((place for place in places if place.is_file()), None)
     return None if found is None else Schema.from_pddl(found)

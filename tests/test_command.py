@@ -1,16 +1,21 @@
 """The command as people use it: reports, exit status, and one clear line for what they got wrong."""
 
+import inspect
 import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_type_hints
 
 import pytest
+from typer.main import get_command
 
-from domains.cli import main
+from domains.clean_up_table.deployment import CleanUpTable
+from domains.cli import app, main
 from knowledge_base import Delta, KnowledgeBase, Schema
+from knowledge_base.errors import InputError
 
 TABLE = Path(__file__).parent.parent / "domains" / "clean_up_table"
 
@@ -273,3 +278,109 @@ def test_an_output_on_a_full_medium_is_named(dsc, tmp_path):
         status, out, err = dsc(*words, option.split()[-1], "/dev/full")
         named = "" if option == "--trace" else " '/dev/full'"
         assert (status, err) == (74, f"dsc: cannot write{named}: No space left on device\n"), out
+
+
+# --- every command with every kind of file that it is not meant for
+
+
+TELLING = {"folder", "fifo", "loop"}
+"""The kinds that most often went wrong; `make sweep-files` takes all."""
+
+
+def bad_files(folder, store):
+    """Files of every kind, none of which is what a command wants; a store and a plot are wrong for most."""
+    folder.mkdir()
+    (folder / "folder").mkdir()
+    (folder / "empty").touch()
+    (folder / "binary").write_bytes(bytes(range(256)) * 8)
+    (folder / "half.json").write_text('{"format": "dsc-knowledge/2"')
+    (folder / "open.pddl").write_text("(define (domain d")
+    (folder / "plot.yaml").write_text("plot: p\nstates:\n  a: {on: {go: nowhere}}\n")
+    (folder / "loop").symlink_to("loop")
+    os.mkfifo(folder / "fifo")
+    shutil.copy(store, folder / "store.yaml")
+    made = [*sorted(folder.iterdir()), folder / "missing", folder / "empty" / "inside", folder / ("x" * 300)]
+    return made if "SWEEP" in os.environ else [one for one in made if one.name in TELLING or len(one.name) == 300]
+
+
+def leaves(group, words=()):
+    """The commands below a group, each with the words that call it."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from leaves(command, (*words, name))
+        else:
+            yield (*words, name), command
+
+
+def takes_a_file(command, parameter):
+    hint = get_type_hints(inspect.unwrap(command.callback)).get(parameter.name)
+    return "Path" in str(hint) or any(said in (parameter.metavar or "") for said in ("FILE", "OUT"))
+
+
+GOOD = {
+    "plot.yaml": "plot: p\nstates:\n  a: {on: {go: b}}\n  b: {final: true}\n",
+    "domain.pddl": "(define (domain d) (:types cup))",
+    "problem.pddl": "(define (problem p) (:domain d) (:objects x - cup) (:goal (cup x)))",
+}
+PLAIN = {
+    "plot": "plot.yaml", "kb": "problem.pddl", "plan": "domain.pddl", "domain": "domain.pddl", "world": "clean-up-table",
+    "prefix": "x_", "to": "svg", "expression": "(cup x)", "facts": "(cup x)", "when": "0",
+}  # fmt: skip
+"""A word for each parameter that is not swept, by its name or else by the command's first word."""
+ENDING = {("view",): ["--no-open"], ("kb", "watch"): ["--seconds", "0"]}
+"""Options with which commands end that would go on."""
+SWEPT = [
+    pytest.param(words, command.params, swept, id=" ".join([*words, swept.name]))
+    for words, command in leaves(get_command(app))
+    for swept in command.params
+    if takes_a_file(command, swept)
+]
+
+
+def words_with(words, params, swept, path):
+    """The command with that file, and with something plain wherever else a word is needed."""
+    options, arguments = [*ENDING.get(words, ())], []
+    for one in params:
+        if not (one.required or one is swept or one.name == "world"):
+            continue
+        word = path if one is swept else PLAIN.get(one.name, PLAIN.get(words[0], "x"))
+        if one.param_type_name == "argument":
+            arguments += [word] * (2 if words == ("plan",) else 1)
+        else:
+            options += [one.opts[0], word]
+    return [*words, *options, *arguments]
+
+
+def content(path):
+    try:
+        return path.read_bytes() if path.is_file() else None
+    except OSError:  # a name that no file has
+        return None
+
+
+def would_run(*_, **__):
+    raise InputError("it would run")
+
+
+def test_the_sweep_has_every_command_that_takes_a_file():
+    swept = {words for words, *_ in (one.values for one in SWEPT)}
+    assert {words for words, _ in leaves(get_command(app))} - swept == {("doctor",), ("bundles",), ("plot", "schema")}
+
+
+@pytest.mark.parametrize(("words", "params", "swept"), SWEPT)
+def test_no_kind_of_file_gives_a_traceback_or_a_wait(dsc, tmp_path, store, monkeypatch, words, params, swept):
+    for name, text in GOOD.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("knowledge_base.pddl.files.WRITER_S", 0.0)
+    monkeypatch.setattr("knowledge_base.outputs.PATIENCE_S", 0.0)
+    monkeypatch.setattr("dsc.viewer.cli.until_interrupt", lambda _: None)
+    monkeypatch.setattr(CleanUpTable, "run", would_run)
+    for path in bad_files(tmp_path / "bad", store):
+        before = content(path)
+        status, out, err = dsc(*words_with(words, params, swept, path))
+        assert status in {0, 1, 2}, (path, out, err)
+        assert "Traceback" not in out + err
+        if status == 2:
+            assert 0 < len((out + err).splitlines()) <= 6, (path, out, err)
+            assert content(path) == before or words == ("run",)  # it would have written there

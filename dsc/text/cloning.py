@@ -52,7 +52,7 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
     if not re.fullmatch(r"[a-zA-Z_][\w\-]*", prefix):
         raise SchemaError(f"no name begins with '{prefix}': letters, digits, _ and -, a letter first", found=prefix)
     folder = file.parent if into is None else into
-    apart = folder.resolve() != file.parent.resolve()
+    apart = os.path.realpath(folder) != os.path.realpath(file.parent)
     plot = load_plot(file)
     library, broken = Neighbours().of(file, plot)
     there = dict(_plots_in(folder))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,8 +34,8 @@ class Neighbours:
         planned = any(isinstance(state, DynamicState) for _, state, _ in plot.walk())
         if not (plot.uses() or plot.rules or planned):
             return library, broken
-        here, texts = file.resolve(), self._texts(file.parent)
-        left = {other: text for other, text in texts.items() if other.resolve() != here}
+        here, texts = os.path.realpath(file), self._texts(file.parent)
+        left = {other: text for other, text in texts.items() if os.path.realpath(other) != here}
         actions = bool(plot.rules) or planned
         while True:
             missing = {name for known in library for name in known.uses() if name not in library}
