@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 KIND = Kind("simulated world", 0x64736377, 2)
 """The first format had no number, and nothing that says whose file it is."""
+PATIENCE_MS = 5000
+"""How long an action waits for those of another program."""
 _TABLES = (
     "CREATE TABLE world (state TEXT NOT NULL)",
     "CREATE TABLE done (action_id TEXT PRIMARY KEY, result TEXT NOT NULL)",
@@ -58,7 +60,7 @@ class LastingWorld(World):
                 with new_database(path, KIND.application_id, KIND.form, lasting=False) as file:
                     for statement in _TABLES:
                         file.execute(statement)
-            self._file = connect(path, "rw")
+            self._file = _opened(path)
             self._file.execute("BEGIN")
             self._file.execute("DELETE FROM world")
             self._file.execute("DELETE FROM done")
@@ -73,7 +75,7 @@ class LastingWorld(World):
             raise StoreError("the world of the run is not there", place=Place(str(path)))
         require_free(path)
         with _reported(path, "read"):
-            file = connect(path, "rw")
+            file = _opened(path)
             try:
                 lasting = cls.from_state(_state(file))
                 lasting._file = file  # noqa: SLF001  of its own class
@@ -112,6 +114,12 @@ class LastingWorld(World):
     def _present(self) -> str:
         """Everything but what was done, of which there is ever more."""
         return json.dumps({name: value for name, value in self.state().items() if name != "done"})
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    file = connect(path, "rw")
+    file.execute(f"PRAGMA busy_timeout = {PATIENCE_MS}")
+    return file
 
 
 def _state(file: sqlite3.Connection) -> dict[str, Any]:

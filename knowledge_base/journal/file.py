@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 from knowledge_base.errors import DamagedStoreError, Place, StoreError
-from knowledge_base.journal.neighbours import INDEX, LOG, regular, require_no_strangers, unlocked
+from knowledge_base.journal.neighbours import INDEX, LOG, OLD_LOG, regular, require_no_strangers, unlocked
 from knowledge_base.journal.still import changed, is_still, open_still, stamp_of
 from knowledge_base.pddl.files import files_beside
 
@@ -60,12 +60,10 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
     Raises:
         StoreError: the file is not there, not a store, or cannot be read.
     """
-    if not is_there(path):
-        beside = files_beside(path)
-        raise StoreError(f"there is no store '{path.name}'", place=Place(str(path)), found=path.name, valid=beside)
+    seen = _seen(str(path))
     with reported(path, "read"):
-        require_own(path)
-        if is_still(path):
+        _require_readable(path, seen)
+        if not all(seen[:3]) and is_still(path):  # SQLite makes the missing ones
             with _reading_still(path) as connection:
                 yield connection
             return
@@ -76,6 +74,30 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
             yield connection
         finally:
             connection.close()
+
+
+Seen = tuple[tuple[int, int, bool] | None, ...]
+"""Device, inode, and whether there is content: of a store and of SQLite's files beside it."""
+
+
+def _seen(name: str) -> Seen:
+    return tuple([_identity(name + ending) for ending in ("", LOG, INDEX, OLD_LOG)])
+
+
+def _identity(name: str) -> tuple[int, int, bool] | None:
+    try:
+        found = os.lstat(name)
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_size > 0
+
+
+@lru_cache(maxsize=256)  # whoever asks for the past, or follows a writer, opens the same files again and again
+def _require_readable(path: Path, seen: Seen) -> None:  # noqa: ARG001  other files, another answer
+    if not is_there(path):
+        beside = files_beside(path)
+        raise StoreError(f"there is no store '{path.name}'", place=Place(str(path)), found=path.name, valid=beside)
+    require_own(path)
 
 
 @contextmanager
@@ -223,17 +245,6 @@ def require_own(path: Path, kind: Kind = STORE) -> None:
 
     Opening somebody else's database in the usual way may already put its log into it.
     """
-    _require_own(path, kind, identity(path))
-
-
-def identity(path: Path) -> tuple[int, int] | None:
-    """By which the file is known, whatever its name is; `None` if nothing is there."""
-    found = regular(path)
-    return found and (found.st_dev, found.st_ino)
-
-
-@lru_cache(maxsize=256)  # whoever asks for the past opens a file again and again
-def _require_own(path: Path, kind: Kind, file: tuple[int, int] | None) -> None:  # noqa: ARG001  another file, another answer
     with closing(unlocked(path)) as connection:
         require_store(connection, path, kind)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,7 +16,7 @@ from kept_lives import SCENARIO, told
 
 from domains.clean_up_table.deployment import PROFILES, deploy, resumed
 from domains.clean_up_table.scenario import Scenario
-from domains.clean_up_table.world_file import LastingWorld
+from domains.clean_up_table.world_file import KIND, LastingWorld
 from dsc.dynamic.library import Library
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_store import RunStore
@@ -104,6 +106,54 @@ def test_a_world_that_is_not_there_or_none_is_said_so(tmp_path):
         LastingWorld.open(tmp_path / "text")
     with pytest.raises(StoreError, match="there is no folder"):
         LastingWorld.from_state(Scenario.default().world().state()).create(tmp_path / "no" / "folder")
+
+
+def _database(path: Path, *statements: str) -> None:
+    with sqlite3.connect(path) as connection:
+        for statement in ("CREATE TABLE world (state TEXT)", "CREATE TABLE done (action_id TEXT)", *statements):
+            connection.execute(statement)
+    connection.close()
+
+
+STRANGERS = {
+    "text": (lambda path: path.write_text("my notes\n"), "file is not a database"),
+    "empty": (lambda path: path.touch(), "is empty"),
+    "database": (_database, "this is a database, but no simulated world"),
+    "link": (lambda path: (_database(path.with_name("mine")), path.symlink_to("mine")), "is a link"),
+    "pipe": (os.mkfifo, "is a pipe"),
+    "log": (lambda path: path.with_name(path.name + "-wal").write_text("mine"), "run.kb-world-wal"),
+    "later": (lambda path: _database(path, f"PRAGMA application_id = {KIND.application_id}", "PRAGMA user_version = 9"),
+              "the world has format 9, this program reads format 2"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("stranger", STRANGERS)
+def test_what_has_the_name_of_the_world_and_is_none_stays_as_it_is(tmp_path, planner, stranger):
+    spoil, message = STRANGERS[stranger]
+    spoil(tmp_path / "run.kb-world")
+    before = [(path.name, path.lstat(), path.is_fifo() or path.read_bytes()) for path in sorted(tmp_path.iterdir())]
+    for use in (
+        lambda: deploy(None, 3, 0.2, planner, store=tmp_path / "run.kb"),
+        lambda: LastingWorld.from_state(Scenario.default().world().state()).create(tmp_path / "run.kb-world"),
+        lambda: LastingWorld.open(tmp_path / "run.kb-world"),
+    ):
+        with pytest.raises(StoreError, match=message if stranger != "log" else "run.kb-world"):
+            use()
+        after = [(path.name, path.lstat(), path.is_fifo() or path.read_bytes()) for path in sorted(tmp_path.iterdir())]
+        assert [one[::2] for one in after] == [one[::2] for one in before]
+        assert [one[1].st_ino for one in after] == [one[1].st_ino for one in before]
+
+
+def test_the_world_of_a_store_that_was_deleted_makes_place_for_the_next(tmp_path):
+    for seed in (1, 2):
+        world = LastingWorld.from_state(Scenario.parse(SCENARIO).world(seed, 0.5).state())
+        world.create(tmp_path / "run.kb-world")
+        world.drive("a", "sink")
+        world.close()
+        again = LastingWorld.open(tmp_path / "run.kb-world")
+        assert (again.state(), list(again.done)) == (world.state(), ["a"])
+        again.close()
+    assert [path.name for path in tmp_path.iterdir()] == ["run.kb-world"]
 
 
 def test_a_store_that_has_a_run_is_not_begun_anew(whole, planner):
