@@ -124,7 +124,7 @@ def located(path: str | Path) -> Path:
     """
     text = str(path)
     if text == ":memory:" or text.startswith("file:"):
-        raise StoreError(f"'{text}' has a meaning to SQLite; a store is named by its path, e.g. './{text}'")
+        raise StoreError(f"'{text}' has a meaning to SQLite; a store is named by the path of its file")
     if text.endswith("/"):
         raise StoreError(f"'{text}' names a folder; a store is a file")
     try:
