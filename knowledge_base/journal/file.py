@@ -243,10 +243,15 @@ STORE = Kind("knowledge store", APPLICATION_ID, FORMAT)
 def require_own(path: Path, kind: Kind = STORE) -> None:
     """Raise `StoreError` unless the file is of that kind; SQLite's files beside it stay as they are.
 
-    Opening somebody else's database in the usual way may already put its log into it.
+    Opening somebody else's database in the usual way may already put its log into it. A file that SQLite calls
+    malformed may be one into which the log is being put, or was when the process died; its log tells.
     """
-    with closing(unlocked(path)) as connection:
-        require_store(connection, path, kind)
+    try:
+        with closing(unlocked(path)) as connection:
+            require_store(connection, path, kind)
+    except sqlite3.DatabaseError as error:
+        if getattr(error, "sqlite_errorcode", 0) & 0xFF != sqlite3.SQLITE_CORRUPT:
+            raise
 
 
 def require_store(connection: sqlite3.Connection, path: Path, kind: Kind = STORE) -> None:

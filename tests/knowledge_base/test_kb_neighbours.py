@@ -307,3 +307,20 @@ def test_a_store_that_takes_the_place_of_an_open_one_is_left_alone(store, tmp_pa
 def test_the_command_makes_no_store_where_one_is(store, tmp_path) -> None:
     (tmp_path / "d.pddl").write_text("(define (domain d) (:types cup))", encoding="utf-8")
     refused(tmp_path, lambda: new(store, tmp_path / "d.pddl"), name="'s.kb' is there already")
+
+
+@pytest.mark.parametrize("read_only", [True, False])
+def test_a_store_into_which_the_log_was_being_put_has_all_of_it(tmp_path, read_only) -> None:
+    """Its head says already that it is longer than it is."""
+    path = tmp_path / "s.kb"
+    with KnowledgeBase.open(SCHEMA, path) as kb:
+        for number in range(200):
+            kb.apply(Delta(nodes={f"c{number}x": "cup"}), "me" * 200)
+        kb._history._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+        died = tmp_path / "died"
+        died.mkdir()
+        for ending in ("", "-wal"):
+            shutil.copy(tmp_path / f"s.kb{ending}", died)
+    os.truncate(died / "s.kb", (died / "s.kb").stat().st_size - 5 * 4096)
+    with KnowledgeBase.open(None, died / "s.kb", read_only=read_only) as kb:
+        assert kb.version == 200
