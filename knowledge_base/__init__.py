@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from knowledge_base.errors import ConflictError as ConflictError
     from knowledge_base.errors import HistoryError as HistoryError
     from knowledge_base.errors import InputError as InputError
+    from knowledge_base.errors import OutOfBoundsError as OutOfBoundsError
     from knowledge_base.errors import ParseError as ParseError
     from knowledge_base.errors import Place as Place
     from knowledge_base.errors import SchemaError as SchemaError
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Fact as Fact
     from knowledge_base.facts import Value as Value
     from knowledge_base.facts import fact as fact
+    from knowledge_base.language.bounds import Bounds as Bounds
     from knowledge_base.language.explanation import Explanation as Explanation
     from knowledge_base.language.query_plan import QueryPlan as QueryPlan
     from knowledge_base.language.query_plan import QueryStep as QueryStep
@@ -48,6 +50,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
     {
         "Binding": "prepared",
+        "Bounds": "language.bounds",
         "Change": "facts",
         "Clock": "conditions.clock",
         "Computed": "world.computation",
@@ -63,6 +66,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "InputError": "errors",
         "KnowledgeBase": "store",
         "Missed": "conditions.watch",
+        "OutOfBoundsError": "errors",
         "Overlay": "world.overlay",
         "ParseError": "errors",
         "Place": "errors",

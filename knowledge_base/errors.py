@@ -194,6 +194,21 @@ class DamagedStoreError(StoreError):
     """A store's file has not what was written into it; the message names the table and the row."""
 
 
+class OutOfBoundsError(InputError):
+    """A question, or an effect, reached its bounds or was cancelled; nothing was changed.
+
+    Attributes:
+        work: how many facts and things it looked at.
+        seconds: how long it took.
+    """
+
+    def __init__(self, message: str, *, work: int, seconds: float) -> None:
+        done = f"given up after {work} facts and things in {seconds:.2f} s"
+        super().__init__(f"{message}; {done}: name more of them, or fewer variables, or allow more")
+        self.work = work
+        self.seconds = seconds
+
+
 class SchemaMismatchError(SchemaError):
     """What was written with one schema is read with another that is not an extension of it.
 

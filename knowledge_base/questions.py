@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import TypeVar
 
 from knowledge_base.facts import Value
-from knowledge_base.language.asking import Asked, Queried, asked, queried
+from knowledge_base.language.asking import Asked, Queried, asked, queried, rows
 from knowledge_base.language.check import Free, check
 from knowledge_base.language.expression import Expression, free_variables
 from knowledge_base.language.inputs import fitted_names, require_condition, require_params
@@ -91,6 +91,10 @@ class Questions:
             found = queried(self.query(text, params, world), world.schema, params)
             _keep(self._queried, key, found)
         return found.answers(world, params)
+
+    def rows(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Iterator[dict[str, Value]]:
+        """The answers one by one; errors as for `query`."""
+        return rows(self.query(text, params, world), world, params)
 
     def condition(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
         """The condition, all of whose free variables are in `params`.

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from knowledge_base.errors import InputError, ParseError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.language.application import apply_effect
+from knowledge_base.language.bounds import BoundedWorld, Bounds, Meter
 from knowledge_base.language.check import check, check_effect
 from knowledge_base.language.effect import Add, Assign, Effect
 from knowledge_base.language.expression import Atom, Call, Comparison, Constant, Expression
@@ -21,7 +22,9 @@ from knowledge_base.language.world import World
 from knowledge_base.world.overlay import Overlay
 
 
-def told(statements: Iterable[str], world: World, source: str | None = None) -> Delta:
+def told(
+    statements: Iterable[str], world: World, source: str | None = None, bounds: Bounds | None = None
+) -> Delta:
     """The change that makes all the statements true, one after the other; nothing is changed yet.
 
     Things may be used in front of the statement that names their type.
@@ -30,14 +33,17 @@ def told(statements: Iterable[str], world: World, source: str | None = None) -> 
         statements: the texts, one statement each.
         world: what they are said of.
         source: what to call them in messages; their number follows it.
+        bounds: what working them out may take, all together.
 
     Raises:
+        OutOfBoundsError: it takes more.
         ParseError: a text is no statement.
         UnknownNameError: an undeclared type, predicate or function, or a thing that is neither there nor named.
         SchemaError: a wrong number of arguments or a wrong type, or a thing of another type.
     """
     effects = [_effect(text, _called(source, number)) for number, text in enumerate(statements, 1)]
-    view = Overlay(world)
+    view, meter = Overlay(world), Meter(bounds)
+    seen = view if bounds is None else BoundedWorld(view, meter)
     for effect in effects:
         if (thing := _thing(effect, world)) is not None:
             view.apply(Delta(nodes=thing))
@@ -45,7 +51,9 @@ def told(statements: Iterable[str], world: World, source: str | None = None) -> 
     for effect in effects:
         if _thing(effect, world) is None:
             check_effect(effect, world.schema, objects=known)
-            view.apply(apply_effect(effect, view))
+            with meter.over(source or "an effect"):
+                change = apply_effect(effect, seen)
+            view.apply(change)
     return view.delta
 
 

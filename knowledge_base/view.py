@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import islice
 
+from knowledge_base.errors import ConflictError, InputError
 from knowledge_base.exchange.json import to_json
 from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.exchange.problem_writer import problem_to_text
 from knowledge_base.facts import Content, Fact, Value
+from knowledge_base.language.bounds import BoundedWorld, Bounds, Meter
 from knowledge_base.language.evaluation import Explanation, explain
 from knowledge_base.language.expression import TRUE, Expression
-from knowledge_base.language.inputs import require_params
+from knowledge_base.language.inputs import require_params, shown
 from knowledge_base.language.query_plan import QueryPlan, plan_query
 from knowledge_base.prepared import Binding, Prepared, ReadyQuestions
 from knowledge_base.questions import Questions
@@ -19,6 +22,9 @@ from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 from knowledge_base.world.turn import Turn
+
+_TOGETHER = 100
+"""Answers of a stream that are found with one turn at the lock."""
 
 
 class View:
@@ -57,25 +63,81 @@ class View:
                 self._graph = WorldGraph(self._state)
             return self._graph.view
 
-    def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[Binding]:
+    def query(
+        self,
+        text: str | Expression,
+        params: Mapping[str, Value] | None = None,
+        limit: int | None = None,
+        bounds: Bounds | None = None,
+    ) -> list[Binding]:
         """The values of the free variables that make the text true, each choice once.
 
         Args:
             text: a condition such as `(and (on ?o ?table) (cup ?o))`.
             params: variables that have a value already; they are not part of the answers.
+            limit: how many answers are wanted at most; nothing behind them is looked at.
+            bounds: what the question may take before it is given up.
 
         Raises:
+            OutOfBoundsError: it takes more, or was cancelled.
             ParseError: the text is no condition.
             UnknownNameError: an undeclared predicate, function or type, a thing that is not there, or a parameter
                 that the text does not have.
             SchemaError: a wrong number of arguments or a type that can never fit.
             InputError: a variable occurs only under `not` or in a comparison.
         """
-        given = params if type(params) is dict else _plain(params)
-        return self._ready.querying(text, given)(*given.values())
+        if bounds is None is limit:
+            given = params if type(params) is dict else _plain(params)
+            return self._ready.querying(text, given)(*given.values())
+        return list(islice(self.stream(text, params, bounds=bounds), _whole(limit)))
 
-    def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
+    def stream(
+        self, text: str | Expression, params: Mapping[str, Value] | None = None, *, bounds: Bounds | None = None
+    ) -> Iterator[Binding]:
+        """The answers of `query` in the same order, without a list of them all; each when it is found.
+
+        Others may ask and change the knowledge between two answers. An error about candidates that cannot be computed
+        comes after all answers.
+
+        Raises:
+            ConflictError: a change was committed before the last answer; `at` gives a world that stays as it is.
+            InputError: as for `query`.
+        """
+        meter = Meter(bounds)
+        with self._lock, meter.over(text):
+            params = self._questions.given(text, params, self._state, "answers")
+            found = self._questions.rows(text, params, BoundedWorld(self._state, meter))
+        return self._streamed(found, text, meter)
+
+    def _streamed(self, found: Iterator[Binding], text: str | Expression, meter: Meter) -> Iterator[Binding]:
+        version, more = self._version, True
+        while more:
+            answers: list[Binding] = []
+            wrong: InputError | None = None
+            with self._lock:
+                if self._version != version:
+                    said = "a change was committed while the answers were read; ask kb.at(version=kb.version)"
+                    raise ConflictError(said)
+                try:
+                    with meter.over(text):
+                        for answer in islice(found, _TOGETHER):
+                            answers.append(answer)  # noqa: PERF402  what was found before an error counts
+                except InputError as error:
+                    wrong = error
+            yield from answers
+            if wrong is not None:
+                raise wrong
+            more = len(answers) == _TOGETHER
+
+    def ask(
+        self, text: str | Expression, params: Mapping[str, Value] | None = None, bounds: Bounds | None = None
+    ) -> bool:
         """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
+        if bounds is not None:
+            meter = Meter(bounds)
+            with self._lock, meter.over(text):
+                given = self._questions.given(text, params, self._state, "error")
+                return self._questions.ask(text, given, BoundedWorld(self._state, meter))
         given = params if type(params) is dict else _plain(params)
         return self._ready.asking(text, given)(*given.values())
 
@@ -90,11 +152,15 @@ class View:
         """
         return self._ready.prepared(text, parameters)
 
-    def explain(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> Explanation:
+    def explain(
+        self, text: str | Expression, params: Mapping[str, Value] | None = None, *, bounds: Bounds | None = None
+    ) -> Explanation:
         """Why the text is true or false; errors as for `ask`."""
-        with self._lock:
+        meter = Meter(bounds)
+        with self._lock, meter.over(text):
             params = self._questions.given(text, params, self._state, "error")
-            return explain(self._questions.condition(text, params, self._state), self._state, params)
+            world = self._state if bounds is None else BoundedWorld(self._state, meter)
+            return explain(self._questions.condition(text, params, self._state), world, params)
 
     def explain_query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> QueryPlan:
         """How the query would run on the world as it is: what is looked up, in which order; errors as for `query`."""
@@ -191,6 +257,12 @@ class View:
         """The thing's type; `None` if there is no such thing."""
         with self._lock:
             return self._state.type_of(name)
+
+
+def _whole(limit: int | None) -> int | None:
+    if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int) or limit < 0):
+        raise InputError(f"a limit is a whole number, 0 or more, not {shown(limit)}")
+    return limit
 
 
 def _plain(params: Mapping[str, Value] | None) -> dict[str, Value]:

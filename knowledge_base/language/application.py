@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from knowledge_base.content import require_content
 from knowledge_base.errors import SchemaError
@@ -56,8 +56,11 @@ class _Application:
         self.removed: dict[Fact, None] = {}
         self.values: dict[Fact, Content] = {}
         self.computed: set[Fact] = set()
+        self.spend: Callable[[], None] | None = getattr(world, "spend", None)
 
     def apply(self, effect: Effect, bindings: Bindings) -> None:
+        if self.spend is not None:
+            self.spend()
         match effect:
             case Add(atom):
                 self.added[self.fact(atom, bindings)] = None

@@ -6,14 +6,14 @@ expression again costs no more than the look-ups it needs. Nothing is ever execu
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import VALUE_TYPES, Content, Value
 from knowledge_base.language.binding import check_answers, check_bound
-from knowledge_base.language.compiler import Answers, compile_answers, compile_test
+from knowledge_base.language.compiler import Answers, compile_answers, compile_query, compile_test
 from knowledge_base.language.depth import check_depth
 from knowledge_base.language.expression import (
     Constant,
@@ -114,6 +114,19 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
     return queried(e, world.schema, bindings).answers(world, bindings)
 
 
+def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Iterator[dict[str, Value]]:
+    """The answers of `query` in the same order, each when it is found; `world` must not change until the last.
+
+    An error about candidates that cannot be computed comes after all answers; otherwise errors are those of `query`.
+    """
+    check_depth(e)
+    bound = free_variables(e).intersection(bindings)
+    check_answers(e, bound, world.schema)
+    names = _asked_for(e, bound)
+    found = compile_query(e, world.schema, bound)(world, bindings)
+    return ({name: each[name] for name in names} for each in found)
+
+
 def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried:
     """The query ready to be answered when `params` are bound; errors of the text as for `query`."""
     queries = _queries.find(e, schema) or _queries.keep(e, schema, _unsearched(e))
@@ -169,5 +182,8 @@ def _compiled_term(term: Term, schema: Vocabulary) -> _Term:
 
 def _compiled_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) -> Queried:
     check_answers(e, bound, schema)
-    names = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
-    return Queried(e, compile_answers(e, schema, bound, names))
+    return Queried(e, compile_answers(e, schema, bound, _asked_for(e, bound)))
+
+
+def _asked_for(e: Expression, bound: frozenset[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))

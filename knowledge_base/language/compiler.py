@@ -275,9 +275,15 @@ def _computable(found: Iterator[Bindings], failed: list[InputError]) -> Iterator
         try:
             yield from found
         except InputError as error:
-            failed.append(error)
+            _keep_first(failed, error)
         else:
             return
+
+
+def _keep_first(failed: list[InputError], error: InputError) -> None:
+    """There may be one for every candidate, and only the first is said."""
+    if not failed:
+        failed.append(error)
 
 
 def _ends(
@@ -305,7 +311,7 @@ def _ends(
         except InputError as error:
             if failed is None:
                 raise
-            failed.append(error)
+            _keep_first(failed, error)
         else:
             stack.append((after, found if after.test is None else filter(partial(after.test, world), found)))
 

@@ -15,7 +15,8 @@ class World(Protocol):
     Predicates are the told ones; types as predicates, computed predicates, quantifiers and comparisons are the
     language's affair and are built from these answers. A world that also has `estimate(predicate, pattern) -> int`,
     at most how many facts match, lets conjunctions begin with the rarest. One that has `reference(function, args) ->
-    str | None`, where what the function is worth comes from, refuses to have it set.
+    str | None`, where what the function is worth comes from, refuses to have it set. One that has `spend()` is told of
+    every effect that is applied on it, and may end that (`bounds`).
     """
 
     @property
