@@ -1,39 +1,64 @@
-"""What the page asks beyond records: the knowledge of a moment."""
+"""What the page asks beyond records: the knowledge of a moment, each question within bounds."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from itertools import islice
 from typing import Any
 
 from dsc.viewer.moments import knowledge
 from dsc.viewer.records import RecordLog
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, OutOfBoundsError, UnknownNameError
 from knowledge_base.facts import Fact
-from knowledge_base.language.expression import variables_in_order
+from knowledge_base.language.bounds import Bounds
+from knowledge_base.language.explanation import Explanation
+from knowledge_base.language.expression import Expression, variables_in_order
 from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.printer import to_text
 from knowledge_base.view import View
 
 Form = Mapping[str, Any]
+Left = Callable[[], bool]
+"""Whether whoever asked is gone."""
+
+MOST_TEXT = 10_000
+"""Characters of an expression or statement from a browser."""
+MOST_SECONDS = 5.0
+"""Of an answer to a browser; behind it the question is given up."""
+MOST_ANSWERS = 10_000
+"""Answers, facts and numbers that a browser gets at once; `more` says that there are others."""
+MOST_EXPLAINED = 1.0
+"""Seconds to find out why an answer is what it is, which is left out otherwise."""
+
+
+def _still_there() -> bool:
+    return False
 
 
 class Answers:
-    """Answers to one page's questions, each a JSON value; a question that makes no sense is an `InputError`."""
+    """Answers to one page's questions, each a JSON value; a question that makes no sense is an `InputError`.
+
+    A question takes `MOST_SECONDS` at most, and ends when `left` says that whoever asked is gone.
+    """
 
     def __init__(self, log: RecordLog) -> None:
         self._log = log
         self._knowledge = knowledge(log)
 
-    def query(self, asked: Form) -> dict[str, Any]:
+    def query(self, asked: Form, left: Left = _still_there) -> dict[str, Any]:
         """Who makes the expression true, or whether it is true and why."""
         view = self._view(asked)
         params = asked.get("params") or {}
         condition = parse_condition(_text(asked, "expression"), "EXPR")
         variables = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
-        answers = view.query(condition, params)
+        bounds = Bounds(seconds=MOST_SECONDS, cancelled=left)
+        answers = view.query(condition, params, MOST_ANSWERS + 1, bounds)
         said = {"variables": variables, "holds": bool(answers), "answers": answers, "version": view.version}
-        return said if variables else {**said, "why": view.explain(condition, params).to_json()}
+        if len(answers) > MOST_ANSWERS:
+            return {**said, "answers": answers[:MOST_ANSWERS], "more": True}
+        return said if variables else {**said, "why": _why(view, condition, params, left, holds=bool(answers))}
 
-    def facts(self, asked: Form) -> dict[str, Any]:
+    def facts(self, asked: Form, left: Left = _still_there) -> dict[str, Any]:  # noqa: ARG002  it takes a moment
         """All that is known, or all that is known about one thing."""
         view, about = self._view(asked), asked.get("about")
         things, facts, values = view.nodes(), view.facts(), view.values()
@@ -44,16 +69,26 @@ class Answers:
             values = {fluent: value for fluent, value in values.items() if about in fluent.args}
             near = {arg for fact in (*facts, *values) for arg in fact.args} | {about}
             things = {name: kind for name, kind in things.items() if name in near}
-        return {
+        said = {
             "version": view.version,
-            "things": things,
-            "facts": [_listed(fact) for fact in facts],
-            "values": [[*_listed(fluent), value] for fluent, value in values.items()],
+            "things": dict(islice(things.items(), MOST_ANSWERS)),
+            "facts": [_listed(fact) for fact in facts[:MOST_ANSWERS]],
+            "values": [[*_listed(fluent), value] for fluent, value in islice(values.items(), MOST_ANSWERS)],
         }
+        return {**said, "more": True} if max(map(len, (things, facts, values))) > MOST_ANSWERS else said
 
     def _view(self, asked: Form) -> View:
         known = self._knowledge.at(_seq(asked))
         return View(known.state, known.version)
+
+
+def _why(
+    view: View, condition: Expression, params: Mapping[str, Any], left: Left, *, holds: bool
+) -> dict[str, Any]:
+    try:
+        return view.explain(condition, params, bounds=Bounds(seconds=MOST_EXPLAINED, cancelled=left)).to_json()
+    except OutOfBoundsError as error:
+        return Explanation(to_text(condition), holds, detail=str(error)).to_json()
 
 
 def _listed(fact: Fact) -> list[Any]:
@@ -71,4 +106,11 @@ def _text(asked: Form, name: str) -> str:
     said = asked.get(name)
     if not isinstance(said, str):
         raise InputError(f"'{name}' is a text")
+    require_short(said, name)
     return said
+
+
+def require_short(text: str, name: str) -> None:
+    """Raise `InputError` for a text from a browser that is longer than `MOST_TEXT`."""
+    if len(text) > MOST_TEXT:
+        raise InputError(f"'{name}' has {len(text)} characters; a browser may send {MOST_TEXT}")

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dsc.events import Event
 from dsc.sequencer.clock import LoopClock
+from dsc.viewer.answers import require_short
 from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.bounds import Bounds
 from knowledge_base.language.check import check
 from knowledge_base.language.parser import parse_condition
 
@@ -21,6 +23,11 @@ if TYPE_CHECKING:
 AUTHOR = "viewer"
 MOST_SECONDS = 10
 """That a command waits for the run, which computes."""
+MOST_WORK = 20_000
+"""Facts and things that a condition or effect from a browser may look at: about 20 ms of the run's thread."""
+MOST_STATEMENTS = 1000
+MOST_BREAKS = 50
+"""Conditions of breakpoints are judged after every macrostep."""
 KINDS = ("state", "event", "condition", "plan_step")
 
 
@@ -67,6 +74,7 @@ class Control:
         self._steps: int | None = None  # macrosteps until it stands still; None: none is counted
         self._was_true: set[int] = set()
         self._plan_steps: dict[str, str] = {}  # path of a generated plot's state -> the plan's step that it carries out
+        self._dropped: list[str] = []
         self.paused: str | None = None
         """Why the run stands still, if it does."""
 
@@ -92,7 +100,8 @@ class Control:
             raise UnknownNameError(f"there is nothing to do called '{verb}'", found=str(verb), valid=verbs)
         verbs[verb](command)
         self._changed()
-        return {"ok": True, "breaks": [{"number": n, "on": str(b)} for n, b in self._breaks.items()]}
+        said = {"ok": True, "breaks": [{"number": n, "on": str(b)} for n, b in self._breaks.items()]}
+        return {**said, "dropped": list(self._dropped)} if self._dropped else said
 
     # --- in the page's thread
 
@@ -103,12 +112,17 @@ class Control:
     def _tell(self, command: Mapping[str, Any]) -> None:
         from knowledge_base.statements import retracted, told  # noqa: PLC0415  read where somebody controls a run
 
-        meaning = told if command["do"] == "tell" else retracted
         said = command.get("statements")
         if not isinstance(said, list) or not all(isinstance(one, str) for one in said):
             raise InputError("'statements' is a list of texts such as (on cup1 table)")
-        run = self._run()
-        delta = meaning(said, run.knowledge, "FACT")
+        if len(said) > MOST_STATEMENTS:
+            raise InputError(f"these are {len(said)} statements; a browser may send {MOST_STATEMENTS}")
+        require_short("".join(said), "statements")
+        known = self._run().knowledge
+        if command["do"] == "tell":
+            delta = told(said, known, "FACT", Bounds(work=MOST_WORK))
+        else:
+            delta = retracted(said, known, "FACT")  # a statement takes back what it names, no more
         self._in_run(lambda run: run.change(delta, AUTHOR))
 
     def _set(self, command: Mapping[str, Any]) -> None:
@@ -132,12 +146,16 @@ class Control:
         on = command.get("on")
         if not isinstance(on, dict) or len(on) != 1 or (kind := next(iter(on))) not in KINDS:
             raise InputError(f"a breakpoint is on one of {', '.join(KINDS)}", found=str(on), valid=KINDS)
-        condition = None
+        if len(self._breaks) >= MOST_BREAKS:
+            raise InputError(f"there are {MOST_BREAKS} breakpoints, as many as there may be; remove one")
+        condition, said = None, str(on[kind])
+        require_short(said, kind)
         if kind == "condition":
-            condition = parse_condition(str(on[kind]), "EXPR")
+            condition = parse_condition(said, "EXPR")
             check(condition, self._run().knowledge.schema)
+            self._run().knowledge.ask(condition, bounds=Bounds(work=MOST_WORK))  # refused now rather than dropped later
         self._numbers += 1
-        self._breaks[self._numbers] = Breakpoint(kind, str(on[kind]), condition)
+        self._breaks[self._numbers] = Breakpoint(kind, said, condition)
 
     def _unbreak(self, command: Mapping[str, Any]) -> None:
         number = command.get("number")
@@ -176,10 +194,22 @@ class Control:
                 self._plan_steps[prefix + name] = state.about or ""
         if self._steps:
             self._steps -= 1
-        for number, one in self._breaks.items():
-            if self._is_met(number, one, step):
+        for number, one in tuple(self._breaks.items()):
+            try:
+                met = self._is_met(number, one, step)
+            except InputError as error:  # it asks for too much by now, or for what is no more
+                self._drop(number, f"{one}: {error}")
+                continue
+            if met:
                 self._steps = 0
                 self.paused = str(one)
+
+    def _drop(self, number: int, why: str) -> None:
+        """The run goes on without the breakpoint; whoever asks for something next learns why."""
+        self._breaks.pop(number, None)
+        self._was_true.discard(number)
+        self._dropped = [*self._dropped, why][-MOST_BREAKS:]
+        self._changed()
 
     def _is_met(self, number: int, one: Breakpoint, step: Step) -> bool:
         entered = {name for micro in step.microsteps for name in micro.entered}
@@ -190,7 +220,7 @@ class Control:
                 return any(micro.event is not None and micro.event.name == one.text for micro in step.microsteps)
             case "plan_step":
                 return any(self._plan_steps.get(name) == one.text for name in entered)
-        now = one.condition is not None and self._run().knowledge.ask(one.condition)
+        now = one.condition is not None and self._run().knowledge.ask(one.condition, bounds=Bounds(work=MOST_WORK))
         rose = now and number not in self._was_true
         (self._was_true.add if now else self._was_true.discard)(number)
         return rose

@@ -24,7 +24,7 @@ from starlette.websockets import WebSocket
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from dsc.viewer.access import COOKIE, Access, Keys
-from dsc.viewer.answers import Answers
+from dsc.viewer.answers import Answers, Left
 from dsc.viewer.asked import CONTROL, FACTS, MOST_BYTES, QUERY, Form, asked
 from dsc.viewer.control import Hands
 from dsc.viewer.entrance import Entrance
@@ -87,7 +87,8 @@ class Viewer:
         return Access(self._calm, self._keys, self.port)
 
     def _routed(self) -> ASGIApp:
-        controlled = self._forbidden if self._control is None else self._asked(self._control.obey, CONTROL)
+        control = self._control
+        controlled = self._forbidden if control is None else self._asked(lambda said, _: control.obey(said), CONTROL)
         routes = [
             Route("/", self._page),
             Route("/record/{seq:str}", self._record),
@@ -141,10 +142,11 @@ class Viewer:
         except InputError as error:
             return _wrong(error)
 
-    def _asked(self, answer: Callable[[Mapping[str, Any]], Any], form: Form) -> Callable[[Request], Any]:
+    def _asked(self, answer: Callable[[Mapping[str, Any], Left], Any], form: Form) -> Callable[[Request], Any]:
         async def answering(request: Request) -> Response:
             try:
-                return _json(await run_in_threadpool(answer, asked(await _body(request), form)))
+                said = asked(await _body(request), form)
+                return _json(await _while_there(request, answer, said))
             except InputError as error:
                 return _wrong(error)
             except RecursionError:
@@ -197,6 +199,24 @@ class _Protocol(H11Protocol):
 
 def _own(cookie: bytes) -> bytes:
     return b";".join(part for part in cookie.split(b";") if part.lstrip().startswith(COOKIE.encode()))
+
+
+async def _while_there(
+    request: Request, answer: Callable[[Mapping[str, Any], Left], Any], said: Mapping[str, Any]
+) -> Any:
+    """What `answer` gives in a thread of its own; it learns when whoever asked has left. The body was read."""
+    left = threading.Event()
+
+    async def watch() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+        left.set()
+
+    watching = asyncio.create_task(watch())
+    try:
+        return await run_in_threadpool(answer, said, left.is_set)
+    finally:
+        watching.cancel()
 
 
 async def _body(request: Request) -> bytes:

@@ -61,13 +61,13 @@ def require_size(size: int, most: int, source: str | None) -> None:
 
 
 def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> Iterator[str]:
-    """The lines of a UTF-8 file without their ends, one by one; the last one only if it is not empty.
+    """The lines of a UTF-8 file without their ends, one by one; an empty file has one, which is empty.
 
     Args:
         path: a file, device or pipe.
         most: bytes that are read at most.
         longest: bytes of a line at most.
-        errors: as for `open`.
+        errors: what becomes of other bytes, as for `open`.
 
     Raises:
         InputError: as `read_text`, and for a line that is too long.
@@ -81,7 +81,7 @@ def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> I
             yield _line(line, path, number, longest, errors)
         if len(rest) > longest:
             break
-    if rest:
+    if rest or not number:
         yield _line(rest, path, number + 1, longest, errors)
 
 

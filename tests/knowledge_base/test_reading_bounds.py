@@ -104,6 +104,8 @@ def test_lines_are_read_one_by_one_each_with_a_bound(tmp_path):
     file = tmp_path / "lines"
     file.write_bytes(b"one\ntwo\n\nfour")
     assert list(files.read_lines(file, most=100, longest=4)) == ["one", "two", "", "four"]
+    (tmp_path / "empty").write_bytes(b"")
+    assert list(files.read_lines(tmp_path / "empty", most=100, longest=4)) == [""]
     with pytest.raises(InputError, match="lines:4: a line has at most 3 bytes"):
         list(files.read_lines(file, most=100, longest=3))
     with pytest.raises(InputError, match="/dev/zero:1: a line has at most 5 bytes"):
