@@ -5,6 +5,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,18 @@ def test_yaml_on_a_page_is_a_plot_a_profile_or_a_scenario(page):
 def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
         assert target.startswith("https://") or (page.parent / target).exists(), target
+
+
+UNITS = {"": 1, " s": 1, " MiB": 1 << 20, " GiB": 1 << 30}
+
+
+def test_every_limit_on_the_page_is_the_one_in_the_code():
+    page = (ROOT / "docs" / "limits.md").read_text()
+    rows = re.findall(r"^\| `([\w.]+)\.(\w+)` \| (\d+)( \w+)? \|", page, flags=re.MULTILINE)
+    assert len(rows) > 20
+    for module, name, number, unit in rows:
+        value = getattr(import_module(module), name)
+        assert value == int(number) * UNITS[unit], f"{module}.{name} is {value}"
 
 
 TABLE = ROOT / "domains" / "clean_up_table" / "plots"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from knowledge_base.cli.printing import print_json, print_table
+from knowledge_base.cli.printing import print_json, print_json_list, print_table
 from knowledge_base.cli.sources import Domain, Json, Source, Store, opened, opened_store
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ Params = Annotated[
 ]
 Explain = Annotated[bool, typer.Option("--explain", help="Show how the query will be looked up.")]
 Why = Annotated[bool, typer.Option("--why", help="Show each part with its truth, and what decides.")]
+Limit = Annotated[int | None, typer.Option("--limit", min=1, help="Give so many answers at most, and look no further.")]
+Seconds = Annotated[float | None, typer.Option("--seconds", min=0.0, help="Give the question up after so long.")]
 NO = 1
 """Exit status of an answer `no`; 2 is a mistake, as for every command."""
 
@@ -35,12 +37,14 @@ def query(
     domain: Domain = None,
     param: Params = None,
     explain: Explain = False,
+    limit: Limit = None,
+    seconds: Seconds = None,
     json: Json = False,
 ) -> None:
     """List the values of EXPR's variables that make it true, e.g. '(and (on ?o table1) (cup ?o))'."""
     with opened(source, domain) as (kb, _):
         if not explain:
-            _answer(kb, expression, _params(param), as_json=json)
+            _answer(kb, expression, _params(param), limit, seconds, as_json=json)
             return
         plan = kb.explain_query(_parsed(expression), _params(param))
     if json:
@@ -55,13 +59,15 @@ def ask(
     domain: Domain = None,
     param: Params = None,
     why: Why = False,
+    seconds: Seconds = None,
     json: Json = False,
 ) -> None:
     """Say whether EXPR is true. Exit status: 0 yes, 1 no."""
     from knowledge_base.cli.printing import explanation_lines
+    from knowledge_base.language.bounds import Bounds
 
     with opened(source, domain) as (kb, _):
-        explanation = kb.explain(_parsed(expression), _params(param))
+        explanation = kb.explain(_parsed(expression), _params(param), bounds=Bounds(seconds=seconds))
     if json:
         print_json({"holds": explanation.truth, "why": explanation.to_json()})
     else:
@@ -87,6 +93,8 @@ def at(
     when: Annotated[str, typer.Argument(metavar="WHEN", help="A version, or a time such as 2026-11-21T16:40.")],
     expression: Annotated[str | None, typer.Argument(metavar="[EXPR]", help="Ask this instead of showing all.")] = None,
     param: Params = None,
+    limit: Limit = None,
+    seconds: Seconds = None,
     json: Json = False,
 ) -> None:
     """Show a store's world of then, or ask it."""
@@ -97,21 +105,36 @@ def at(
         if expression is None:
             _show(then, None, None, as_json=json)
         else:
-            _answer(then, expression, _params(param), as_json=json)
+            _answer(then, expression, _params(param), limit, seconds, as_json=json)
 
 
-def _answer(world: View, expression: str, params: Mapping[str, Value], *, as_json: bool) -> None:
+def _answer(
+    world: View,
+    expression: str,
+    params: Mapping[str, Value],
+    limit: int | None,
+    seconds: float | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Print the answers as they are found; nobody has them all in memory."""
+    from itertools import chain, islice
+
+    from knowledge_base.language.bounds import Bounds
     from knowledge_base.language.expression import variables_in_order
 
     condition = _parsed(expression)
-    answers = world.query(condition, params)
+    answers = world.stream(condition, params, bounds=Bounds(seconds=seconds))
+    answers = islice(answers, limit)
     names = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
+    first = list(islice(answers, 1))  # what is wrong with the question comes before anything is printed
+    answers = chain(first, answers)
     if as_json:
-        print_json({"variables": names, "holds": bool(answers), "answers": answers})
+        print_json_list(answers, {"variables": names, "holds": bool(first)}, "answers")
     elif names:
-        print_table([f"?{n}" for n in names], [[answer[n] for n in names] for answer in answers])
+        print_table([f"?{n}" for n in names], ([answer[n] for n in names] for answer in answers))
     else:
-        typer.echo("yes" if answers else "no")
+        typer.echo("yes" if first else "no")
 
 
 def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_json: bool) -> None:

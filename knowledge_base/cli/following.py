@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from knowledge_base.cli.printing import change_form, clock_time, delta_lines, print_json, print_line, print_table
+from knowledge_base.cli.printing import change_form, clock_time, delta_lines, print_json_list, print_line, print_table
 from knowledge_base.cli.sources import Json, Store, opened_store
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from knowledge_base.facts import Change
     from knowledge_base.store import KnowledgeBase
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Pattern = Annotated[
     str | None, typer.Argument(metavar="[PATTERN]", help="Only changes of this, e.g. '(on ?x table)' or '(weight ?x)'.")
 ]
+TOGETHER = 1000
+"""Changes that are read together."""
 POLL_S = 0.1
 """How often a store that others write is looked at."""
 
@@ -33,13 +35,12 @@ def history(
     """List what changed, when, and who did it."""
     with opened_store(store) as kb:
         touches = _touches(kb, pattern)
-        first = kb.oldest if since is None else since
-        changes = [change for change in kb.changes(first, until) if touches(change)]
-    if json:
-        print_json([change_form(change) for change in changes])
-        return
-    rows = [[c.version, clock_time(c.time), c.author, "\n".join(delta_lines(c.delta))] for c in changes]
-    print_table(["version", "time", "author", "change"], rows)
+        changes = filter(touches, _changes(kb, kb.oldest if since is None else since, until))
+        if json:
+            print_json_list(map(change_form, changes))
+            return
+        rows = ([c.version, clock_time(c.time), c.author, "\n".join(delta_lines(c.delta))] for c in changes)
+        print_table(["version", "time", "author", "change"], rows)
 
 
 def check(store: Store, json: Json = False) -> None:
@@ -76,6 +77,15 @@ def watch(
         while left != 0 and (end is None or time.monotonic() < end):
             kb.refresh()
             time.sleep(POLL_S)
+
+
+def _changes(kb: KnowledgeBase, since: int, until: int | None) -> Iterator[Change]:
+    """The changes of a store, read some at a time."""
+    last = kb.version if until is None else until
+    kb.changes(last, last)  # a mistake comes before the first change
+    yield from kb.changes(since, min(last, since + TOGETHER))
+    for first in range(since + TOGETHER, last, TOGETHER):
+        yield from kb.changes(first, min(last, first + TOGETHER))
 
 
 def _touches(kb: KnowledgeBase, pattern: str | None) -> Callable[[Change], bool]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -12,12 +13,31 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Change, Delta
     from knowledge_base.language.evaluation import Explanation
 
+MOST_ROWS = 5000
+"""Of a table, whose columns are as wide as their widest cell: so all rows must be there before the first is printed."""
+
 
 def print_json(said: Any) -> None:
     """One JSON value, for programs."""
     import json
 
     typer.echo(json.dumps(said, indent=2))
+
+
+def print_json_list(items: Iterable[Any], said: Mapping[str, Any] | None = None, name: str = "") -> None:
+    """What `print_json` prints of the list, or of `{**said, name: [*items]}`, but each item when it comes."""
+    import json
+    import sys
+
+    whole: object = [] if said is None else {**said, name: []}
+    head, _, tail = json.dumps(whole, indent=2).rpartition("[]")
+    indent = "\n" + "  " * (1 if said is None else 2)
+    write, before, end = sys.stdout.write, indent, "]"
+    write(head + "[")
+    for item in items:
+        write(before + json.dumps(item, indent=2).replace("\n", indent))
+        before, end = "," + indent, indent[:-2] + "]"
+    write(f"{end}{tail}\n")
 
 
 def print_line(said: Mapping[str, Any]) -> None:
@@ -30,7 +50,14 @@ def print_line(said: Mapping[str, Any]) -> None:
 
 
 def print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """A table, as wide as the terminal or what it goes to lets it be."""
+    """A table, as wide as the terminal or what it goes to lets it be; after `MOST_ROWS` rows another one begins."""
+    rest = iter(rows)
+    _print_table(head, islice(rest, MOST_ROWS))
+    while some := list(islice(rest, MOST_ROWS)):
+        _print_table(head, some)
+
+
+def _print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,9 @@ def to_json(state: WorldState, version: int) -> str:
         "schema": schema_form(state.schema),
         **world_form(state),
     }
-    return json.dumps(said, indent=1, allow_nan=False)
+    text = StringIO()
+    json.dump(said, text, indent=1, allow_nan=False)  # `dumps` keeps millions of pieces until the end
+    return text.getvalue()
 
 
 def read_json(

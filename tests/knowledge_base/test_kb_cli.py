@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from knowledge_base.cli import app
+from knowledge_base.cli.printing import print_json, print_json_list, print_table
 from knowledge_base.errors import InputError
 
 DOMAIN = """(define (domain d) (:types cup place)
@@ -99,3 +100,38 @@ def test_public_names_are_there_when_asked_for() -> None:
     assert {getattr(knowledge_base, name) is not None for name in knowledge_base.__all__} == {True}
     with pytest.raises(AttributeError, match="no attribute 'Knowledge'"):
         _ = knowledge_base.Knowledge
+
+
+ENDLESS = "(and (cup ?a) (cup ?b) (cup ?c) (cup ?d) (cup ?e) (cup ?f) (cup ?g) (cup ?h) (cup ?i) (cup ?j) (cup ?k))"
+
+
+def test_answers_are_limited(problem) -> None:
+    said = json.loads(run("query", problem, ENDLESS, "--limit", "3", "--json"))
+    assert len(said["answers"]) == 3
+    assert run("query", problem, "(on ?cup ?where)", "--limit", "1").count("table") == 1
+
+
+def test_a_question_is_given_up_after_some_seconds(problem) -> None:
+    for command in ("query", "ask"):
+        text = f"(exists (?x) {ENDLESS} )".replace("(?x)", "(?a ?b ?c ?d ?e ?f ?g ?h ?i ?j ?k ?l ?m ?n ?o)")
+        text = text.replace("(cup ?k)", "(cup ?k) (not (= ?k ?k))")
+        result = CliRunner().invoke(app, [command, problem, text, "--seconds", "0"])
+        assert isinstance(result.exception, InputError)
+        assert "the question takes longer than 0 s" in str(result.exception)
+
+
+@pytest.mark.parametrize("items", [[], [1], [{"a": "x\ny", "b": [1, {"c": None}]}, [], "z"]])
+def test_a_list_is_printed_item_by_item_as_if_at_once(items, capsys) -> None:
+    for said in (None, {"n": 1, "names": ["a"]}):
+        print_json_list(iter(items), said, "items")
+        streamed = capsys.readouterr().out
+        print_json(items if said is None else {**said, "items": items})
+        assert streamed == capsys.readouterr().out
+
+
+def test_a_long_table_is_printed_in_parts(monkeypatch, capsys) -> None:
+    monkeypatch.setattr("knowledge_base.cli.printing.MOST_ROWS", 2)
+    print_table(["number"], ([number] for number in range(5)))
+    assert capsys.readouterr().out.count("number") == 3
+    print_table(["number"], [])
+    assert capsys.readouterr().out.count("number") == 1
