@@ -53,22 +53,31 @@ def _as_cases(value: Any) -> Any:
 
 
 def _case_text(key: Any) -> str:
+    """The key as text; one spelling for each number, so that a plot that was written and read is the same plot."""
     if isinstance(key, bool):
         return "true" if key else "false"
-    if isinstance(key, int | float) and math.isfinite(key):
-        return repr(key)
-    if isinstance(key, str):
+    if isinstance(key, str) and not is_number(key):
         return key
+    number = case_value(key if isinstance(key, str) else repr(key))
+    if isinstance(number, int) or (isinstance(number, float) and math.isfinite(number)):
+        return repr(number)
     raise ValueError(f"a case is text, a number or a truth value; found {key!r}")
 
 
 def case_value(key: str) -> Value:
     """The constant that a case's key stands for: `1` a number, `true` a truth value, `"1"` and `cup` texts."""
     if is_number(key):
-        number = float(key)
-        return int(number) if number.is_integer() else number
+        return _number(key)
     quoted = len(key) > 1 and key[0] == key[-1] == '"'
     return TRUTH_VALUES.get(key, key[1:-1] if quoted else key)
+
+
+def _number(text: str) -> int | float:
+    try:
+        return int(text)  # a large one has more digits than a float can hold
+    except ValueError:
+        number = float(text)
+    return int(number) if number.is_integer() else number
 
 
 class SelectState(Connector):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from dsc.model.actions import Assign, Configure, Emit, Switch, Trigger
-from dsc.model.connectors import ChoiceState, SelectState
+from dsc.model.connectors import ChoiceState, SelectState, case_value
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.rules import Rule
 from dsc.model.states import (
@@ -362,6 +362,24 @@ def test_the_branches_of_a_choice_are_transitions_in_order():
         (("choice", 1), "choice", "second"),
     ]
     assert next(iter(choice.transitions()))[1].effect == (Assign(assign={"n": 1}),)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("1.0", 1), ("-0.0", 0), ("1e16", 10**16), ("1.50", 1.5), ("9007199254740993", 2**53 + 1), ("1" * 30, int("1" * 30)), ('"-0"', 0)],
+)
+def test_a_number_as_a_case_is_that_number_after_writing_and_reading_too(key, value):
+    made = parse_plot(f"plot: p\nstates:\n  s: {{select: 1, cases: {{{key}: t}}, else: t}}\n  t:\n")
+    ((case, _),) = made.states["s"].cases.items()
+    assert case_value(case) == value
+    assert parse_plot(plot_to_yaml(made)) == made
+
+
+def test_a_case_is_a_number_of_any_size_and_never_infinite():
+    form = {"plot": "p", "states": {"s": {"select": "?x", "cases": {10**400: "s"}, "else": "s"}}}
+    assert list(ActionPlot.model_validate(form).states["s"].cases) == [str(10**400)]
+    with pytest.raises(InputError, match="a case is text, a number or a truth value"):
+        ActionPlot.model_validate({"plot": "p", "states": {"s": {"select": "?x", "cases": {"1e400": "s"}, "else": "s"}}})
 
 
 def test_the_cases_of_a_select_are_guarded_by_their_values():
