@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer test-viewer screenshots clean
 
 help:   ## this list
@@ -73,6 +73,9 @@ soak-kb: $(VENV)/.test   ## four threads and an event loop change, ask and watch
 
 memory: $(VENV)/.run   ## a run of 24 simulated hours and 1,000,000 events: is its memory flat after the first tenth? (EVENTS=N)
 	$(BIN)/python benchmarks/memory.py $(if $(EVENTS),--events $(EVENTS))
+
+fuzz: $(VENV)/.test   ## mutated inputs for every reader and command: no traceback, no hang, no growth (SECONDS=N SEED=N ONLY=NAMES REPRODUCE=FILE)
+	$(BIN)/python tests/fuzz/fuzz.py --seconds $(or $(SECONDS),60) --seed $(or $(SEED),0) $(if $(ONLY),--only $(ONLY)) $(if $(REPRODUCE),--reproduce $(REPRODUCE))
 
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py

@@ -1,0 +1,5 @@
+(define (domain e) (:types t u - object)
+  (:predicates (p ?x - t) (q ?x ?y - (either t u))) (:functions (total-cost))
+  (:action a :parameters (?x - t ?y - u)
+    :precondition (and (or (p ?x) (not (q ?x ?y))) (forall (?z - t) (imply (p ?z) (exists (?w - u) (q ?z ?w)))))
+    :effect (and (not (p ?x)) (when (q ?x ?y) (p ?x)) (forall (?z - t) (p ?z)) (increase (total-cost) 2))))
