@@ -4,14 +4,51 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dsc.engine.configuration import Configuration, configuration_of
 from dsc.engine.tables import Chart, CompiledPlot
 from dsc.events import Event
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import ParseError, UnknownNameError
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+class _Form(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class _EventForm(_Form):
+    name: str
+    attributes: dict[str, Any]
+    to: int | None
+    exact: bool
+    frame: int | None
+    number: int | None
+
+
+class _FrameForm(_Form):
+    serial: int
+    plot: str
+    form: Any  # of a plot that was made; `None` for one of the chart's
+    active: list[str]
+    waiting: list[str]
+    history: dict[str, list[str]]
+    variables: dict[str, Any]
+    activations: dict[str, int]
+    children: dict[str, _FrameForm]
+    kept: list[tuple[str, _EventForm]]
+
+
+class _MachineForm(_Form):
+    root: _FrameForm | None
+    serials: int
+    finished: bool
+
+
+_F = TypeVar("_F", bound=_Form)
 
 
 class FrameState(NamedTuple):
@@ -65,21 +102,8 @@ class FrameState(NamedTuple):
 
     @staticmethod
     def from_json(data: Mapping[str, Any], chart: Chart) -> FrameState:
-        """The inverse of `to_json`; raises `UnknownNameError` if the chart lacks the plot, or the plot the state."""
-        form = data["form"]
-        compiled = chart.compiled(data["plot"]) if form is None else chart.bind(form)
-        index = _Index(compiled)
-        configuration = configuration_of(
-            compiled,
-            tuple(map(index, data["active"])),
-            frozenset(map(index, data["waiting"])),
-            tuple([(index(at), tuple(map(index, kept))) for at, kept in data["history"].items()]),
-        )
-        children = {name: FrameState.from_json(child, chart) for name, child in data["children"].items()}
-        kept = tuple([(name, Event(**event)) for name, event in data["kept"]])
-        return FrameState(
-            data["serial"], compiled, configuration, data["variables"], data["activations"], children, kept
-        )
+        """The inverse of `to_json`; errors as for `MachineState.from_json`."""
+        return _frame_of(_read(_FrameForm, data), chart)
 
 
 class _Index:
@@ -121,10 +145,12 @@ class MachineState(NamedTuple):
         """The inverse of `to_json`, with the plots of a chart.
 
         Raises:
+            ParseError: the data do not have that form.
+            InputError: a plot that was made is none.
             UnknownNameError: the chart lacks one of the plots, or a plot one of the states.
         """
-        root = FrameState.from_json(data["root"], chart) if data["root"] else None
-        return MachineState(root, data["serials"], data["finished"])
+        form = _read(_MachineForm, data)
+        return MachineState(None if form.root is None else _frame_of(form.root, chart), form.serials, form.finished)
 
     def configuration(self) -> tuple[str, ...]:
         """Paths of all active states, outermost first."""
@@ -166,3 +192,26 @@ def _paths(frame: FrameState, prefix: str) -> Iterator[str]:
         yield prefix + name
         if name in frame.children:
             yield from _paths(frame.children[name], f"{prefix}{name}/")
+
+
+def _read(form: type[_F], data: object) -> _F:
+    try:
+        return form.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        path = ".".join(map(str, first["loc"])) or "the whole"
+        raise ParseError(f"this is no state of a machine: {path}: {first['msg']}") from None
+
+
+def _frame_of(form: _FrameForm, chart: Chart) -> FrameState:
+    compiled = chart.compiled(form.plot) if form.form is None else chart.bind(form.form)
+    index = _Index(compiled)
+    configuration = configuration_of(
+        compiled,
+        tuple(map(index, form.active)),
+        frozenset(map(index, form.waiting)),
+        tuple([(index(at), tuple(map(index, kept))) for at, kept in form.history.items()]),
+    )
+    children = {name: _frame_of(child, chart) for name, child in form.children.items()}
+    kept = tuple([(name, Event(**dict(event))) for name, event in form.kept])
+    return FrameState(form.serial, compiled, configuration, form.variables, form.activations, children, kept)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from dsc_charts import FakeSituation, Run, plot
@@ -12,7 +13,7 @@ from dsc.engine.machine import step
 from dsc.engine.situation import Decision
 from dsc.engine.state import MachineState
 from dsc.events import Event
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 
 RICH = """
     plot: p
@@ -98,3 +99,41 @@ def test_a_machine_that_was_not_started_or_has_ended_does_nothing():
     assert run.send("e").moved is False
     assert run.start().state.finished
     assert run.send("e").handled is False
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        ((), [], "no state of a machine: the whole: "),
+        (("root",), 3, "no state of a machine: root: "),
+        (("serials",), "many", "no state of a machine: serials: "),
+        (("root", "plot"), [], "no state of a machine: root.plot: "),
+        (("root", "active"), {"a": 1}, "no state of a machine: root.active: "),
+        (("root", "kept"), [["a"]], "no state of a machine: root.kept.0.1: "),
+        (("root", "kept"), [["a", {"name": "e", "sent": 1}]], "no state of a machine: root.kept.0.1."),
+        (("root", "history"), [1], "no state of a machine: root.history: "),
+        (("root", "surplus"), 1, "no state of a machine: root.surplus: "),
+        (("root", "form"), {"plot": 3}, "plot"),
+    ],
+)
+def test_what_is_no_state_is_refused_by_what_is_wrong_in_it(path, value, said):
+    run = rich()
+    run.start()
+    form = json.loads(json.dumps(run.machine.state.to_json()))
+    holder = form
+    for key in path[:-1]:
+        holder = holder[key]
+    if path:
+        holder[path[-1]] = value
+    with pytest.raises(InputError, match=re.escape(said)):
+        MachineState.from_json(form if path else value, run.library)
+
+
+def test_a_state_nested_too_deeply_is_refused():
+    run = rich()
+    run.start()
+    form = json.loads(json.dumps(run.machine.state.to_json()))
+    for _ in range(2000):
+        form["root"] = {**form["root"], "children": {"a": form["root"]}}
+    with pytest.raises(InputError, match="no state of a machine"):
+        MachineState.from_json(form, run.library)
