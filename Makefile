@@ -74,6 +74,22 @@ soak-kb: $(VENV)/.test   ## four threads and an event loop change, ask and watch
 memory: $(VENV)/.run   ## a run of 24 simulated hours and 1,000,000 events: is its memory flat after the first tenth? (EVENTS=N)
 	$(BIN)/python benchmarks/memory.py $(if $(EVENTS),--events $(EVENTS))
 
+LOWER := .venv-lower
+
+$(LOWER)/.made: pyproject.toml tests/dependencies.py   # the core and what its tests need, each at its lower bound
+	$(PYTHON) -m venv $(LOWER)
+	$(PYTHON) tests/dependencies.py --lower > $(LOWER)/bounds.txt
+	$(LOWER)/bin/python -m pip install --quiet --disable-pip-version-check --constraint $(LOWER)/bounds.txt --editable '.[test]'
+	@touch $@
+
+lower-bounds: $(LOWER)/.made   ## tests of every room with the oldest packages that pyproject.toml allows
+	$(LOWER)/bin/dsc run clean-up-table --json
+	$(LOWER)/bin/python -m pytest -W ignore::DeprecationWarning -p no:cacheprovider tests/test_command.py \
+		tests/knowledge_base/test_kb_store.py tests/knowledge_base/test_kb_drawing.py tests/knowledge_base/test_kb_cli.py \
+		tests/dsc/test_yaml_plots.py tests/dsc/test_model.py tests/dsc/test_plot_schema.py tests/dsc/test_plot_cli.py \
+		tests/dsc/test_diagram.py tests/dsc/test_run_store.py tests/dsc/viewer/test_viewer_server.py \
+		tests/planning/test_planner.py tests/planning/test_unified.py tests/planning/test_cli.py
+
 fuzz: $(VENV)/.test   ## mutated inputs for every reader and command: no traceback, no hang, no growth (SECONDS=N SEED=N ONLY=NAMES REPRODUCE=FILE)
 	$(BIN)/python tests/fuzz/fuzz.py --seconds $(or $(SECONDS),60) --seed $(or $(SEED),0) $(if $(ONLY),--only $(ONLY)) $(if $(REPRODUCE),--reproduce $(REPRODUCE))
 
@@ -123,4 +139,4 @@ bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watc
 	$(BIN)/python benchmarks/viewer.py $(if $(RUNS),--rounds $(RUNS))
 
 clean:   ## forget the environment and caches
-	rm -rf $(VENV) $(BENCH) frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) $(BENCH) $(LOWER) frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -1,0 +1,137 @@
+"""What the project depends on: its page is made of pyproject.toml and the metadata of what is installed.
+
+`python tests/dependencies.py --write` writes docs/dependencies.md; `--lower` prints the lower bounds of the core and of
+what its tests need as constraints for pip.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, metadata
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "dependencies.md"
+LOWER = ("core", "test", "viewer", "bt")
+"""What `make lower-bounds` installs at its lower bounds."""
+
+
+class Requirement(NamedTuple):
+    """One line of pyproject.toml: where it stands, the package, its lower bound ("" for none)."""
+
+    group: str
+    package: str
+    bound: str
+
+
+IN_PROCESS, APART, BUILD = "imported", "a process of its own", "to develop"
+WHY = {
+    "networkx": ("the public graph of a knowledge base, and layouts of drawings", IN_PROCESS),
+    "numpy": ("layouts of networkx", IN_PROCESS),
+    "scipy": ("layouts of networkx", IN_PROCESS),
+    "pydantic": ("plots, profiles and scenarios as values that are judged when they are read", IN_PROCESS),
+    "pyperplan": ("the planner that is always there", APART),
+    "rich": ("trees, tables and progress on a terminal", IN_PROCESS),
+    "ruamel.yaml": ("YAML 1.2 with places and comments", IN_PROCESS),
+    "typer": ("the command line", IN_PROCESS),
+    "unified-planning": ("other planning engines, and problems in its form (`to_unified`)", "imported by `planning.unified` and in the engines' processes"),
+    "up-pyperplan": ("pyperplan for who plans with unified-planning", "found by unified-planning; not imported"),
+    "up-fast-downward": ("the engine `fast-downward`", APART),
+    "up-enhsp": ("the engine `enhsp`, which is a Java program", APART),
+    "up-aries": ("the engine `aries`", APART),
+    "py-trees": ("behaviour trees as skills", "imported by `dsc.components.trees`"),
+    "starlette": ("the page's requests", "imported where a page is served"),
+    "uvicorn": ("the page's server", "imported where a page is served"),
+    "websockets": ("the page's socket", "imported where a page is served"),
+    "httpx": ("requests in tests of the page", BUILD),
+    "hypothesis": ("properties in tests", BUILD),
+    "jsonschema": ("the published JSON Schema, tested", BUILD),
+    "pytest": ("tests", BUILD),
+    "pytest-xdist": ("tests on all cores", BUILD),
+    "import-linter": ("the direction of imports, checked", BUILD),
+    "mypy": ("types, checked", BUILD),
+    "ruff": ("style, checked", BUILD),
+    "types-networkx": ("types of networkx", BUILD),
+    "pyoxigraph": ("compared with in benchmarks", BUILD),
+    "python-statemachine": ("compared with in benchmarks", BUILD),
+    "rdflib": ("compared with in benchmarks", BUILD),
+    "sismic": ("compared with in benchmarks", BUILD),
+    "transitions": ("compared with in benchmarks", BUILD),
+    "xstate-statemachine": ("compared with in benchmarks", BUILD),
+    "hatchling": ("builds the package", BUILD),
+}
+"""What each is for, and how it is met."""
+LICENCES = {
+    "up-fast-downward": "GPL-3.0 (the engine)", "up-enhsp": "Apache-2.0; the engine GPL-3.0", "up-aries": "MIT",
+    "pyoxigraph": "MIT OR Apache-2.0", "python-statemachine": "MIT", "rdflib": "BSD-3-Clause", "sismic": "LGPL-3.0",
+    "scipy": "BSD-3-Clause", "transitions": "MIT", "xstate-statemachine": "MIT", "hatchling": "MIT",
+}  # fmt: skip
+"""Of what `make test` does not install, and of a package that says too little."""
+SPELT = {"GPL3+": "GPL-3.0-or-later", "APACHE": "Apache-2.0", "BSD 2-Clause License": "BSD-2-Clause"}
+"""Licences as packages say them, and as SPDX does."""
+TITLES = {
+    "core": "Core", "viewer": "Extra `viewer`", "bt": "Extra `bt`", "fast": "Extra `fast`", "numeric": "Extra `numeric`",
+    "durations": "Extra `durations`", "test": "Extra `test`", "check": "Extra `check`", "bench": "Extra `bench`",
+    "build": "To build the package",
+}  # fmt: skip
+HEAD = """# Dependencies
+
+The page is made by `python tests/dependencies.py --write` of pyproject.toml and the metadata of the installed packages.
+The project itself is Apache-2.0.
+
+`make lower-bounds` installs the core and what its tests need exactly at the lower bounds, in an environment of its own,
+and runs tests of every room. There are no upper bounds.
+
+Planning engines never run in the program's process: `planning/engines/process.py` starts `planning.engines.worker` for
+each and talks to it in lines of JSON. `pyperplan` is GPL-3.0-or-later and is imported in that worker alone; a program
+that must not depend on it passes another `Planner`. A test checks that the program does not import it.
+"""
+
+
+def requirements() -> Iterator[Requirement]:
+    """All that pyproject.toml names, but for extras that are made of extras."""
+    form = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    groups = {"core": form["project"]["dependencies"], **form["project"]["optional-dependencies"]}
+    for group, texts in {**groups, "build": form["build-system"]["requires"]}.items():
+        for text in texts:
+            name, _, bound = text.partition(">=")
+            if "[" not in name:
+                yield Requirement(group, name.strip(), bound.strip())
+
+
+def licence(package: str) -> str:
+    """Of the installed package, or what is known of one that is not."""
+    try:
+        said = metadata(package)
+    except PackageNotFoundError:
+        return LICENCES[package]
+    if package in LICENCES:
+        return LICENCES[package]
+    classified = [one.split(" :: ")[-1] for one in said.get_all("Classifier") or [] if one.startswith("License")]
+    text = said.get("License-Expression") or said.get("License") or ""
+    text = text if text and len(text) < 60 else (classified or [text[:60]])[0]
+    return SPELT.get(text, re.sub(r"^(MIT|BSD) License$", r"\1", text))
+
+
+def page() -> str:
+    """docs/dependencies.md."""
+    lines = [HEAD]
+    for group, title in TITLES.items():
+        lines += [f"## {title}\n", "| package | from | licence | for | how it is met |", "| --- | --- | --- | --- | --- |"]
+        for one in requirements():
+            if one.group == group:
+                why, how = WHY[one.package]
+                lines.append(f"| {one.package} | {one.bound or 'any'} | {licence(one.package)} | {why} | {how} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    if "--write" in sys.argv:
+        PAGE.write_text(page())
+    if "--lower" in sys.argv:
+        print("\n".join(f"{one.package}=={one.bound}" for one in requirements() if one.group in LOWER and one.bound))
