@@ -171,7 +171,7 @@ class Worker:
     def __init__(self, seed: int, only: tuple[str, ...]) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=work, args=(theirs, seed, only))
+        self.process = context.Process(target=work, args=(theirs, seed, only), daemon=True)
         self.process.start()
         theirs.close()
         self.pipe.recv()
