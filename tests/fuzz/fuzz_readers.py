@@ -40,7 +40,7 @@ from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.reader import parse_scxml
 from dsc.text.scxml.writer import to_scxml
 from dsc.text.state_diagram import to_mermaid, to_plantuml
-from dsc.trace import Record, Trace, header
+from dsc.trace import Trace, header
 from dsc.validation import review_plot, validate_plot
 from dsc.viewer.answers import Answers
 from dsc.viewer.control import Control
@@ -269,8 +269,6 @@ def read_trace_file(data: bytes, folder: Path) -> None:
     for seq in {0, 1, 2, len(log) // 2, len(log), len(log) + 1}:
         _unless(InputError, lambda seq=seq: answers.facts({"seq": seq}))
         _unless(InputError, lambda seq=seq: answers.query({"seq": seq, "expression": "(on ?x ?y)"}))
-    for line in data.decode("utf-8", "replace").split("\n")[1:3]:
-        _unless(InputError, lambda line=line: Record.from_line(line))
 
 
 def read_store(data: bytes, folder: Path, name: str) -> None:
