@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer test-viewer screenshots clean
 
 help:   ## this list
@@ -92,6 +92,9 @@ lower-bounds: $(LOWER)/.made   ## tests of every room with the oldest packages t
 
 fuzz: $(VENV)/.test   ## mutated inputs for every reader and command: no traceback, no hang, no growth (SECONDS=N SEED=N ONLY=NAMES REPRODUCE=FILE)
 	$(BIN)/python tests/fuzz/fuzz.py --seconds $(or $(SECONDS),60) --seed $(or $(SEED),0) $(if $(ONLY),--only $(ONLY)) $(if $(REPRODUCE),--reproduce $(REPRODUCE))
+
+corrupt-stores: $(VENV)/.test   ## stores damaged in every way: does any reader answer what never was? (CORRUPTIONS=N FIRST=SEED)
+	$(BIN)/python tests/dsc/stores_soak.py $(or $(CORRUPTIONS),1000) $(or $(FIRST),0)
 
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py

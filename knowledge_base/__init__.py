@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from knowledge_base.conditions.watch import Watch as Watch
     from knowledge_base.errors import ConditionCancelledError as ConditionCancelledError
     from knowledge_base.errors import ConflictError as ConflictError
+    from knowledge_base.errors import DamagedStoreError as DamagedStoreError
     from knowledge_base.errors import HistoryError as HistoryError
     from knowledge_base.errors import InputError as InputError
     from knowledge_base.errors import OutOfBoundsError as OutOfBoundsError
@@ -77,6 +78,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "SchemaMismatchError": "errors",
         "Signature": "language.vocabulary",
         "Source": "sources",
+        "DamagedStoreError": "errors",
         "StoreError": "errors",
         "Transaction": "transaction",
         "UnknownNameError": "errors",

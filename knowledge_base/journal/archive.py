@@ -21,6 +21,7 @@ from knowledge_base.journal.integrity import (
     damaged,
     link,
     require_link,
+    require_own_log,
     require_sound,
     require_tables,
 )
@@ -36,7 +37,8 @@ _BOTH_THERE = "SELECT EXISTS (SELECT 1 FROM schemas) AND EXISTS (SELECT 1 FROM s
 _DIGEST_AT = """SELECT digest FROM changes WHERE version = :version
     UNION ALL SELECT head FROM snapshots WHERE version = :version"""
 _KEYS = """SELECT number, key, version, keys.time, keys.author, coalesce(keys.delta, changes.delta), context,
-    keys.digest, coalesce((SELECT digest FROM keys AS before WHERE before.number = keys.number - 1), x'')
+    keys.digest, coalesce((SELECT digest FROM keys AS before WHERE before.number = keys.number - 1),
+    (SELECT digest FROM ends WHERE chain = 'store'))
     FROM keys LEFT JOIN changes USING (version)"""
 _TIPS = {
     "schemas": "SELECT rowid, digest FROM schemas ORDER BY rowid DESC LIMIT 1",
@@ -163,6 +165,7 @@ class Archive:
         """
         require_tables(connection, self._path, TABLES)
         ends = Ends(connection, self._path)
+        require_own_log(self._path, ends.identity)
         if not ends.closed:
             require_sound(connection, self._path)
         (parts,) = connection.execute(_BOTH_THERE).fetchone()
@@ -171,6 +174,9 @@ class Archive:
         (first,) = connection.execute("SELECT min(version) FROM changes").fetchone()
         if first is not None and first != _oldest(connection) + 1:
             raise damaged(self._path, f"version {_oldest(connection) + 1} is missing")
+        (keys, last) = connection.execute("SELECT count(*), coalesce(max(number), 0) FROM keys").fetchone()
+        if keys != last:
+            raise damaged(self._path, f"there are {keys} keys, and the last one is key {last}")
         if ends.closed:
             for chain, tip in self._tips(connection):
                 ends.require(chain, tip)
@@ -199,7 +205,7 @@ class Archive:
 
     def written_schema(self, connection: sqlite3.Connection) -> Schema:
         """The schema that the store has now."""
-        digest, text = NOTHING, ""
+        digest, text = Ends(connection, self._path).identity, ""
         for number, row in enumerate(connection.execute("SELECT * FROM schemas ORDER BY rowid"), 1):
             version, name, text, found = row
             digest = require_link(self._path, f"schema {number}", found, (digest,), version, name, text)

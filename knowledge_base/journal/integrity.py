@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterable, Mapping
+from contextlib import closing, suppress
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -21,6 +22,8 @@ SIZE: Final = 16
 NOTHING: Final = b""
 """The digest before the first row of a chain."""
 ENDS = "CREATE TABLE ends (chain TEXT PRIMARY KEY, count INTEGER, digest BLOB) WITHOUT ROWID"
+STORE: Final = "store"
+"""In the table of ends, the random identity of the store, with which its chains begin."""
 _OPEN = "open"
 _PUT_END = "INSERT OR REPLACE INTO ends VALUES (?, ?, ?)"
 _SHOWN = 3
@@ -81,11 +84,23 @@ def require_tables(connection: sqlite3.Connection, path: Path, tables: Mapping[s
             raise damaged(path, f"the table '{name}' is declared as '{there[name]}'")
 
 
-def require_sound(connection: sqlite3.Connection, path: Path) -> None:
-    """Raise `DamagedStoreError` if SQLite's own check finds anything wrong with the pages of the file."""
-    problems = [str(problem) for (problem,) in connection.execute(f"PRAGMA integrity_check({_SHOWN})")]
+def require_sound(connection: sqlite3.Connection, path: Path, table: str | None = None) -> None:
+    """Raise `DamagedStoreError` if SQLite's own check finds a problem in the pages of the file, or of a table."""
+    problems = [str(problem) for (problem,) in connection.execute(f"PRAGMA integrity_check({table or _SHOWN})")]
     if problems != ["ok"]:
-        raise damaged(path, "; ".join(" ".join(problem.split()) for problem in problems))
+        raise damaged(path, "; ".join(" ".join(problem.split()) for problem in problems[:_SHOWN]))
+
+
+def require_own_log(path: Path, identity: bytes) -> None:
+    """Raise `DamagedStoreError` if SQLite's log beside the file is that of another store, with that identity."""
+    log = path.with_name(path.name + "-wal")
+    if not log.exists() or not log.stat().st_size:
+        return
+    with suppress(sqlite3.Error):  # a crash may have left the file itself half written: then the log completes it
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as alone:
+            (own,) = alone.execute("SELECT digest FROM ends WHERE chain = ?", (STORE,)).fetchone() or (identity,)
+        if own != identity:
+            raise damaged(path, f"'{log.name}' is the log of another store")
 
 
 class Ends:
@@ -102,8 +117,13 @@ class Ends:
         self.closed = _OPEN not in rows
         self.chains = frozenset(rows) - {_OPEN}
         self.tips = {chain: Tip(*row) for chain, row in rows.items() if chain != _OPEN and row[1] is not None}
-        if not rows:
-            raise damaged(path, "the table 'ends' is empty")
+        if STORE not in self.tips:
+            raise damaged(path, "the table 'ends' does not say which store this is")
+
+    @property
+    def identity(self) -> bytes:
+        """What no other store has."""
+        return self.tips[STORE].digest
 
     def require(self, chain: str, found: Tip) -> None:
         """Raise `DamagedStoreError` if the chain ends elsewhere."""

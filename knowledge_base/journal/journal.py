@@ -22,7 +22,17 @@ from knowledge_base.journal.file import (
     writing,
 )
 from knowledge_base.journal.history import Version, Writer
-from knowledge_base.journal.integrity import NOTHING, SIZE, Tip, link, mark_closed, put_ends, require_sound
+from knowledge_base.journal.integrity import (
+    NOTHING,
+    SIZE,
+    STORE,
+    Ends,
+    Tip,
+    link,
+    mark_closed,
+    put_ends,
+    require_sound,
+)
 from knowledge_base.journal.lock import WriterLock
 from knowledge_base.journal.making import making
 from knowledge_base.journal.transaction import Group, Transaction
@@ -81,7 +91,7 @@ class Journal(Archive):
         if not is_there(path) and schema is None:
             raise _no_schema(path)
         self._place = Place(str(path))
-        self._head = self._schema_digest = NOTHING
+        self._head = self._schema_digest = self._identity = NOTHING
         self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
         self._durability = durability
         self._writers = WriterLock(path)
@@ -115,11 +125,11 @@ class Journal(Archive):
         snapshot = None if self._tail < max(SNAPSHOT_AFTER, self._snapshot_size) else compact(world_form(before))
         with self._part() as connection:
             if snapshot is not None:
-                self._put_snapshot(snapshot, change.version - 1)
+                self._put_snapshot(snapshot, change.version - bool(change.delta))  # that of the world before it
             if change.delta:
                 connection.execute(_INSERT_CHANGE, (change.version, time, change.author, delta, digest))
             if key is not None:
-                number, previous = connection.execute(_LAST_KEY).fetchone() or (0, NOTHING)
+                number, previous = connection.execute(_LAST_KEY).fetchone() or (0, self._identity)
                 said = (number + 1, key, change.version, time, change.author)
                 kept = None if change.delta else delta
                 connection.execute(_INSERT_KEY, (*said, kept, context, link(previous + digest, *said)))
@@ -199,6 +209,8 @@ class Journal(Archive):
     def _prepare(self, schema: Schema | None, clock: Callable[[], float]) -> None:
         with reported(self._path, "read"):
             self.require_whole(self._connection)
+            require_sound(self._connection, self._path, "keys")  # of which one that is not found is made again
+            self._identity = Ends(self._connection, self._path).identity
             written = self.written_schema(self._connection)
             self._schema = schema or written
             (self._schema_digest,) = self._connection.execute(_LAST_SCHEMA).fetchone()
@@ -291,10 +303,11 @@ def _make(path: Path, schema: Schema | None, durability: Durability, time: float
     if schema is None:  # somebody has just taken it away
         raise _no_schema(path)
     with making(path, durability) as connection:
-        first = _put_schema(connection, schema, 0, NOTHING)
-        head = os.urandom(SIZE)  # so that no row of another store fits this one
-        _put_world(connection, 0, float(time), compact(world_form(WorldState(schema))), head, first)
-        put_ends(connection, {"changes": Tip(0, head), "schemas": Tip(1, first), "keys": Tip(0, NOTHING)}.items())
+        identity = os.urandom(SIZE)  # no row of another store fits this one
+        first = _put_schema(connection, schema, 0, identity)
+        _put_world(connection, 0, float(time), compact(world_form(WorldState(schema))), identity, first)
+        tips = {"changes": Tip(0, identity), "schemas": Tip(1, first), "keys": Tip(0, NOTHING), STORE: Tip(1, identity)}
+        put_ends(connection, tips.items())
 
 
 def _put_schema(connection: sqlite3.Connection, schema: Schema, version: int, before: bytes) -> bytes:

@@ -106,7 +106,7 @@ class Soak:
         await asyncio.gather(*watchers)
 
     def _work(self, worker: str) -> None:
-        random, commits = Random(worker), 0  # noqa: S311
+        random, commits = Random(worker), 0
         try:
             while self.go_on(commits):
                 commits += self._commit(worker, commits, random)

@@ -200,6 +200,17 @@ def test_compaction_forgets_what_was_before_and_nothing_else(kb):
     assert everything(kb.at(version=kb.version)) == before
 
 
+def test_a_snapshot_before_a_change_of_nothing_is_that_of_its_version(path, monkeypatch):
+    monkeypatch.setattr(journal, "SNAPSHOT_AFTER", 1)
+    with opened(path) as kb:
+        kb.apply(QUIET, author="a")
+        kb.apply(LOUD, author="a")
+        past = [everything(kb.at(version=version)) for version in range(3)]
+        kb.apply(Delta(), author="a", key="k")
+        kb.apply(Delta(nodes={"late": "cup"}), author="a")
+        assert [everything(kb.at(version=version)) for version in range(3)] == past
+
+
 def test_compaction_makes_the_file_smaller_and_keeps_it_whole(path):
     with opened(path) as kb:
         for number in range(2000):
