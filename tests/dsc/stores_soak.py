@@ -39,7 +39,9 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 
 SECONDS = 5
-"""After so many a reader hangs."""
+"""After so many of work a reader hangs."""
+WAITING = 60
+"""After so many seconds it hangs, whether it works or not; other programs may be at work as well."""
 PAGE = 4096
 VERSIONS = 5
 """How many past worlds of a store are asked for."""
@@ -556,15 +558,18 @@ def _item(kb: KnowledgeBase) -> str:
 @contextmanager
 def _limited():
     def hang(*_: object) -> None:
-        raise HangError(f"no answer in {SECONDS} s")
+        raise HangError("no answer in time")
 
-    before = signal.signal(signal.SIGALRM, hang)
-    signal.alarm(SECONDS)
+    limits = ((signal.SIGPROF, signal.ITIMER_PROF, SECONDS), (signal.SIGALRM, signal.ITIMER_REAL, WAITING))
+    before = [signal.signal(number, hang) for number, _, _ in limits]
+    for _, timer, seconds in limits:
+        signal.setitimer(timer, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        for (number, timer, _), handler in zip(limits, before, strict=True):
+            signal.setitimer(timer, 0)
+            signal.signal(number, handler)
 
 
 def main() -> None:
