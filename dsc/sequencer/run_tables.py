@@ -25,7 +25,16 @@ from dsc.sequencer.run_standing import Row, Standing, standing
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.file import is_there, located, reading
-from knowledge_base.journal.integrity import NOTHING, Ends, Tip, damaged, require_link, require_sound, require_tables
+from knowledge_base.journal.integrity import (
+    NOTHING,
+    Ends,
+    Tip,
+    damaged,
+    require_link,
+    require_own_log,
+    require_sound,
+    require_tables,
+)
 
 TABLES = {
     "runs": """CREATE TABLE runs (run INTEGER PRIMARY KEY, plot TEXT NOT NULL, arguments TEXT NOT NULL,
@@ -362,7 +371,9 @@ def require_format(connection: sqlite3.Connection, path: Path) -> None:
 
 def require_tables_of_runs(connection: sqlite3.Connection, path: Path) -> bool:
     """Whether the store has room for runs; raises `StoreError` if that is damaged or of another format."""
-    if CHAIN in Ends(connection, path).chains:
+    ends = Ends(connection, path)
+    require_own_log(path, ends.identity)
+    if CHAIN in ends.chains:
         require_tables(connection, path, TABLES)
         require_format(connection, path)
         return True
