@@ -73,16 +73,19 @@ def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> I
         InputError: as `read_text`, and for a line that is too long.
         ParseError: a line is not UTF-8.
     """
-    number, rest = 0, b""
+    number, held, size = 0, list[bytes](), 0
     for piece in _pieces(path, most):
-        *whole, rest = (rest + piece).split(b"\n")
-        for line in whole:
+        begun, *more = piece.split(b"\n")
+        held.append(begun)
+        size += len(begun)
+        for following in more:
             number += 1
-            yield _line(line, path, number, longest, errors)
-        if len(rest) > longest:
+            yield _line(b"".join(held), path, number, longest, errors)
+            held, size = [following], len(following)
+        if size > longest:  # what follows makes it no shorter
             break
-    if rest or not number:
-        yield _line(rest, path, number + 1, longest, errors)
+    if size or not number:
+        yield _line(b"".join(held), path, number + 1, longest, errors)
 
 
 def _pieces(path: Path, most: int) -> Iterator[bytes]:
