@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from knowledge_base.cli.printing import change_form, clock_time, delta_lines, print_json_list, print_line, print_table
+from knowledge_base.cli.printing import (
+    change_form,
+    clock_time,
+    delta_lines,
+    print_json,
+    print_json_list,
+    print_line,
+    print_table,
+)
 from knowledge_base.cli.sources import Json, Store, opened_store
 
 if TYPE_CHECKING:
