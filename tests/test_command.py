@@ -135,7 +135,7 @@ def test_bad_input_is_told_to_programs_as_json(dsc, tmp_path):
         (["fly"], "No such command 'fly'", None),
         (["kb", "fly"], "No such command 'fly'", None),
         (["runs", "list"], "Missing argument 'FILE'", None),
-        (["run", "clean-up-table", "--store", "."], "is a folder; a store is a file", None),
+        (["run", "clean-up-table", "--store", "."], "is a folder, not a regular file", None),
     ],
 )
 def test_what_is_wrong_with_the_words_is_told_to_programs_as_json(dsc, words, message, nearest):

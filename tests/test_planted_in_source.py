@@ -228,9 +228,9 @@ BUGS = {
     "the newest key is forgotten": (
         MemoryHistory, "_remember", "next(iter(self._keys))", "key", exactly_the_last_keys_are_remembered),
     "a push is heard as often as it comes": (
-        Endpoint, "_heard", '["n"] > newest', '["n"] >= newest', a_push_is_heard_once),
+        Endpoint, "_heard", 'number > peer.newest', 'number >= peer.newest', a_push_is_heard_once),
     "a push of an earlier life is heard": (
-        Endpoint, "_heard", "if present and", "if", a_push_of_an_earlier_life_is_not_heard),
+        Endpoint, "_heard", 'and self._lives.get(sender) == said["life"] and', "and", a_push_of_an_earlier_life_is_not_heard),
     "an action is unknown while it is being stopped": (
         HostedActions, "_stop", "if action is not None", "self._actions.pop(_key(said), None)\n    if action is not None",
         stopping_is_over_when_things_are_in_order),

@@ -27,6 +27,9 @@ _KINDS = {
 _LOG_HEADS = (bytes.fromhex("377f0682002de21800001000"), bytes.fromhex("377f0683002de21800001000"), bytes(12))
 """A log with pages of 4 KiB begins with one of these; with zeros while it has its length, but no commit."""
 _INDEX_HEADS = ((3007000).to_bytes(4, "little"), (3007000).to_bytes(4, "big"), bytes(4), bytes(3), b"")
+_MAGIC = b"SQLite format 3\0"
+_SHORTEST = 512
+"""Bytes of the smallest database; what is shorter SQLite takes for an empty one."""
 _INDEX_PART = 32768
 """An index has a multiple of so many bytes; 3, for a moment, when SQLite begins it."""
 
@@ -54,12 +57,15 @@ def is_database(path: Path) -> bool:
     """Whether the file is an SQLite database, ours or not; nothing is created, changed or waited for."""
     try:
         found = path.stat()
-        if not (stat.S_ISREG(found.st_mode) and found.st_size):
+        if not stat.S_ISREG(found.st_mode):
             return False
+        if found.st_size < _SHORTEST:
+            return _begins_as_database(path)
         with closing(unlocked(path)) as connection:
             connection.execute("PRAGMA schema_version")
     except sqlite3.Error as error:
-        return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_CORRUPT
+        code = getattr(error, "sqlite_errorcode", None)
+        return code == sqlite3.SQLITE_CORRUPT or (code == sqlite3.SQLITE_NOTADB and _begins_as_database(path))
     except (OSError, ValueError):
         return False
     return True
@@ -162,6 +168,12 @@ def _head(path: Path, length: int) -> bytes | None:
 def _require(path: Path, store: Path, holds: object, reason: str) -> None:
     if not holds:
         raise foreign(path, store, reason)
+
+
+def _begins_as_database(path: Path) -> bool:
+    """Whether the file begins as a database does; to be asked of what SQLite cannot open: closing it loses locks."""
+    with path.open("rb") as file:
+        return file.read(len(_MAGIC)) == _MAGIC
 
 
 def _beside(path: Path) -> Path | None:

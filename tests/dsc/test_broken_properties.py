@@ -231,7 +231,11 @@ def test_a_chart_survives_scxml_but_for_the_spelling_of_its_conditions(plot):
         written = to_scxml(plot)
     except NotExpressibleError:
         return
-    again = parse_scxml(written)
+    try:
+        again = parse_scxml(written)
+    except NotExpressibleError as error:  # these charts also compute with truth values, which only ECMAScript does
+        assert "would be converted" in str(error)
+        return
     assert parse_scxml(to_scxml(again)) == again
     assert [name for name, _, _ in again.walk()] == [name for name, _, _ in plot.walk()]
 

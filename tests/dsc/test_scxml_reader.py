@@ -15,6 +15,7 @@ from dsc.text.scxml.document import MAX_DEPTH
 from dsc.text.scxml.ecmascript import condition, term
 from dsc.text.scxml.errors import NotExpressibleError
 from dsc.text.scxml.reader import parse_scxml
+from dsc.text.scxml.tokens import tokens
 from dsc.text.scxml.writer import to_scxml
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
@@ -160,7 +161,9 @@ REFUSED = [
     (cond("x === 1 / x", "<data id='x' expr='1'/>"), "only a number other than 0 divides"),
     (cond("--x === 1", "<data id='x' expr='1'/>"), "'--'"),
     (cond("x === 010", "<data id='x' expr='1'/>"), "octal"),
-    (cond("x === '\\u0041'", "<data id='x' expr='1'/>"), "escape by number"),
+    (cond("x === '\\101'", "<data id='x' expr='1'/>"), "has no counterpart"),
+    (cond("x === '\\u{41}'", "<data id='x' expr='1'/>"), "has no counterpart"),
+    (cond("x === '\\ud83d'", "<data id='x' expr='1'/>"), "half a character"),
     (cond("true", "<data id='x' expr='y + 1'/><data id='y' expr='1'/>"), "has none yet"),
     (cond("true", "<data id='x' expr='x'/>"), "has none yet"),
     (cond("true", "<data id='x'>[1]</data>"), "an array"),
@@ -283,3 +286,12 @@ def test_mistakes_are_said_with_file_and_line(body, message):
 def test_documents_that_are_none_or_too_much_are_refused(text):
     with pytest.raises(InputError):
         parse_scxml(text)
+
+
+@pytest.mark.parametrize(
+    ("literal", "text"),
+    [("\\u0041", "A"), ("\\x41", "A"), ("\\ud83d\\ude00", "\U0001f600"), ("a\\\\u0041", "a\\u0041"), ("\\v\\'", "\v'")],
+)
+def test_escapes_are_read_as_ecmascript_reads_them(literal, text):
+    (word, _) = tokens(f"'{literal}'", None)
+    assert (word.kind, word.text) == ("text", text)

@@ -48,11 +48,18 @@ def test_links_lead_to_the_store(store, tmp_path) -> None:
     assert store_owning(tmp_path / "loop") is None
 
 
+@pytest.mark.parametrize("size", [16, 100, 4096])
+def test_the_rest_of_a_damaged_store_is_one_still(tmp_path, size) -> None:
+    (tmp_path / "rest").write_bytes(b"SQLite format 3\0".ljust(size, b"\0"))
+    assert store_owning(tmp_path / "rest") == tmp_path / "rest"
+
+
 def test_what_is_no_database_belongs_to_no_store(tmp_path) -> None:
     (tmp_path / "text").write_text("SQLite format 3\n" * 100, encoding="utf-8")
     (tmp_path / "empty").touch()
+    (tmp_path / "short").write_text("x", encoding="utf-8")  # SQLite takes it for an empty database
     os.mkfifo(tmp_path / "fifo")  # to open it would wait for a writer
-    for name in ("text", "empty", "fifo", "fifo-wal", "missing", ".", "-wal", "n" * 300, "nul\0", "/dev/full"):
+    for name in ("text", "empty", "short", "fifo", "fifo-wal", "missing", ".", "-wal", "n" * 300, "nul\0", "/dev/full"):
         assert store_owning(tmp_path / name) is None
 
 

@@ -18,7 +18,7 @@ _WORDS = re.compile(
     re.VERBOSE,
 )
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v"}
-_BY_NUMBER = re.compile(r"(?<!\\)(?:\\\\)*\\[0-9ux]")
+_ESCAPE = re.compile(r"\\(u[0-9a-fA-F]{4}|x[0-9a-fA-F]{2}|[^0-9ux])")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +42,26 @@ def tokens(text: str, place: Place | None) -> list[Token]:
             raise NotExpressibleError("expression", f"'{text}' cannot be said in conditions and terms", place=place)
         kind = match.lastgroup or ""
         word = match[kind]
-        if kind == "text" and _BY_NUMBER.search(word):
-            raise NotExpressibleError("expression", f"an escape by number in {word} has no counterpart", place=place)
-        found.append(Token(kind, _unquoted(word) if kind == "text" else word))
+        found.append(Token(kind, _unquoted(word, place) if kind == "text" else word))
         at = match.end()
     return [*found, Token("end", "")]
 
 
-def _unquoted(word: str) -> str:
-    return re.sub(r"\\(.)", lambda escaped: _ESCAPES.get(escaped[1], escaped[1]), word[1:-1])
+def _unquoted(word: str, place: Place | None) -> str:
+    """The text that a literal stands for; two halves of a character that are written as two escapes are put together.
+
+    Raises:
+        NotExpressibleError: an escape is octal, in braces or cut short, or there is half a character.
+    """
+    inside = word[1:-1]
+    if "\\" in _ESCAPE.sub("", inside):
+        raise NotExpressibleError("expression", f"an escape in {word} has no counterpart", place=place)
+    text = _ESCAPE.sub(lambda escape: _character(escape[1]), inside)
+    try:
+        return text.encode("utf-16", "surrogatepass").decode("utf-16")
+    except UnicodeDecodeError:
+        raise NotExpressibleError("expression", f"{word} has half a character", place=place) from None
+
+
+def _character(escape: str) -> str:
+    return chr(int(escape[1:], 16)) if len(escape) > 1 else _ESCAPES.get(escape, escape)

@@ -86,21 +86,20 @@ def test_an_expression_of_a_browser_is_no_longer_than_its_bound(log, monkeypatch
         Answers(log).query({"seq": 1, "expression": "(clean o333)"})
 
 
-def test_a_question_ends_when_its_browser_leaves(log) -> None:
+def test_a_question_ends_when_its_browser_leaves(log, monkeypatch) -> None:
     """Formerly it went on in the thread that it had been given."""
-    viewer = Viewer(log, Entrance.on())
     begun, ended = threading.Event(), threading.Event()
-    real = viewer._answers.query
+    real = Answers.query
 
-    def query(asked, left):
+    def query(self, asked, left):
         begun.set()
         try:
-            return real(asked, left)
+            return real(self, asked, left)
         finally:
             ended.set()
 
-    viewer._answers.query = query
-    viewer._server.config.app = viewer._server.config.loaded_app = viewer.application()
+    monkeypatch.setattr(Answers, "query", query)
+    viewer = Viewer(log, Entrance.on())
     viewer.start()
     try:
         body = f'{{"seq": 1, "expression": "{NEST}"}}'
