@@ -15,6 +15,7 @@ from soak_judge import (
     AFTER_STOP,
     FALSE_CLAIM,
     HANGS,
+    HISTORY,
     NO_REPORT,
     STOPPED,
     TWICE,
@@ -38,6 +39,7 @@ from dsc.testing.crashes import Crashes
 from dsc.testing.faults import USUAL, Fault, Faults
 from dsc.testing.interleaving import Interleaving
 from dsc.testing.invariants import executed_once, kept_run
+from knowledge_base.errors import DamagedStoreError
 from planning import PlannerProcess
 from planning.engines.cache import CachingPlanner
 from planning.testing import FaultyPlanner
@@ -146,8 +148,13 @@ class Trial:
                 self._judge(report)
         except HangError as error:
             outcome.wrong.append((HANGS, str(error)))
+        except DamagedStoreError as error:  # nobody has damaged it: two programs have written two histories
+            outcome.wrong.append((HISTORY, str(error)))
         except Exception as error:  # noqa: BLE001  whatever it is, the seed is worth a look
-            outcome.wrong.append((NO_REPORT, f"{type(error).__name__}: {error}"))
+            if isinstance(error.__cause__, HangError):  # raised by an observer, whose errors are contained
+                outcome.wrong.append((HANGS, str(error.__cause__)))
+            else:
+                outcome.wrong.append((NO_REPORT, f"{type(error).__name__}: {error}"))
         outcome.wrong += [(TWICE, problem) for problem in self._crashes.problems]
         outcome.wrong += [(AFTER_STOP, problem) for problem in self._stop.problems]
         outcome.lives = self._crashes.life + 1
