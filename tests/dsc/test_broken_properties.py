@@ -233,8 +233,10 @@ def test_a_chart_survives_scxml_but_for_the_spelling_of_its_conditions(plot):
         return
     try:
         again = parse_scxml(written)
-    except NotExpressibleError as error:  # these charts also compute with truth values, which only ECMAScript does
-        assert "would be converted" in str(error)
+    except NotExpressibleError as error:
+        computes_with_truth_values = "would be converted" in str(error)  # only ECMAScript does that
+        if not computes_with_truth_values:
+            raise
         return
     assert parse_scxml(to_scxml(again)) == again
     assert [name for name, _, _ in again.walk()] == [name for name, _, _ in plot.walk()]

@@ -116,7 +116,7 @@ def test_a_folder_is_read_with_its_mistakes_named(tmp_path):
 @pytest.mark.parametrize(
     ("found", "said"),
     [
-        (ImportError("no module named robots"), "the bundle 'odd' of 'robots:odd' cannot be loaded: no module"),
+        (ImportError("no module named robots"), "the bundle 'odd' of 'robots:odd' cannot be loaded: ImportError: no module"),
         (5, "the entry point 'odd' of 'robots:odd' leads to 5, which is no Bundle"),
     ],
 )
