@@ -8,6 +8,8 @@ export interface Answer {
   readonly holds: boolean;
   readonly answers: readonly Readonly<Record<string, Value>>[];
   readonly version: number;
+  /** There are other answers besides these. */
+  readonly more?: boolean;
   readonly why?: Explanation;
 }
 
@@ -23,8 +25,15 @@ export interface Break {
   readonly on: string;
 }
 
+export interface Obeyed {
+  readonly ok: boolean;
+  readonly breaks?: readonly Break[];
+  /** Breakpoints that the run goes on without, each with the reason. */
+  readonly dropped?: readonly string[];
+}
+
 export const query = (seq: number, expression: string) => ask<Answer>("query", { seq, expression });
-export const control = (command: object) => ask<{ ok: boolean; breaks?: readonly Break[] }>("control", command);
+export const control = (command: object) => ask<Obeyed>("control", command);
 
 async function ask<T>(what: string, body: object): Promise<T> {
   return parsed(await (await post(what, body)).text()) as T;

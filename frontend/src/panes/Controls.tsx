@@ -11,11 +11,13 @@ const KINDS = [["state", "clear/execute"], ["event", "grasp_failed"], ["conditio
 export function Controls() {
   const { paused, live, selection } = useShown();
   const [breaks, setBreaks] = useState<readonly Break[]>([]);
+  const [dropped, setDropped] = useState<readonly string[]>([]);
   const [wrong, setWrong] = useState("");
   const send = useCallback((command: object) => {
     control(command).then((said) => {
       setWrong("");
       if (said.breaks) setBreaks(said.breaks);
+      setDropped(said.dropped ?? []);
     }, (error: Error) => setWrong(error.message));
   }, []);
   useEffect(() => send({ do: "breaks" }), [send]);
@@ -40,6 +42,7 @@ export function Controls() {
           <li key={one.number}>{one.on} <button aria-label={`Remove ${one.on}`} onClick={() => send({ do: "unbreak", number: one.number })}>✕</button></li>
         ))}
       </ul>
+      {dropped.map((one) => <p key={one} className="bad note" role="status">{`Dropped: ${one}`}</p>)}
       {path !== null && <button onClick={() => send({ do: "break", on: { state: path } })}>{`Add the selected state ${path}`}</button>}
       {step !== undefined && <button onClick={() => send({ do: "break", on: { plan_step: step } })}>{`Add the selected step ${step}`}</button>}
       <Choice kinds={KINDS} known={known} act={(kind, text) => send({ do: "break", on: { [kind]: text } })} verb="Add" wrong={setWrong} />

@@ -111,7 +111,7 @@ function Answers({ seq, text }: { seq: number; text: string }) {
   const { answer } = said;
   return (
     <div aria-label="Answers" aria-live="polite">
-      <p><b>{answer.variables.length ? `${answer.answers.length} answers` : answer.holds ? "true" : "false"}</b><span className="quiet">{` · version ${answer.version}`}</span></p>
+      <p><b>{answer.variables.length ? `${answer.answers.length} answers${answer.more ? ", and there are more" : ""}` : answer.holds ? "true" : "false"}</b><span className="quiet">{` · version ${answer.version}`}</span></p>
       {answer.why && <div role="tree" aria-label="Why"><Tree why={answer.why} decider={deciding(answer.why)} /></div>}
       {answer.variables.length > 0 && (
         <table className="known">
