@@ -1,8 +1,8 @@
 """Memory of a long run in simulated time: flat after its first tenth, without a store, with one, and with a trace file.
 
 `python benchmarks/memory.py [--events N] [--json] [--ways W ...]` lives 24 simulated hours of a robot on watch: skills
-with reports, an observed fact that changes, periods, timeouts that are cancelled, failures that a rule answers, and
-plans. It prints the memory at each tenth; exit status 1 if the last nine tenths grow by more than `MOST`.
+with reports, an observed fact that changes, periods, timeouts that are cancelled, and failures that a rule answers.
+It prints the memory at each tenth; exit status 1 if the last nine tenths grow by more than `MOST`.
 """
 
 from __future__ import annotations

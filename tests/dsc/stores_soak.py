@@ -128,6 +128,7 @@ class Original:
         closed: whether its writer has closed it.
         resume: goes on with its run in a folder, and raises `WrongError` if that ends otherwise than it should.
         earlier: folders with the same store as it was before.
+        earlier_file: whether one of these files has taken its place.
     """
 
     name: str
@@ -138,6 +139,12 @@ class Original:
     answers: dict[str, Any] = field(default_factory=dict)
     keys: dict[str, int] = field(default_factory=dict)
     schemas: set[str] = field(default_factory=set)
+    earlier_file: bool = False
+
+    @property
+    def store(self) -> str:
+        """Which store it is, at whatever moment."""
+        return self.name.partition(",")[0]
 
     def learn(self, scratch: Path) -> Original:
         """Ask every reader while all is well."""
@@ -191,7 +198,7 @@ def _knowledge_stores(folder: Path, changes: int) -> list[Original]:
                 if number == 1:
                     kb.compact(keep_since=changes + 2)
                     kb.apply(Delta(added=(fact("p"),)), "c", key="after")
-                    made.append(Original("knowledge, compacted, not closed", copied(home, folder / "compacted"), closed=False))
+                    made.append(Original("knowledge 1, compacted, not closed", copied(home, folder / "compacted"), closed=False))
             made.append(Original(f"knowledge {number}, closed", home, closed=True, earlier=earlier[-2:]))
     finally:
         journal.SNAPSHOT_AFTER = was
@@ -325,7 +332,8 @@ def page_of_another(path: Path, one: Original, others: list[Original], random: R
 
 
 def log_of_another(path: Path, one: Original, others: list[Original], random: Random) -> str:
-    logs = [log for other in others for log in [other.folder / f"{NAME}-wal"] if log.exists() and log.stat().st_size]
+    strangers = [other for other in others if other.store != one.store]  # a later log of its own is a later moment
+    logs = [log for other in strangers for log in [other.folder / f"{NAME}-wal"] if log.exists() and log.stat().st_size]
     logs += [log for folder in one.earlier for log in [folder / f"{NAME}-wal"] if log.exists()]
     log = random.choice(logs)
     shutil.copy(log, path.with_name(NAME + "-wal"))
@@ -338,7 +346,7 @@ def file_of_earlier(path: Path, one: Original, others: list[Original], random: R
         return page_of_another(path, one, others, random)
     source = random.choice(one.earlier)
     shutil.copy(source / NAME, path)
-    one.closed = False  # so it is as it was then
+    one.closed, one.earlier_file = False, True  # so it is as it was then, with what was forgotten since
     return f"main file of {source.name} beside the -wal"
 
 
@@ -502,6 +510,10 @@ class Judge:
             raise WrongError("changes are missing")
         if found["schema"] not in (one.schemas if not one.closed else {was["schema"]}):
             raise WrongError("another schema")
+        if one.earlier_file and found["oldest"] < was["oldest"]:
+            if any(was["worlds"].get(version, world) != world for version, world in found["worlds"].items()):
+                raise WrongError("another world")
+            return
         if found["oldest"] != was["oldest"] or found["changes"] != was["changes"][: len(found["changes"])]:
             raise WrongError("another history")
         for part in ("worlds", "times"):
