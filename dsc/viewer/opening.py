@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsc.viewer.records import read_trace
-from knowledge_base.cli.sources import is_store
+from knowledge_base.journal.neighbours import is_database
 
 if TYPE_CHECKING:
     from dsc.viewer.records import RecordLog
@@ -23,7 +23,7 @@ def records_of(path: Path) -> Iterator[RecordLog]:
     Raises:
         InputError: there is no such file, or it is neither a trace nor a store.
     """
-    if is_store(path):
+    if is_database(path):
         from dsc.sequencer.run_tables import has_run  # noqa: PLC0415  a trace needs no store
         from dsc.viewer.kept_runs import following_run  # noqa: PLC0415
         from dsc.viewer.stores import following_store  # noqa: PLC0415

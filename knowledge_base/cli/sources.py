@@ -76,13 +76,6 @@ def writable(store: Path) -> Iterator[KnowledgeBase]:
         yield kb
 
 
-def is_store(path: Path) -> bool:
-    """Whether the file is a database."""
-    from knowledge_base.journal.neighbours import is_database
-
-    return is_database(path)
-
-
 def domain_of(problem: Path) -> Path:
     """Where a problem's domain is, if nobody names it."""
     return problem.parent / "domain.pddl"
@@ -90,10 +83,11 @@ def domain_of(problem: Path) -> Path:
 
 def _opened(source: Path, domain: Path | None) -> Opened:
     from knowledge_base.exchange.json import MAX_WORLD_BYTES
+    from knowledge_base.journal.neighbours import is_database
     from knowledge_base.pddl.files import MAX_BYTES, decoded, read_bytes, require_size
     from knowledge_base.store import KnowledgeBase
 
-    if is_store(source):
+    if is_database(source):
         return Opened(KnowledgeBase.open(None, source, read_only=True))
     if source.suffix in readers:
         return Opened(readers[source.suffix](source))

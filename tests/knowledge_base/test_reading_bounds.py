@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 from knowledge_base import KnowledgeBase
 from knowledge_base.cli.app import app
-from knowledge_base.cli.sources import is_store
 from knowledge_base.errors import InputError, ParseError, SchemaError
+from knowledge_base.journal.neighbours import is_database
 from knowledge_base.pddl import files
 from knowledge_base.pddl.domain_text import MOST_IMPLIED, parse_domain
 from knowledge_base.world.schema import MAX_TYPE_DEPTH, MAX_TYPES, Schema
@@ -84,7 +84,7 @@ def test_a_pipe_is_read_once_as_a_file_is(tmp_path):
     for content, kind in ((PROBLEM, "pddl"), (KnowledgeBase(Schema.parse(DOMAIN)).to_json(), "json")):
         pipe = tmp_path / f"pipe.{kind}"
         os.mkfifo(pipe)
-        assert not is_store(pipe)
+        assert not is_database(pipe)
         writer = threading.Thread(target=pipe.write_text, args=(content,))
         writer.start()
         result = CliRunner().invoke(app, ["show", str(pipe), "--json"])
