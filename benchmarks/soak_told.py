@@ -6,7 +6,7 @@ exactly, also that of items which others have moved since.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from domains.clean_up_table.faults import ITEM_MOVED
@@ -44,9 +44,10 @@ class Told:
         heard = set()
         for step in run.steps:
             heard.add(self._take(step.message))
+            looked = step.message.get("outcome") == "recognised"
             for record in step.records:
                 if record.type == "knowledge" and record.data["author"] == CHART:
-                    self._conclude(record.data.get("added", ()))
+                    self._conclude(record.data.get("added", ()), looked=looked)
         for action_id, items in self._moves.items():
             if action_id not in heard:
                 self.stale.update(items)
@@ -114,11 +115,14 @@ class Told:
         for item, where in seen.items():
             self._is_at(item, where)
 
-    def _conclude(self, added: Iterator[list[str]]) -> None:
-        """What the plots themselves make of it: they may give up an item that was looked for in vain."""
-        for predicate, *args in added:
-            if predicate == "missing":
-                self._is_lost(*args)
+    def _conclude(self, added: Iterable[list[str]], *, looked: bool) -> None:
+        """What the plots themselves make of it: they may give up an item that was looked for in vain.
+
+        What they make of a look is worked out here as well, but for items in what was missing before.
+        """
+        for item in (one[1] for one in added if one[0] == "missing"):
+            if not looked or self.where.get(item) in self.missing:
+                self._is_lost(item)
 
     def _is_at(self, item: str, where: str) -> None:
         self.where[item] = where

@@ -193,14 +193,7 @@ def _wired(
     store: Path | None = None,
     durability: Durability = "process",
 ) -> CleanUpTable:
-    def believed(surface: str) -> list[str]:
-        knowledge = executive.knowledge
-        lying = [str(found["item"]) for found in knowledge.query("(lies-at ?item ?at)", {"at": surface})]
-        for item in lying:  # grows: what is in an item is where the item is
-            lying += [str(found["inner"]) for found in knowledge.query("(inside ?inner ?item)", {"item": item})]
-        return lying
-
-    components = robot(profile)(world, believed)
+    components = robot(profile)(world)
     configure(components, profile)
     executive = Executive(
         domain(), library() if profile is None else adapted(plots(), profile), components, None, planner,
@@ -214,18 +207,14 @@ def _wired(
     return deployed
 
 
-Believed = Callable[[str], list[str]]
-"""The items that the robot believes to lie on a surface."""
-
-
-def on_wheels(world: World, believed: Believed) -> list[Component]:
+def on_wheels(world: World) -> list[Component]:
     """A base on wheels, an arm with a hand."""
-    return [Base(world), Arm(world), Camera(world, believed), Voice(world)]
+    return [Base(world), Arm(world), Camera(world), Voice(world)]
 
 
-def on_tracks(world: World, believed: Believed) -> list[Component]:
+def on_tracks(world: World) -> list[Component]:
     """A base on tracks, an arm that holds by suction; see `second_robot`."""
-    return [Tracks(world), SuctionArm(world), PatientCamera(world, believed), Voice(world)]
+    return [Tracks(world), SuctionArm(world), PatientCamera(world), Voice(world)]
 
 
 ROBOTS = {"on_wheels": on_wheels, "on_tracks": on_tracks}
@@ -233,7 +222,7 @@ ROBOTS = {"on_wheels": on_wheels, "on_tracks": on_tracks}
 PROFILES = HOME / "profiles"
 
 
-def robot(profile: Profile | None) -> Callable[[World, Believed], list[Component]]:
+def robot(profile: Profile | None) -> Callable[[World], list[Component]]:
     """What makes the components of the robot that a profile names; raises `UnknownNameError`."""
     name = "on_wheels" if profile is None or profile.robot is None else profile.robot
     if name not in ROBOTS:

@@ -24,6 +24,7 @@
     (graspable ?i - item)
     (passable ?p - place)
     (seen ?i - item)
+    (in-view ?i - item)         ; in the last look
     (missing ?i - item)
     (tidy ?i - item)
     (disposed ?i - item))

@@ -14,7 +14,7 @@ from domains.clean_up_table.places import PLACES, SURFACES, TYPES
 from knowledge_base.facts import Delta, Fact, fact
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from domains.clean_up_table.results import Result, Sighting
     from domains.clean_up_table.world import World
@@ -66,17 +66,10 @@ def initial_knowledge(world: World) -> Delta:
     return notes.delta()
 
 
-def learned(result: Result, believed: Callable[[str], Iterable[str]] = lambda _surface: ()) -> Delta:
-    """What the robot learns from the result of any verb.
-
-    Args:
-        result: what the world answered.
-        believed: the items that the robot believes to lie on a surface; a look misses those it does not see.
-    """
+def learned(result: Result) -> Delta:
+    """What the robot learns from the result of any verb."""
     notes = _Notes()
-    if result.outcome == "recognised":
-        _recognised(notes, result, believed(str(result.attributes["surface"])))
-    elif result.outcome in _LEARNED:
+    if result.outcome in _LEARNED:
         _LEARNED[result.outcome](notes, result)
     return notes.delta()
 
@@ -165,24 +158,19 @@ def _gone(notes: _Notes, result: Result) -> None:
     notes.holds("missing", item)
 
 
-def _recognised(notes: _Notes, result: Result, believed: Iterable[str]) -> None:
-    (surface,) = _names(result, "surface")
+def _recognised(notes: _Notes, result: Result) -> None:
     for sighting in result.sightings:
         _sighted(notes, sighting)
     for item, carrier in result.fits:
         notes.holds("fits", item, carrier)
     _rooms(notes, result)
-    there = {sighting.item for sighting in result.sightings}
-    for item in believed:
-        if item not in there:
-            notes.holds_not("lies-at", item, surface)
-            notes.holds("missing", item)
 
 
 def _sighted(notes: _Notes, sighting: Sighting) -> None:
     item = sighting.item
     notes.nodes[item] = sighting.kind
     notes.holds("seen", item)
+    notes.holds("in-view", item)
     notes.known(item)
     if sighting.where in SURFACES:
         notes.holds_only("lies-at", item, sighting.where, of=SURFACES)
@@ -225,6 +213,7 @@ def _names(result: Result, *attributes: str) -> tuple[str, ...]:
 
 
 _LEARNED = {
+    "recognised": _recognised,
     "arrived": _arrived,
     "no_path": _no_path,
     "slipped": _slipped,

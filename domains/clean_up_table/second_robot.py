@@ -15,6 +15,7 @@ from domains.clean_up_table.skills import (
     Camera,
     again,
     drives,
+    outcome_of,
     picks_up,
     recognises,
     seconds,
@@ -47,7 +48,7 @@ class Tracks(Base):
         if result.outcome == "no_path":
             await call.clock.sleep(self.parameters["patience"])
             result = self.world.drive(again(call.action_id), to)
-        return self.outcome_of(result)
+        return outcome_of(result)
 
 
 class SuctionArm(Arm):
@@ -83,7 +84,7 @@ class SuctionArm(Arm):
         if result.outcome == "grasp_failed":
             await call.clock.sleep(pumping)
             result = grasp(again(call.action_id))
-        return self.outcome_of(result)
+        return outcome_of(result)
 
 
 class PatientCamera(Camera):
@@ -97,4 +98,4 @@ class PatientCamera(Camera):
         if result.outcome == "nothing_found":
             await call.clock.sleep(self.parameters["recognising"])
             result = self.world.recognise(again(call.action_id), surface)
-        return self.outcome_of(result)
+        return outcome_of(result)

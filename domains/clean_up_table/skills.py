@@ -17,8 +17,6 @@ from dsc.components.parameters import Parameter
 from dsc.skills import skill
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
     from domains.clean_up_table.results import Result
     from domains.clean_up_table.world import World
     from dsc.skills import AfterCrash
@@ -100,15 +98,11 @@ class Part(Component):
         super().__init__(name)
         self.world = world
 
-    def outcome_of(self, result: Result) -> Outcome:
-        """What a skill of this part ends with when the world has answered."""
-        return outcome_of(result)
-
     async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
         """Nothing goes on by itself here; what was done is done."""
         self.world.catch_up()
         results = [self.world.done.get(one) for one in (again(action_id), action_id)]
-        return next((Ended(self.outcome_of(result)) for result in results if result is not None), None)
+        return next((Ended(outcome_of(result)) for result in results if result is not None), None)
 
 
 class Base(Part):
@@ -189,32 +183,16 @@ class Arm(Part):
 
 
 class Camera(Part):
-    """The camera, which also reports what it misses.
-
-    Args:
-        world: what it looks at.
-        believed: the items that the robot believes to lie on a surface, asked at the moment of the look.
-        name: how charts address it.
-    """
+    """The camera, which reports what it sees; what it should have seen is the plots' business."""
 
     name = "camera"
     declares: ClassVar[Mapping[str, Parameter]] = {"recognising": seconds(2.0), "looking": seconds(1.5)}
-
-    def __init__(
-        self, world: World, believed: Callable[[str], Iterable[str]], name: str | None = None
-    ) -> None:
-        super().__init__(world, name)
-        self.believed = believed
-
-    def outcome_of(self, result: Result) -> Outcome:
-        """What should have been seen is missing."""
-        return outcome_of(result, self.believed)
 
     @recognises
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
         """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
         await call.clock.sleep(self.parameters["recognising"])
-        return self.outcome_of(self.world.recognise(call.action_id, surface))
+        return outcome_of(self.world.recognise(call.action_id, surface))
 
     @skill(
         outcomes={"looked": CARRIER_AT, "gone": ITEM_AT, "not_possible": NOT_POSSIBLE},
@@ -247,7 +225,7 @@ def again(action_id: str) -> str:
     return f"{action_id}/again"
 
 
-def outcome_of(result: Result, believed: Callable[[str], Iterable[str]] = lambda _surface: ()) -> Outcome:
-    """What a skill ends with when the world has answered; `believed` is asked for what a look should have shown."""
+def outcome_of(result: Result) -> Outcome:
+    """What a skill ends with when the world has answered."""
     attributes = {k: list(v) if isinstance(v, tuple) else v for k, v in result.attributes.items()}
-    return Outcome(result.outcome, attributes, learned(result, believed))
+    return Outcome(result.outcome, attributes, learned(result))

@@ -57,7 +57,7 @@ def parse_condition(text: str | Node, source: str | None = None) -> Expression:
     Raises:
         ParseError: the form is wrong; it says where and what was expected.
     """
-    group = _group(_only(text, source, "condition"), "a condition")
+    group = _group(_only(text, source, "a condition"), "a condition")
     if not group.items:
         return And((), place=group.place)
     head, args = _head(group, "a predicate or one of " + " ".join(KEYWORDS)), group.items[1:]
@@ -72,7 +72,7 @@ def parse_effect(text: str | Node, source: str | None = None) -> Effect:
     Raises:
         ParseError: the form is wrong, or a word of conditions (`or`, `exists`) is used as an effect.
     """
-    group = _group(_only(text, source, "effect"), "an effect")
+    group = _group(_only(text, source, "an effect"), "an effect")
     if not group.items:
         return AllOf((), place=group.place)
     head, args = _head(group, "a predicate or one of " + " ".join(EFFECT_KEYWORDS)), group.items[1:]
@@ -89,7 +89,7 @@ def parse_term(text: str | Node, source: str | None = None) -> Term:
     Raises:
         ParseError: the form is wrong.
     """
-    node = _only(text, source, "term")
+    node = _only(text, source, "a term")
     return _simple_term(node) if isinstance(node, Word) else _compound_term(node)
 
 
@@ -97,12 +97,12 @@ def _only(text: str | Node, source: str | None, kind: str) -> Node:
     if isinstance(text, Word | Group):
         return text
     if not isinstance(text, str):
-        raise ParseError(f"a {kind} is written as text, not as {text!r}", place=Place(source))
+        raise ParseError(f"{kind} is written as text, not as {text!r}", place=Place(source))
     nodes = read(text, source)
     if not nodes:
-        raise ParseError(f"the text is empty where a {kind} is expected", place=Place(source, 1, 1))
+        raise ParseError(f"the text is empty where {kind} is expected", place=Place(source, 1, 1))
     if len(nodes) > 1:
-        raise ParseError(f"one {kind} is expected, and here a second begins", place=nodes[1].place)
+        raise ParseError(f"{kind} is expected, and here a second begins", place=nodes[1].place)
     return nodes[0]
 
 

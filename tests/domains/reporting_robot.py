@@ -38,7 +38,7 @@ class Robot:
         self.facts: set[Fact] = set()
         self.values: dict[Fact, float] = {}
         self.types: dict[str, str] = dict.fromkeys(("none", "one", "two"), "room")
-        self.components = [Base(world), Arm(world), Camera(world, self.lying), Voice(world)]
+        self.components = [Base(world), Arm(world), Camera(world), Voice(world)]
         self.calls = 0
         self.learn(initial_knowledge(world))
 
@@ -63,7 +63,14 @@ class Robot:
         assert set(outcome.attributes) == set(declared[outcome.event])
         json.dumps(outcome.attributes)
         self.learn(outcome.observed)
+        if outcome.event == "recognised":
+            self.miss(*set(self.lying(arguments["surface"])) - {f.args[0] for f in outcome.observed.added if f.predicate == "in-view"})
         return outcome
+
+    def miss(self, *items: str) -> None:
+        """What the plot of a look makes of items that it did not show."""
+        nowhere = [f for f in self.facts if f.predicate == "lies-at" and f.args[0] in items]
+        self.learn(Delta(removed=tuple(nowhere), added=tuple(fact("missing", item) for item in items)))
 
 
 def finish(skill: Coroutine[None, None, Outcome]) -> Outcome:

@@ -29,9 +29,9 @@ def planners():
     made.close()
 
 
-def lived(seed, planners, **how):
+def lived(seed, planners, faults=FAULTS, **how):
     with tempfile.TemporaryDirectory(dir=soak.MEMORY if soak.MEMORY.is_dir() else None) as folder:
-        return Trial(seed, FAULTS, planners, Path(folder), **how).run()
+        return Trial(seed, faults, planners, Path(folder), **how).run()
 
 
 @pytest.mark.parametrize("first", range(0, 300, CHUNK))
@@ -48,6 +48,10 @@ def test_every_promise_holds_in_every_run(first, planners):
 @pytest.mark.parametrize("seed", [1193, 3193, 4208])
 def test_what_was_done_just_before_an_operator_stopped_it_is_known_after_a_crash(seed, planners):
     assert lived(seed, planners).wrong == []
+
+
+def test_what_somebody_says_while_the_camera_looks_is_not_forgotten(planners):
+    assert lived(2800, planners, faults=0.3).wrong == []
 
 
 def test_the_same_seed_is_the_same_run(planners):

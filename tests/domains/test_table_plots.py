@@ -24,14 +24,14 @@ from dsc.testing import (
 )
 
 LIBRARY = Library(plots())
-ROBOT = (Base(make_world()), Arm(make_world()), Camera(make_world(), list), Voice(make_world()))
+ROBOT = (Base(make_world()), Arm(make_world()), Camera(make_world()), Voice(make_world()))
 DOMAIN = HOME / "domain.pddl"
-ITEMS = "cup1 cup2 - cup table floor - surface bin sink - destination"
+ITEMS = "cup1 cup2 cup3 cup4 - cup table floor - surface bin sink - destination"
 FACTS = "(lies-at cup1 table) (lies-at cup2 table) (inside cup2 cup1) (seen cup1)"
 
 ARRIVED = Answer("arrived", {"to": "table"}, after=5)
 BLOCKED = Answer("no_path", {"to": "table"}, observed="(increase (detours ?to) 1)")
-SEEN = Answer("recognised", {"surface": "table", "count": 2})
+SEEN = Answer("recognised", {"surface": "table", "count": 2}, observed="(and (in-view cup1) (in-view cup2))")
 NOTHING = Answer("nothing_found", {"surface": "table"})
 STUCK = Answer("not_possible", {"reason": "the wheels are stuck"})
 SLIPPED = Answer("slipped", {"item": "cup1", "surface": "floor", "to": "table"})
@@ -62,6 +62,29 @@ def test_only_the_fourth_look_in_a_row_that_finds_nothing_is_believed():
     assert told(run.steps[-1], "(and (missing cup1) (not (lies-at cup1 table)) (missing cup2))")
 
 
+def looked(observed, facts=FACTS):
+    answer = Answer("recognised", {"surface": "table", "count": 1}, observed=observed)
+    return rehearsed("recognise", {"surface": "table"}, {"camera.recognise": [answer]}, facts=facts)
+
+
+def missing(run):
+    return sorted(str(item) for (item,) in run.knowledge.match("missing", (None,)))
+
+
+def test_what_is_not_in_view_is_missing_from_the_outermost_carrier_inwards():
+    stacked = FACTS + " (inside cup3 cup2) (lies-at cup4 floor) (in-view cup1)"
+    assert missing(looked("(and)", stacked)) == ["cup1", "cup2", "cup3"]
+    run = looked("(and (in-view cup1) (in-view cup2))", stacked)
+    assert missing(run) == ["cup3"]
+    assert run.emitted == (Event("recognised", {"surface": "table", "count": 1}),)
+
+
+def test_what_somebody_said_while_the_camera_looked_is_not_forgotten():
+    """The item was on the table when the look began; by its end it is known to be elsewhere."""
+    run = looked("(and (in-view cup1) (in-view cup2) (not (lies-at cup3 table)) (lies-at cup3 floor))", FACTS + " (lies-at cup3 table)")
+    assert not run.knowledge.ask("(missing cup3)")
+
+
 def test_a_way_that_is_blocked_is_planned_round_and_then_given_up():
     run = search([BLOCKED, BLOCKED, ARRIVED], [SEEN])
     assert chose(run, "approach", "drive_planned")
@@ -83,6 +106,7 @@ def test_an_item_that_slips_on_the_way_does_not_keep_the_robot_from_looking():
 def test_every_state_transition_and_rule_of_a_search_is_reached():
     coverage = Coverage(LIBRARY, only=["search", "recognise"])
     runs = [([ARRIVED], [NOTHING] * 4), ([BLOCKED] * 5, []), ([STUCK], []), ([ARRIVED], [STUCK]), ([SLIPPED, ARRIVED], [SEEN])]
+    runs.append(([ARRIVED], [Answer("recognised", {"surface": "table", "count": 1}, observed="(and (in-view cup1) (not (lies-at cup2 table)))")]))
     for drives, looks in runs:
         coverage.add(*search(drives, looks).steps)
     assert [str(item) for item in coverage.missing()] == [

@@ -66,8 +66,8 @@ def test_a_thing_is_taken_back_by_any_of_its_types(kb) -> None:
         ("(on mug)", "SAID 1:1:1: 'on' takes 2 arguments, as in (on ?c - cup ?s - surface); found 1"),
         ("(on ?x table)", "SAID 1:1:5: the variable '?x' is not bound"),
         ("(or (clean mug))", "SAID 1:1:1: 'or' is no effect"),
-        ("clean mug", "SAID 1:1:7: one effect is expected, and here a second begins"),
-        ("", "SAID 1:1:1: the text is empty where a effect is expected"),
+        ("clean mug", "SAID 1:1:7: an effect is expected, and here a second begins"),
+        ("", "SAID 1:1:1: the text is empty where an effect is expected"),
     ],
 )
 def test_what_cannot_be_told_says_where_and_why(kb, statement: str, message: str) -> None:
