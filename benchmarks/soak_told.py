@@ -16,6 +16,7 @@ from domains.clean_up_table.results import Result
 from domains.clean_up_table.world import World
 from dsc.sequencer.reactor import CHART
 from dsc.testing.invariants import KeptRun
+from dsc.trace import Record
 from knowledge_base.facts import Fact, fact
 
 _PLACED = {"put_down": "surface", "stacked": "carrier", "slipped": "surface"}
@@ -43,11 +44,11 @@ class Told:
         self._moves = {one.action_id: one.items for one in world.fired if one.kind == ITEM_MOVED}
         heard = set()
         for step in run.steps:
-            heard.add(self._take(step.message))
-            looked = step.message.get("outcome") == "recognised"
+            compared = any(map(_compares, step.records))
+            heard.add(self._take(step.message, compared=compared))
             for record in step.records:
                 if record.type == "knowledge" and record.data["author"] == CHART:
-                    self._conclude(record.data.get("added", ()), looked=looked)
+                    self._conclude(record.data.get("added", ()), compared=compared)
         for action_id, items in self._moves.items():
             if action_id not in heard:
                 self.stale.update(items)
@@ -73,11 +74,11 @@ class Told:
             if item not in self.missing | self.stale and where != is_at:
                 yield f"it was told that {item} is at {where}, and it is at {is_at}"
 
-    def _take(self, message: Mapping[str, Any]) -> str | None:
+    def _take(self, message: Mapping[str, Any], *, compared: bool) -> str | None:
         """The id of the action whose answer it is, if it is one that the world gave."""
         match message:
             case {"late": _, "message": inner}:
-                return self._take(inner)
+                return self._take(inner, compared=compared)
             case {"change": change}:
                 for predicate, *args in change.get("added", ()):
                     if predicate == "lies-at":
@@ -86,15 +87,15 @@ class Told:
                 result = self._world.done.get(action_id)
                 if result is not None and result.outcome == outcome:
                     self.stale.update(self._moves.get(action_id, ()))
-                    self._acted(result)
+                    self._acted(result, compared=compared)
                     return str(action_id)
         return None
 
-    def _acted(self, result: Result) -> None:
+    def _acted(self, result: Result, *, compared: bool) -> None:
         said = {name: str(value) for name, value in result.attributes.items()}
         match result.outcome:
             case "recognised":
-                self._looked(result, said["surface"])
+                self._looked(result, said["surface"], compared=compared)
             case "picked_up" | "taken_out":
                 self._is_at(said["item"], HAND)
             case "put_down" | "stacked" | "slipped":
@@ -108,20 +109,22 @@ class Told:
             case "gone":
                 self._is_lost(said["item"])
 
-    def _looked(self, result: Result, surface: str) -> None:
+    def _looked(self, result: Result, surface: str, *, compared: bool) -> None:
+        """Sightings are known however late the answer comes; an item is missed only while a plot compares."""
         seen = {one.item: one.where for one in result.sightings}
         for item in [item for item in self.where if item not in seen and self._outermost(item) == surface]:
-            self._is_lost(item)
+            if compared:
+                self._is_lost(item)
         for item, where in seen.items():
             self._is_at(item, where)
 
-    def _conclude(self, added: Iterable[list[str]], *, looked: bool) -> None:
+    def _conclude(self, added: Iterable[list[str]], *, compared: bool) -> None:
         """What the plots themselves make of it: they may give up an item that was looked for in vain.
 
         What they make of a look is worked out here as well, but for items in what was missing before.
         """
         for item in (one[1] for one in added if one[0] == "missing"):
-            if not looked or self.where.get(item) in self.missing:
+            if not compared or self.where.get(item) in self.missing:
                 self._is_lost(item)
 
     def _is_at(self, item: str, where: str) -> None:
@@ -138,3 +141,9 @@ class Told:
     def _outermost(self, item: str) -> str | None:
         where = self.where.get(item)
         return self._outermost(where) if where in self.where else where
+
+
+def _compares(record: Record) -> bool:
+    """Whether a plot takes the answer of a look."""
+    steps = record.data["microsteps"] if record.type == "step" else ()
+    return any(one["event"] == "recognised" and one["taken"] for one in steps)
