@@ -52,8 +52,10 @@ def main():
     for name in sorted(medians, key=medians.get, reverse=True)[:SHOWN]:
         print(f"{1000 * medians[name]:7.0f} ms   {1000 * max(times[name]):7.0f} ms   {name}")
     middle, largest, longest = statistics.median(medians.values()), max(medians.values()), max(map(max, times.values()))
-    print(f"{len(files)} files, {runs} runs of each: median {1000 * middle:.0f} ms, "
-          f"largest median {1000 * largest:.0f} ms, longest {1000 * longest:.0f} ms")
+    print(
+        f"{len(files)} files, {runs} runs of each: median {1000 * middle:.0f} ms, "
+        f"largest median {1000 * largest:.0f} ms, longest {1000 * longest:.0f} ms"
+    )
 
 
 if __name__ == "__main__":

@@ -9,8 +9,8 @@ from typing import Any
 from peers.dsc import KNOWLEDGE, Ready, ready
 from timing import Job
 
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.events import Event
 from dsc.model.plot import ActionPlot

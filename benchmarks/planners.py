@@ -31,10 +31,10 @@ from planning.engines.planner import PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, installed
 from planning.engines.request import written
-from planning.generation.plot import plot_from_plan
-from planning.ordering.order import deordered
+from planning.generation.plan_to_plot import plot_from_plan
+from planning.ordering.partial_order import deordered
 from planning.plan import Plan, PlanFound
-from planning.posing.problem import Poser, pose
+from planning.problem.construction import ProblemBuilder, build_problem
 from planning.strips import Problem
 
 PAGE = Path(__file__).parents[1] / "docs" / "engines.md"
@@ -84,7 +84,7 @@ def row(items: int, rounds: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "problem.pddl"
         file.write_text(set_table.problem_text(items), encoding="utf-8")
-        racing = _racing(pose(set_table.domain(), set_table.world(items), set_table.GOAL), rounds)
+        racing = _racing(build_problem(set_table.domain(), set_table.world(items), set_table.GOAL), rounds)
         for _ in range(rounds):
             for name in names:
                 if not answers[name] or answers[name][-1].seconds is not None:
@@ -147,13 +147,13 @@ def _racing(problem: Problem, rounds: int) -> list[Answer]:
 def part_row(items: int, rounds: int) -> dict[str, Any]:
     """Everything that is not the engine's own work, in ms; the medians."""
     domain, world, goal = set_table.domain(), set_table.world(items), set_table.GOAL
-    poser = Poser(domain)
-    problem = poser.pose(world, goal)
+    builder = ProblemBuilder(domain)
+    problem = builder.build_problem(world, goal)
     plan = _plan(problem)
     order, request = deordered(plan, domain, world, goal), written(problem)
     parts: dict[str, Callable[[], object]] = {
-        "pose, cold": lambda: Poser(domain).pose(world, goal),
-        "pose, warm": lambda: poser.pose(world, goal),
+        "pose, cold": lambda: ProblemBuilder(domain).build_problem(world, goal),
+        "pose, warm": lambda: builder.build_problem(world, goal),
         "write": lambda: written(replace(problem)),
         "translate": lambda: sas(json.loads(request)),
         "validate, de-order": lambda: deordered(plan, domain, world, goal),
@@ -177,7 +177,7 @@ def whole_row(items: int) -> dict[str, Any]:
 
 def optimal_row(items: int) -> dict[str, Any]:
     """Trips next to the fewest there can be, which an optimal engine finds when trips alone cost."""
-    problem = pose(set_table.domain(), set_table.world(items), set_table.GOAL)
+    problem = build_problem(set_table.domain(), set_table.world(items), set_table.GOAL)
     actions = tuple(replace(a, cost=_trip_cost(a.step)) for a in problem.actions)
     priced = replace(problem, unsliced=None, actions=actions)
     fewest = asyncio.run(_solved("fast-downward-opt", priced))

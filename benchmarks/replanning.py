@@ -34,7 +34,7 @@ PARTS = (
 OURS = tuple(part for part in PARTS if part != "engine")
 _HERE = tuple(part for part in OURS if part != "translate")  # that the engine's process does
 _WRAPPED = (
-    (search, "mending", "mend"), (search, "pose", "pose"), (search, "deordered", "validate, de-order"),
+    (search, "mending", "mend"), (search, "build_problem", "pose"), (search, "deordered", "validate, de-order"),
     (asking, "written", "write"),
     (plotting, "deordered", "validate, de-order"), (plotting, "laid_out", "generate"),
     (plotting, "plot_of", "generate"),
@@ -84,7 +84,14 @@ class _Robot(Component):
 
     @skill(outcomes={"did": {}, "failed": {}})
     async def act(
-        self, call: SkillCall, action: str, a: str = "", b: str = "", c: str = "", d: str = "", e: str = ""  # noqa: ARG002
+        self,
+        call: SkillCall,  # noqa: ARG002
+        action: str,
+        a: str = "",
+        b: str = "",
+        c: str = "",
+        d: str = "",
+        e: str = "",
     ) -> Outcome:
         now = time.process_time()
         if self._since and self._failed == 2 and self.found is None:

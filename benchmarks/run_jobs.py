@@ -12,8 +12,8 @@ from timing import Job
 
 from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Start
 from dsc.events import Event

@@ -32,7 +32,7 @@ from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from knowledge_base import KnowledgeBase
-from knowledge_base.journal.transaction import TIDY_UP_AFTER
+from knowledge_base.journal.write_transaction import TIDY_UP_AFTER
 
 PLOT = ActionPlot.model_validate({
     "plot": "worker", "receives": {"ping": None, "stop": None},

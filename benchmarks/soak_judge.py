@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 
 from soak_told import Told
 
-from domains.clean_up_table.faults import ITEM_MOVED
 from domains.clean_up_table.items import Item
 from domains.clean_up_table.places import SURFACES
 from domains.clean_up_table.report import Report
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
+from domains.clean_up_table.world_faults import ITEM_MOVED
 from dsc.dynamic.library import Library
 from dsc.sequencer.sequencer import Sequencer
 from dsc.testing.invariants import (
@@ -36,7 +36,7 @@ STOPPED = ("stopped",)
 """The configuration in which the operator's stop is obeyed."""
 
 
-def invariants(world: World, library: Library | None, *, replayed: bool) -> Iterator[tuple[str, Invariant]]:
+def invariants(world: TableWorld, library: Library | None, *, replayed: bool) -> Iterator[tuple[str, Invariant]]:
     """What a run must be like that has led to that world."""
     cleared = all(item.disposed for item in world.items if item.seen)
     yield NO_REPORT, comes_to_an_end(LONGEST)
@@ -49,7 +49,7 @@ def invariants(world: World, library: Library | None, *, replayed: bool) -> Iter
     yield AFTER_STOP, stands_still
 
 
-def knows_what_it_was_told(world: World) -> Invariant:
+def knows_what_it_was_told(world: TableWorld) -> Invariant:
     """How the robot is itself, and of each item where it was told that it is: that, and nothing else."""
 
     def invariant(run: KeptRun) -> Iterable[str]:
@@ -60,7 +60,7 @@ def knows_what_it_was_told(world: World) -> Invariant:
     return invariant
 
 
-def itself(world: World) -> Iterator[Fact]:
+def itself(world: TableWorld) -> Iterator[Fact]:
     """What the robot knows of itself."""
     yield fact("robot-at", world.robot_at)
     if world.items.held is None:
@@ -92,7 +92,7 @@ def ended_stopped(run: KeptRun) -> bool:
     return len(run.steps) > 1 and run.steps[-1 if run.ended is None else -2].configuration == STOPPED
 
 
-def wrong_report(report: Report, world: World, *, stopped: bool, plain: bool) -> Iterator[str]:
+def wrong_report(report: Report, world: TableWorld, *, stopped: bool, plain: bool) -> Iterator[str]:
     """What a report says that is not so.
 
     Args:
@@ -115,7 +115,7 @@ def wrong_report(report: Report, world: World, *, stopped: bool, plain: bool) ->
             yield f"left are {sorted(left)}, and permanent faults have touched {sorted(world.touched())}"
 
 
-def said_by_others(world: World, sequencer: Sequencer) -> list[Delta]:
+def said_by_others(world: TableWorld, sequencer: Sequencer) -> list[Delta]:
     """What somebody who saw it could say: where an item is, rather of one that somebody has moved.
 
     Not of what the robot handles at the moment: who of the two sees it last would be anybody's guess.

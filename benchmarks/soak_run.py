@@ -26,9 +26,9 @@ from soak_judge import (
 )
 
 from domains.clean_up_table.deployment import CleanUpTable, deploy, resumed
+from domains.clean_up_table.durable_world import DurableWorld, beside
 from domains.clean_up_table.report import Report
 from domains.clean_up_table.scenario import Scenario, Table
-from domains.clean_up_table.world_file import LastingWorld, beside
 from dsc.chance import choose, uniform
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
@@ -206,7 +206,7 @@ class Trial:
     def _judge(self, report: Report | None) -> None:
         """What is in the files after the last life, against what has become of the world."""
         outcome, store = self.outcome, self._crashes.folder / "run.kb"
-        world = LastingWorld.open(beside(store))
+        world = DurableWorld.open(beside(store))
         world.close()
         outcome.faults += Counter(f"{one.kind}{' (permanent)' if one.permanent else ''}" for one in world.fired)
         with kept_run(store) as run:
@@ -276,7 +276,7 @@ def scenario(seed: int) -> Scenario:
 
 def done(store: Path) -> list[str]:
     """What the robot has executed, by action id."""
-    world = LastingWorld.open(beside(store))
+    world = DurableWorld.open(beside(store))
     world.close()
     return list(world.done)
 

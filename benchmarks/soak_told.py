@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from domains.clean_up_table.faults import ITEM_MOVED
 from domains.clean_up_table.items import DESTINATION_OF, HAND
 from domains.clean_up_table.places import DESTINATIONS, SURFACES
 from domains.clean_up_table.results import Result
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
+from domains.clean_up_table.world_faults import ITEM_MOVED
 from dsc.sequencer.reactor import CHART
 from dsc.testing.invariants import KeptRun
 from dsc.trace import Record
@@ -36,7 +36,7 @@ class Told:
         stale: items that others have moved since the robot was told of them.
     """
 
-    def __init__(self, run: KeptRun, world: World) -> None:
+    def __init__(self, run: KeptRun, world: TableWorld) -> None:
         self.where: dict[str, str | None] = {}
         self.missing: set[str] = set()
         self.stale: set[str] = set()

@@ -29,7 +29,7 @@ from websockets.sync.client import ClientConnection, connect
 from domains.clean_up_table.deployment import deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.trace import Listener, header
-from dsc.viewer.entrance import Entrance
+from dsc.viewer.address import PageAddress
 from dsc.viewer.live import LivePage
 from planning import Planner
 from planning.engines.cache import CachingPlanner
@@ -90,7 +90,7 @@ def runs_watched(browsers: int | None, planner: Planner) -> Taken:
     if browsers is None:
         return runs(planner, None)
     with ExitStack() as stack:
-        page = LivePage(header(), Entrance.on())
+        page = LivePage(header(), PageAddress.on())
         page.start()
         stack.callback(page.close)
         with opened(str(page.port), page.token) as socket:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from domains.clean_up_table.report import Report
     from dsc.sequencer.sequencer import Sequencer
     from knowledge_base.errors import InputError
-    from knowledge_base.outputs import Output
+    from knowledge_base.output_files import Output
     from knowledge_base.store import KnowledgeBase
 
 BAD_INPUT, NOT_WRITTEN, NOBODY_READS = 2, 74, 141
@@ -107,9 +107,7 @@ def run(
     world: Annotated[str | None, typer.Argument(help="The ready world to run: clean-up-table.")] = None,
     scenario: Annotated[Path | None, typer.Option(help="What stands on the table (YAML).")] = None,
     seed: Annotated[int | None, typer.Option(help="Which faults happen; same seed, same run.")] = None,
-    faults: Annotated[
-        float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")
-    ] = None,
+    faults: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")] = None,
     profile: Annotated[
         str | None, typer.Option(metavar="NAME|FILE", help="Which robot, and what its parameters are worth (YAML).")
     ] = None,
@@ -132,10 +130,10 @@ def run(
     """Run a ready world. Exit status: 0 goal reached, 1 something is left (the report says what and why)."""
     from domains.clean_up_table.deployment import PROFILES, deploy, resumed
     from domains.clean_up_table.scenario import Scenario
-    from dsc.text.profiles import find_profile
+    from dsc.text.profile_files import find_profile
     from dsc.trace import BEGINS
     from knowledge_base.errors import InputError, UnknownNameError
-    from knowledge_base.outputs import Output
+    from knowledge_base.output_files import Output
 
     file = None if profile is None or not Path(profile).suffix else Path(profile)
     output = None if trace is None else Output(trace, "--trace", scenario, file, store, resume, over=BEGINS)
@@ -174,10 +172,10 @@ def _viewed(
     from dsc.viewer.cli import page, until_interrupt, viewer_installed
 
     viewer_installed()
-    from dsc.viewer.entrance import Entrance
+    from dsc.viewer.address import PageAddress
     from dsc.viewer.live import LivePage
 
-    live = LivePage(header(**deployed.header()), Entrance.on(port), control=control)
+    live = LivePage(header(**deployed.header()), PageAddress.on(port), control=control)
     deployed.executive.listen(live.hear)
     with page(live, opens=opens) as viewer:
         report = follow(prepare=live.control.attach if live.control else None)
@@ -240,7 +238,7 @@ def main() -> None:
     except BrokenPipeError:
         sys.exit(NOBODY_READS)
     except OSError as error:
-        from knowledge_base.outputs import FULL
+        from knowledge_base.output_files import FULL
 
         if error.errno not in FULL:
             raise

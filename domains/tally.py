@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from dsc.dynamic.selection import ACHIEVE
+from dsc.dynamic.candidate_selection import ACHIEVE
 from dsc.trace import Record
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from dsc.calls import Outcome as Outcome
     from dsc.calls import SkillCall as SkillCall
     from dsc.components.component import Component as Component
-    from dsc.components.functions import component_of as component_of
+    from dsc.components.factories import component_of as component_of
     from dsc.components.ports import event as event
     from dsc.components.ports import query as query
     from dsc.components.ports import takes as takes
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from dsc.sequencer.sequencer import RunEnd as RunEnd
     from dsc.sequencer.sequencer import Sequencer as Sequencer
     from dsc.skills import skill as skill
-    from dsc.text.plots import load_library as load_library
-    from dsc.text.plots import load_plot as load_plot
-    from dsc.text.plots import parse_plot as parse_plot
+    from dsc.text.plot_files import load_library as load_library
+    from dsc.text.plot_files import load_plot as load_plot
+    from dsc.text.plot_files import parse_plot as parse_plot
     from dsc.trace import Record as Record
     from dsc.validation import validate_library as validate_library
     from dsc.validation import validate_plot as validate_plot
@@ -46,11 +46,11 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Sequencer": "sequencer.sequencer",
         "SkillCall": "calls",
         "Stream": "components.streams",
-        "component_of": "components.functions",
+        "component_of": "components.factories",
         "event": "components.ports",
-        "load_library": "text.plots",
-        "load_plot": "text.plots",
-        "parse_plot": "text.plots",
+        "load_library": "text.plot_files",
+        "load_plot": "text.plot_files",
+        "parse_plot": "text.plot_files",
         "primitive_plot": "primitive",
         "query": "components.ports",
         "skill": "skills",

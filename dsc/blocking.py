@@ -88,9 +88,7 @@ async def in_thread(body: Callable[..., Outcome], call: SkillCall, arguments: Ma
     return await _supervised(lambda: body(blocking, **arguments), blocking, call, "thread", STOPPING)
 
 
-async def in_process(
-    body: Callable[..., Outcome], name: str, call: SkillCall, arguments: Mapping[str, Any]
-) -> Outcome:
+async def in_process(body: Callable[..., Outcome], name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     """Run `body(BlockingCall, **arguments)` in a fresh process; raises as `in_thread`.
 
     Raises:
@@ -194,9 +192,7 @@ def _hold(call: SkillCall) -> AbstractContextManager[None]:
 # -- the process ---------------------------------------------------------------------------------------------
 
 
-def _in_child(
-    body: Callable[..., Outcome], name: str, blocking: BlockingCall, arguments: Mapping[str, Any]
-) -> Outcome:
+def _in_child(body: Callable[..., Outcome], name: str, blocking: BlockingCall, arguments: Mapping[str, Any]) -> Outcome:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     given = (theirs, body, blocking.action_id, blocking.seconds, dict(arguments))

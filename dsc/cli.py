@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dsc.dynamic.library import Library
     from dsc.errors import Finding
     from dsc.model.plot import ActionPlot
-    from dsc.text.neighbours import Neighbours
+    from dsc.text.plot_folder import Neighbours
     from knowledge_base.errors import InputError
     from knowledge_base.world.schema import Schema
 
@@ -62,8 +62,8 @@ def check(
 
     A plot may use the other plots in its folder. Exit status: 0 nothing found, or warnings alone, 2 findings.
     """
-    from dsc.components.named import robot_of
-    from dsc.text.neighbours import Neighbours
+    from dsc.components.factories import robot_of
+    from dsc.text.plot_folder import Neighbours
 
     neighbours = Neighbours()
     components = None if robot is None else robot_of(robot)
@@ -91,10 +91,10 @@ def show(
     ] = False,
 ) -> None:
     """Show a plot: as a tree in the terminal, as a drawing, or as YAML."""
-    from dsc.text.diagram import draw
-    from dsc.text.plots import load_plot, plot_to_yaml
+    from dsc.drawing import draw
+    from dsc.text.plot_files import load_plot, plot_to_yaml
     from knowledge_base.errors import UnknownNameError
-    from knowledge_base.outputs import Output
+    from knowledge_base.output_files import Output
 
     out = None if svg is None else Output(svg, "--svg", file)
     plot = load_plot(file)
@@ -122,13 +122,13 @@ def import_(
         str, typer.Option("--out", metavar="FILE.yaml", help="Where the plot goes; - is standard output.")
     ] = "-",
 ) -> None:
-    """Read an SCXML chart as a plot of profile `scxml`; what plots cannot say is named."""
+    """Read an SCXML chart as a plot of dialect `scxml`; what plots cannot say is named."""
     from dsc.dynamic.library import Library
-    from dsc.text.files import read_file
-    from dsc.text.plots import plot_to_yaml
-    from dsc.text.scxml.reader import parse_scxml
+    from dsc.scxml.reader import parse_scxml
+    from dsc.text.plot_files import plot_to_yaml
+    from dsc.text.text_files import read_file
     from dsc.validation import raise_findings, validate_plot
-    from knowledge_base.outputs import Output
+    from knowledge_base.output_files import Output
 
     output = Output(out, "--out", file)
     plot = parse_scxml(read_file(file), str(file))
@@ -143,12 +143,12 @@ def export(
     out: Annotated[str, typer.Option("--out", metavar="OUT", help="Where it goes; - is standard output.")] = "-",
 ) -> None:
     """Write a plot in another form; what that form cannot say is named."""
-    from dsc.text.diagram import draw
-    from dsc.text.plots import load_plot
-    from dsc.text.scxml.writer import to_scxml
-    from dsc.text.state_diagram import to_mermaid, to_plantuml
+    from dsc.drawing import draw
+    from dsc.scxml.writer import to_scxml
+    from dsc.text.plot_files import load_plot
+    from dsc.text.text_diagrams import to_mermaid, to_plantuml
     from knowledge_base.errors import InputError
-    from knowledge_base.outputs import Output
+    from knowledge_base.output_files import Output
 
     def to_svg(plot: ActionPlot) -> str:
         library, _ = _neighbours(file, plot)
@@ -179,9 +179,9 @@ def diff(
     """Say what is different between two plots. Exit status: 0 nothing, 1 something."""
     from dataclasses import asdict
 
-    from dsc.text.diagram.svg import above
-    from dsc.text.difference import differences, draw_difference
-    from knowledge_base.outputs import Output
+    from dsc.drawing.svg import above
+    from dsc.text.plot_difference import differences, draw_difference
+    from knowledge_base.output_files import Output
 
     out = None if svg is None else Output(svg, "--svg", old, new)
     before, after = _load(old), _load(new)
@@ -223,8 +223,8 @@ def schema(
     profile: Annotated[bool, typer.Option("--profile", help="That of profiles instead.")] = False,
 ) -> None:
     """Print the JSON Schema of plot files, for editors."""
-    from dsc.text.profiles import profile_schema
-    from dsc.text.schema import json_schema
+    from dsc.text.json_schema import json_schema
+    from dsc.text.profile_files import profile_schema
 
     _print_json(profile_schema() if profile else json_schema())
 
@@ -253,15 +253,15 @@ def _findings(
 
 def _load(file: Path) -> ActionPlot:
     """A plot, whose file says by its name if it is a chart in SCXML."""
-    from dsc.text.files import read_file
-    from dsc.text.plots import load_plot
-    from dsc.text.scxml.reader import parse_scxml
+    from dsc.scxml.reader import parse_scxml
+    from dsc.text.plot_files import load_plot
+    from dsc.text.text_files import read_file
 
     return parse_scxml(read_file(file), str(file)) if file.suffix == ".scxml" else load_plot(file)
 
 
 def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
-    from dsc.text.neighbours import Neighbours
+    from dsc.text.plot_folder import Neighbours
 
     return Neighbours().of(file, plot)
 
@@ -307,7 +307,7 @@ def _print_json(data: object) -> None:
 def _print_tree(plot: ActionPlot) -> None:
     from rich.console import Console
 
-    from dsc.text.diagram.tree import plot_tree
+    from dsc.drawing.tree import plot_tree
 
     console = Console()
     if not console.is_terminal:

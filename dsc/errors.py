@@ -1,4 +1,4 @@
-"""What can be wrong with a plot, and what can go wrong while one runs."""
+"""Errors of plots: findings in their text, failures of a run, and forms that another language cannot express."""
 
 from __future__ import annotations
 
@@ -68,3 +68,11 @@ class ChangedError(InputError):
         more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
         super().__init__(f"the run was begun with others: {'; '.join(differences[:3])}{more}", place=place)
         self.differences = tuple(differences)
+
+
+class NotExpressibleError(InputError):
+    """Something has no counterpart in the other form; `element` is what it is, for counting."""
+
+    def __init__(self, element: str, why: str, *, place: Place | None = None) -> None:
+        super().__init__(f"{element}: {why}", place=place, found=element)
+        self.element = element

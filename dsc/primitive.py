@@ -46,15 +46,17 @@ def primitive_plot(
     states: dict[str, Any] = {"execute": {"entry": trigger, "on": on}, "completed": {"final": True}}
     if others:
         states["ended"] = {"final": True}
-    return ActionPlot.model_validate({
-        "plot": name or skill.name,
-        "parameters": parameters,
-        "emits": {event: {key: kind or "symbol" for key, kind in a.items()} for event, a in others.items()},
-        "implements": implements,
-        "when": when,
-        "effects": effects,
-        "states": states,
-    })
+    return ActionPlot.model_validate(
+        {
+            "plot": name or skill.name,
+            "parameters": parameters,
+            "emits": {event: {key: kind or "symbol" for key, kind in a.items()} for event, a in others.items()},
+            "implements": implements,
+            "when": when,
+            "effects": effects,
+            "states": states,
+        }
+    )
 
 
 def _can_be_given(skill: SkillSignature, key: str) -> bool:

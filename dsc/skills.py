@@ -26,7 +26,7 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import shown
 
 if TYPE_CHECKING:
-    from dsc.components.activations import Activations
+    from dsc.components.event_activations import EventActivations
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
 """What may be done about an action of which nothing is known: do it again, since twice is as once; do it with the
@@ -71,7 +71,7 @@ class Skilled(Protocol):
     """
 
     name: str
-    activations: Activations
+    activations: EventActivations
 
 
 CarryOut = Callable[[Skilled, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
@@ -119,7 +119,7 @@ def skill(
     blocking: Literal["thread", "process"] | None = None,
     after_crash: AfterCrash = "sense",
 ) -> Callable[[_Body], _Body]:
-    """Declare a component's method, or a function of its own (see `dsc.components.functions`), as a skill.
+    """Declare a component's method, or a function of its own (see `dsc.components.factories`), as a skill.
 
     Args:
         outcomes: every event it may end with or report, with the event's attributes and their types.

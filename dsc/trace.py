@@ -14,7 +14,7 @@ from typing import IO, Any, NamedTuple
 from dsc.json_text import text_of
 
 FORMAT = "dsc-trace"
-VERSION = 1
+VERSION = 2
 BEGINS = f'{{"format": "{FORMAT}"'
 """How each trace file begins."""
 

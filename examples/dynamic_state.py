@@ -15,20 +15,22 @@ DOMAIN = PlanningDomain.parse("""
 """)
 
 # In Python. Each candidate carries its own condition; the dynamic state only names them.
-in_python = ActionPlot.model_validate({
-    "plot": "visit",
-    "parameters": {"room": "room"},
-    "states": {
-        "approach": {
-            "dynamic": ["go_straight", "take_the_lift"],
-            "with": {"to": "?room"},
-            "goal": "(robot-in ?room)",
-            "on": {"done": "there", "no_plan": "lost", "gave_up": "lost"},
+in_python = ActionPlot.model_validate(
+    {
+        "plot": "visit",
+        "parameters": {"room": "room"},
+        "states": {
+            "approach": {
+                "dynamic": ["go_straight", "take_the_lift"],
+                "with": {"to": "?room"},
+                "goal": "(robot-in ?room)",
+                "on": {"done": "there", "no_plan": "lost", "gave_up": "lost"},
+            },
+            "there": {"final": True},
+            "lost": {"final": True},
         },
-        "there": {"final": True},
-        "lost": {"final": True},
-    },
-})
+    }
+)
 
 # The same in YAML, as people usually write it.
 in_yaml = parse_plot("""

@@ -57,29 +57,29 @@ def plots(robot: str) -> list[ActionPlot]:
         "close-lid": {"bin": "bin"},
     }
     return [
-        ActionPlot.model_validate({
-            "plot": f"{robot}_{action}",
-            "implements": action,
-            "when": f"(= ?robot {robot})",
-            "parameters": {"robot": "robot", **types},
-            "states": {
-                "act": {
-                    "entry": {
-                        "trigger": f"{robot}.{action.replace('-', '_')}",
-                        "with": {name: f"?{name}" for name in types},
+        ActionPlot.model_validate(
+            {
+                "plot": f"{robot}_{action}",
+                "implements": action,
+                "when": f"(= ?robot {robot})",
+                "parameters": {"robot": "robot", **types},
+                "states": {
+                    "act": {
+                        "entry": {
+                            "trigger": f"{robot}.{action.replace('-', '_')}",
+                            "with": {name: f"?{name}" for name in types},
+                        },
+                        "on": {"acted": "over"},
                     },
-                    "on": {"acted": "over"},
+                    "over": {"final": True},
                 },
-                "over": {"final": True},
-            },
-        })
+            }
+        )
         for action, types in actions.items()
     ]
 
 
-def team(
-    items: dict[str, int], *, parallel: bool = True, seed: int = 0, planner: Planner | None = None
-) -> Executive:
+def team(items: dict[str, int], *, parallel: bool = True, seed: int = 0, planner: Planner | None = None) -> Executive:
     """Both robots at the bin; `items` says how many things lie on each robot's table."""
     every_plot = [plot for robot in ROBOTS for plot in plots(robot)]
     robots = [Robot(name, seed) for name in ROBOTS]

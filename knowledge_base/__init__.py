@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from knowledge_base._lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from knowledge_base.conditions.clock import Clock as Clock
     from knowledge_base.conditions.condition import Condition as Condition
     from knowledge_base.conditions.condition import Firing as Firing
+    from knowledge_base.conditions.damping import TimerClock as TimerClock
     from knowledge_base.conditions.watch import Missed as Missed
     from knowledge_base.conditions.watch import Watch as Watch
     from knowledge_base.errors import ConditionCancelledError as ConditionCancelledError
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Fact as Fact
     from knowledge_base.facts import Value as Value
     from knowledge_base.facts import fact as fact
-    from knowledge_base.language.bounds import Bounds as Bounds
     from knowledge_base.language.explanation import Explanation as Explanation
     from knowledge_base.language.query_plan import QueryPlan as QueryPlan
     from knowledge_base.language.query_plan import QueryStep as QueryStep
+    from knowledge_base.language.question_bounds import Bounds as Bounds
     from knowledge_base.language.vocabulary import Signature as Signature
     from knowledge_base.prepared import Binding as Binding
-    from knowledge_base.sources import Source as Source
+    from knowledge_base.sources import DataSource as DataSource
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
     from knowledge_base.transaction import Transaction as Transaction
     from knowledge_base.view import View as View
@@ -51,9 +51,9 @@ __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
     {
         "Binding": "prepared",
-        "Bounds": "language.bounds",
+        "Bounds": "language.question_bounds",
         "Change": "facts",
-        "Clock": "conditions.clock",
+        "TimerClock": "conditions.damping",
         "Computed": "world.computation",
         "Condition": "conditions.condition",
         "ConditionCancelledError": "errors",
@@ -77,7 +77,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",
         "Signature": "language.vocabulary",
-        "Source": "sources",
+        "DataSource": "sources",
         "DamagedStoreError": "errors",
         "StoreError": "errors",
         "Transaction": "transaction",

@@ -61,9 +61,7 @@ class Delta:
 
     def __bool__(self) -> bool:
         """Whether it says anything at all."""
-        return bool(
-            self.nodes or self.removed or self.added or self.values or self.removed_nodes or self.replaced
-        )
+        return bool(self.nodes or self.removed or self.added or self.values or self.removed_nodes or self.replaced)
 
     def __len__(self) -> int:
         """How many things, facts and values it names."""
@@ -81,9 +79,7 @@ class Delta:
             a for a in self.added
             if a not in undone and gone.isdisjoint(a.args) and (a.predicate, a.args[:-1]) not in anew
         ]  # fmt: skip
-        replaced = [
-            r for r in self.replaced if gone.isdisjoint(r.args) and (r.predicate, r.args[:-1]) not in anew
-        ]
+        replaced = [r for r in self.replaced if gone.isdisjoint(r.args) and (r.predicate, r.args[:-1]) not in anew]
         redone = {*later.added, *later.replaced}
         removed = [r for r in self.removed if r not in redone] + [r for r in later.removed if r not in later.added]
         return Delta(

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from weakref import WeakSet
 
-from knowledge_base.conditions.announcement import Announcer, Listener
-from knowledge_base.conditions.clock import Clock
 from knowledge_base.conditions.condition import Condition, Fire
+from knowledge_base.conditions.damping import TimerClock
 from knowledge_base.conditions.installed import Installed, terms
+from knowledge_base.conditions.notification import Listener, Notifier
 from knowledge_base.conditions.watch import Watch, watch
 from knowledge_base.errors import StoreError
 from knowledge_base.facts import Value
@@ -22,7 +22,7 @@ class Observable(View):
 
     def __init__(self, state: WorldState, version: int) -> None:
         super().__init__(state, version)
-        self._announcer = Announcer(self._lock)
+        self._announcer = Notifier(self._lock)
         self._installed = Installed(state, version, self._lock, self._announcer)
         self._watches: WeakSet[Watch] = WeakSet()
         self._closed = False
@@ -55,7 +55,7 @@ class Observable(View):
         hold_s: float = 0.0,
         once: bool = False,
         hysteresis: float | None = None,
-        clock: Clock | None = None,
+        clock: TimerClock | None = None,
     ) -> Condition:
         """Keep a condition evaluated at every version from now on, and fire when it becomes true (S2.4).
 

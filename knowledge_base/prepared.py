@@ -8,17 +8,17 @@ from typing import Any
 
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.language.asking import asked, queried
-from knowledge_base.language.author import MISSING
 from knowledge_base.language.check import Free
+from knowledge_base.language.code_generation import MISSING
+from knowledge_base.language.evaluator import asked, queried
 from knowledge_base.language.expression import Expression
+from knowledge_base.language.generated_code import GeneratedSource, condition_source, query_source
+from knowledge_base.language.identity_cache import IdentityCache
 from knowledge_base.language.inputs import require_params, shown
-from knowledge_base.language.memory import IdentityCache
-from knowledge_base.language.source import Source, condition_source, query_source
 from knowledge_base.questions import Questions
+from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
-from knowledge_base.world.turn import Turn
 
 Binding = dict[str, Value]
 """One answer of a query: variables' names (without `?`) with their values."""
@@ -62,11 +62,11 @@ class _Way:
 
     free: Free
     checked: Callable[[Questions, str | Expression, Mapping[str, Value], WorldState], Expression]
-    write: Callable[[Expression, Schema, Names], Source | None]
+    write: Callable[[Expression, Schema, Names], GeneratedSource | None]
     closure: Callable[[Expression, Schema, Names], Callable[[WorldState, Mapping[str, Value]], Any]]
-    sources: IdentityCache[Expression, dict[Names, Source | None]] = field(default_factory=IdentityCache)
+    sources: IdentityCache[Expression, dict[Names, GeneratedSource | None]] = field(default_factory=IdentityCache)
 
-    def source(self, e: Expression, schema: Schema, names: Names) -> Source | None:
+    def source(self, e: Expression, schema: Schema, names: Names) -> GeneratedSource | None:
         """The source of the question; `None` if it is not plain."""
         written = self.sources.find(e, schema)
         if written is None:
@@ -83,7 +83,7 @@ _QUERY = _Way("answers", Questions.query, query_source, lambda e, schema, names:
 class _Ready:
     """The questions that were asked of a world in one way, as functions of their parameters' values."""
 
-    def __init__(self, way: _Way, state: WorldState, lock: Turn, questions: Questions) -> None:
+    def __init__(self, way: _Way, state: WorldState, lock: ReadWriteLock, questions: Questions) -> None:
         self._way = way
         self._state = state
         self._lock = lock
@@ -138,7 +138,7 @@ class ReadyQuestions:
         querying: one that gives the values of the other free variables; errors as for `View.query`.
     """
 
-    def __init__(self, state: WorldState, lock: Turn, questions: Questions) -> None:
+    def __init__(self, state: WorldState, lock: ReadWriteLock, questions: Questions) -> None:
         self.asking: Callable[..., Asking] = _Ready(_ASK, state, lock, questions).of
         self.querying: Callable[..., Querying] = _Ready(_QUERY, state, lock, questions).of
 

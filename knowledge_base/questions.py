@@ -7,11 +7,11 @@ from functools import lru_cache
 from typing import TypeVar
 
 from knowledge_base.facts import Value
-from knowledge_base.language.asking import Asked, Queried, asked, queried, rows
 from knowledge_base.language.check import Free, check
+from knowledge_base.language.evaluator import Asked, Queried, asked, queried, rows
 from knowledge_base.language.expression import Expression, free_variables
+from knowledge_base.language.identity_cache import IdentityCache
 from knowledge_base.language.inputs import fitted_names, require_condition, require_params
-from knowledge_base.language.memory import IdentityCache
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.world import World
 
@@ -81,9 +81,7 @@ class Questions:
             _keep(self._asked, key, found)
         return found.holds(world, params)
 
-    def answers(
-        self, text: str | Expression, params: Mapping[str, Value], world: World
-    ) -> list[dict[str, Value]]:
+    def answers(self, text: str | Expression, params: Mapping[str, Value], world: World) -> list[dict[str, Value]]:
         """Who makes the query true of `world`; errors as for `query`."""
         key = (text if isinstance(text, str) else id(text), *params)
         found = self._queried.get(key)

@@ -10,18 +10,18 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
-from knowledge_base.conditions.announcement import Announcer
 from knowledge_base.conditions.installed import Installed
+from knowledge_base.conditions.notification import Notifier
 from knowledge_base.content import require_content
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.facts import Content, Fact
-from knowledge_base.world.admission import check_fluent
+from knowledge_base.world.change_checks import check_fluent
 from knowledge_base.world.graph import WorldGraph
+from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.state import WorldState
-from knowledge_base.world.turn import Turn
 
 
-class Source:
+class DataSource:
     """Feeds one fluent, from any thread; made by `KnowledgeBase.bind_source`.
 
     As a context manager it is closed at the end of the block.
@@ -63,7 +63,7 @@ class Source:
         self._owner.close(self)
 
     def __repr__(self) -> str:
-        return f"<Source {self.fluent} from {self.reference}: {'closed' if self._closed else self._latest}>"
+        return f"<DataSource {self.fluent} from {self.reference}: {'closed' if self._closed else self._latest}>"
 
     def __enter__(self) -> Self:
         return self
@@ -92,14 +92,14 @@ class Sources:
         state: WorldState,
         graph: Callable[[], WorldGraph | None],
         installed: Installed,
-        announcer: Announcer,
-        lock: Turn,
+        announcer: Notifier,
+        lock: ReadWriteLock,
     ) -> None:
         self._state, self._graph, self._installed = state, graph, installed
         self._announcer, self._lock = announcer, lock
-        self._open: dict[Fact, Source] = {}
+        self._open: dict[Fact, DataSource] = {}
 
-    def bind(self, fluent: Fact, reference: str) -> Source:
+    def bind(self, fluent: Fact, reference: str) -> DataSource:
         """Make a source for a fluent that has none; see `KnowledgeBase.bind_source`."""
         if not isinstance(reference, str) or not reference:
             raise InputError(f"a source's reference is text that says where values come from, not {reference!r}")
@@ -107,18 +107,18 @@ class Sources:
             check_fluent(fluent, self._state)
             if fluent in self._open:
                 raise SchemaError(f"{fluent} is fed by '{self._open[fluent].reference}' already")
-            source = self._open[fluent] = Source(self, fluent, reference)
+            source = self._open[fluent] = DataSource(self, fluent, reference)
             self._state.bind(fluent, reference)
             self._show(fluent, reference, self._value(fluent))
         return source
 
-    def listed(self) -> list[Source]:
+    def listed(self) -> list[DataSource]:
         """Those that are open."""
         with self._lock:
             return list(self._open.values())
 
-    def feed(self, source: Source, content: Content) -> None:
-        """Take in a value; see `Source.update`."""
+    def feed(self, source: DataSource, content: Content) -> None:
+        """Take in a value; see `DataSource.update`."""
         fluent = source.fluent
         require_content(content, self._state.schema.result(fluent.predicate), fluent)
         with self._lock:
@@ -131,8 +131,8 @@ class Sources:
             self._tell(fluent, before)
         self._announcer.deliver()
 
-    def close(self, source: Source) -> None:
-        """See `Source.close`."""
+    def close(self, source: DataSource) -> None:
+        """See `DataSource.close`."""
         with self._lock:
             if source.closed:
                 return
@@ -148,7 +148,7 @@ class Sources:
             for source in [s for s in self._open.values() if not gone.isdisjoint(s.fluent.args)]:
                 self._drop(source)
 
-    def _drop(self, source: Source) -> None:
+    def _drop(self, source: DataSource) -> None:
         source.end()
         del self._open[source.fluent]
         self._state.unbind(source.fluent)

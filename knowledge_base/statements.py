@@ -10,21 +10,19 @@ from collections.abc import Iterable, Mapping
 
 from knowledge_base.errors import InputError, ParseError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.application import apply_effect
-from knowledge_base.language.bounds import BoundedWorld, Bounds, Meter
 from knowledge_base.language.check import check, check_effect
-from knowledge_base.language.effect import Add, Assign, Effect
+from knowledge_base.language.effect import Add, Effect, NumericEffect
+from knowledge_base.language.effect_application import apply_effect
 from knowledge_base.language.expression import Atom, Call, Comparison, Constant, Expression
 from knowledge_base.language.parser import parse_condition, parse_effect
+from knowledge_base.language.question_bounds import BoundedWorld, Bounds, Meter
 from knowledge_base.language.sexpr import Group, read
 from knowledge_base.language.vocabulary import ROOT_TYPE
 from knowledge_base.language.world import World
 from knowledge_base.world.overlay import Overlay
 
 
-def told(
-    statements: Iterable[str], world: World, source: str | None = None, bounds: Bounds | None = None
-) -> Delta:
+def told(statements: Iterable[str], world: World, source: str | None = None, bounds: Bounds | None = None) -> Delta:
     """The change that makes all the statements true, one after the other; nothing is changed yet.
 
     Things may be used in front of the statement that names their type.
@@ -84,7 +82,7 @@ def _effect(text: str, source: str | None) -> Effect:
     said = parse_condition(groups[0])
     if not isinstance(said, Comparison) or not isinstance(said.left, Call):
         raise ParseError("a number is said of a function: (= (FUNCTION ...) NUMBER)", place=said.place)
-    return Assign("assign", said.left, said.right, place=said.place)
+    return NumericEffect("assign", said.left, said.right, place=said.place)
 
 
 def _thing(effect: Effect, world: World) -> Mapping[str, str] | None:

@@ -12,17 +12,17 @@ from types import TracebackType
 from typing import Self, get_args
 
 from knowledge_base.errors import ConflictError, HistoryError, InputError
-from knowledge_base.exchange.json import read_json
+from knowledge_base.exchange.world_json import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
+from knowledge_base.group_commit import GroupCommit
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability, located
 from knowledge_base.journal.history import History, Version, Writer, gone
 from knowledge_base.journal.journal import Journal
-from knowledge_base.journal.memory import MemoryHistory
+from knowledge_base.journal.memory_history import MemoryHistory
 from knowledge_base.language.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.observable import Observable
-from knowledge_base.sources import Source, Sources
-from knowledge_base.together import Together
+from knowledge_base.sources import DataSource, Sources
 from knowledge_base.transaction import Transaction
 from knowledge_base.view import View
 from knowledge_base.world.overlay import Overlay
@@ -248,9 +248,9 @@ class KnowledgeBase(Observable):
                 further change is refused, and the file, opened anew, has what was before the block.
             ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
         """
-        return Together(self._lock, self._require_free, self._history)
+        return GroupCommit(self._lock, self._require_free, self._history)
 
-    def bind_source(self, function: str, *args: Value, reference: str) -> Source:
+    def bind_source(self, function: str, *args: Value, reference: str) -> DataSource:
         """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
 
         Its latest value is what questions, snapshots and installed conditions see; versions, changes, watches,
@@ -273,7 +273,7 @@ class KnowledgeBase(Observable):
             self._require_free()
             return self._sources.bind(Fact(function, args), reference)
 
-    def sources(self) -> list[Source]:
+    def sources(self) -> list[DataSource]:
         """The sources that are open, in the order in which they were bound."""
         return self._sources.listed()
 

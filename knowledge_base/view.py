@@ -6,22 +6,22 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 
 from knowledge_base.errors import ConflictError, InputError
-from knowledge_base.exchange.json import to_json
 from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.exchange.problem_writer import problem_to_text
+from knowledge_base.exchange.world_json import to_json
 from knowledge_base.facts import Content, Fact, Value
-from knowledge_base.language.bounds import BoundedWorld, Bounds, Meter
 from knowledge_base.language.evaluation import Explanation, explain
 from knowledge_base.language.expression import TRUE, Expression
 from knowledge_base.language.inputs import require_params, shown
 from knowledge_base.language.query_plan import QueryPlan, plan_query
+from knowledge_base.language.question_bounds import BoundedWorld, Bounds, Meter
 from knowledge_base.prepared import Binding, Prepared, ReadyQuestions
 from knowledge_base.questions import Questions
 from knowledge_base.world.graph import Graph, WorldGraph
 from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
-from knowledge_base.world.turn import Turn
 
 _TOGETHER = 100
 """Answers of a stream that are found with one turn at the lock."""
@@ -34,7 +34,7 @@ class View:
     """
 
     def __init__(self, state: WorldState, version: int) -> None:
-        self._lock = Turn(state.stamp)
+        self._lock = ReadWriteLock(state.stamp)
         self._state = state
         self._version = version
         self._questions = Questions()

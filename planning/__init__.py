@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from planning.engines.planner import PlannerProcess as PlannerProcess
     from planning.engines.race import PlannerRace as PlannerRace
     from planning.executive import Executive as Executive
-    from planning.generation.plot import plot_from_plan as plot_from_plan
+    from planning.generation.plan_to_plot import plot_from_plan as plot_from_plan
     from planning.plan import Plan as Plan
     from planning.plan import PlanStep as PlanStep
-    from planning.posing.problem import pose as pose
+    from planning.problem.construction import build_problem as build_problem
     from planning.unified import from_unified as from_unified
     from planning.unified import to_unified as to_unified
     from planning.validation import validate as validate
@@ -37,8 +37,8 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "PlanningAction": "domain",
         "PlanningDomain": "domain",
         "from_unified": "unified",
-        "plot_from_plan": "generation.plot",
-        "pose": "posing.problem",
+        "plot_from_plan": "generation.plan_to_plot",
+        "build_problem": "problem.construction",
         "to_unified": "unified",
         "validate": "validation",
     },

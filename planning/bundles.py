@@ -16,8 +16,8 @@ from typing import Any
 from dsc.components.component import Component
 from dsc.components.hooks import contained
 from dsc.model.plot import ActionPlot
-from dsc.text.plots import load_library
-from dsc.validation.components import addressed_by
+from dsc.text.plot_files import load_library
+from dsc.validation.deployment import addressed_by
 from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.language.inputs import shown
 from knowledge_base.pddl.domain_text import DomainText

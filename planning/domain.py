@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import InputError, Place, UnknownNameError
 from knowledge_base.exchange.domain_writer import action_to_text, axiom_to_text, domain_to_text
+from knowledge_base.language.durative import Duration
 from knowledge_base.language.effect import Effect, substitute_effect
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
 from knowledge_base.language.expression import (
@@ -23,14 +24,13 @@ from knowledge_base.language.expression import (
     substitute,
 )
 from knowledge_base.language.inputs import require
-from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.language.typed_list import TypedName
 from knowledge_base.language.vocabulary import ROOT_TYPE, Signature
 from knowledge_base.pddl.action_text import ActionText
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.world.schema import Schema
-from planning.actions import Axiom, PlanningAction, checked, checked_axiom, refuse_changed
 from planning.fragments import merged_text, searched
+from planning.planning_actions import Axiom, PlanningAction, checked, checked_axiom, refuse_changed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 _MOST_GROUND = 1024  # steps; a plan for 50 items has about 130
 
-__all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain", "Timed"]
+__all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +117,7 @@ class PlanningDomain:
             return cls.from_text(merged_text(texts), (*_computed(pieces), *computed))
 
     @classmethod
-    def parse(
-        cls, text: str, source: str | None = None, computed: Iterable[Computed[Any]] = ()
-    ) -> PlanningDomain:
+    def parse(cls, text: str, source: str | None = None, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
         """The domain given as text; `source` names it in messages.
 
         Raises:
@@ -230,9 +228,7 @@ class PlanningDomain:
         """The action's parameters with the step's arguments."""
         parameters = self.action(step).parameters
         if len(parameters) != len(step.args):
-            raise InputError(
-                f"'{step.action}' takes {len(parameters)} arguments, {step} has {len(step.args)}"
-            )
+            raise InputError(f"'{step.action}' takes {len(parameters)} arguments, {step} has {len(step.args)}")
         return {p.name: arg for p, arg in zip(parameters, step.args, strict=True)}
 
 

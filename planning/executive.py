@@ -12,11 +12,11 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from dsc.components.component import Component
-from dsc.components.needs import require_deployed
-from dsc.components.roster import require_instances
-from dsc.components.wiring import require_wired
+from dsc.components.component_dependencies import require_deployed
+from dsc.components.component_registry import require_instances
+from dsc.components.streams import require_wired
+from dsc.dynamic.candidate_selection import ACHIEVE
 from dsc.dynamic.library import Library
-from dsc.dynamic.selection import ACHIEVE
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
 from dsc.profiles import configure
@@ -25,16 +25,15 @@ from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.skills import signatures
-from dsc.text.plots import parse_plot
+from dsc.text.plot_files import parse_plot
 from dsc.trace import Listener, Trace
 from knowledge_base.errors import InputError, SchemaError, StoreError
 from knowledge_base.journal.file import Durability, located
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
-from knowledge_base.world.compatibility import require_extension
+from knowledge_base.world.schema_compatibility import require_extension
 from planning import entrance
 from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of
-from planning.collecting import settled
 from planning.domain import PlanningDomain
 from planning.engines.cache import CachingPlanner
 from planning.engines.planner import Planner, PlannerProcess
@@ -42,7 +41,8 @@ from planning.engines.race import PlannerRace
 from planning.execution.component import PlanningComponent
 from planning.execution.foresight import Foresight
 from planning.fragments import shipped_by
-from planning.posing.problem import check_goal
+from planning.garbage_collection import settled
+from planning.problem.construction import check_goal
 from planning.soundness import require_sound
 
 Prepare = Callable[[Sequencer], None]

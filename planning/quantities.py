@@ -43,7 +43,7 @@ OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
 
 @dataclass(frozen=True, slots=True)
-class Bound:
+class NumericBound:
     """A comparison of two quantities; the operator is one of `= < <= > >=`."""
 
     operator: str
@@ -88,7 +88,7 @@ class Assignment:
         return numbers.get(self.fluent, 0.0) + amount if self.increase else amount
 
 
-def helps(change: Assignment, bound: Bound) -> bool:
+def helps(change: Assignment, bound: NumericBound) -> bool:
     """Whether a change may make a bound true that is not; `False` is certain.
 
     Who only ever uses up fuel does not bring about that there is enough of it.

@@ -1,16 +1,66 @@
-"""Whether plots, skills and planning domain fit together, before anything runs."""
+"""Soundness of a robot program: plots, skills and planning domain fit together, before anything runs."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from itertools import pairwise
 
 from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
+from dsc.errors import Finding
 from dsc.skills import SkillSignature
 from dsc.validation import raise_findings, validate_library
+from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.world.schema import Schema
 from planning.domain import PlanningDomain
-from planning.implementations import check_implementations
+
+
+def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[Finding]:
+    """Findings: an unknown action, a parameter the action does not have, an action without any plot.
+
+    Also plots of one action of which some are `observed` and some `assumed`: a generated plot does not know
+    which of them will be chosen, and would wait for effects that nobody reports.
+
+    A domain none of whose actions is implemented is fine: it is then used without a planner.
+    """
+    implemented = set()
+    for plot in library:
+        if plot.implements is None:
+            continue
+        implemented.add(plot.implements)
+        action = domain.actions.get(plot.implements)
+        if action is None:
+            unknown = UnknownNameError(
+                f"the domain '{domain.name}' has no planning action '{plot.implements}'",
+                place=plot.place(("implements",)), found=plot.implements, valid=domain.actions,
+            )  # fmt: skip
+            yield Finding(unknown, "known planning action")
+            continue
+        names = [parameter.name for parameter in action.parameters]
+        for name, parameter in plot.parameters.items():
+            if name not in names and parameter.default is None:
+                missing = UnknownNameError(
+                    f"planning action '{action.name}' has no parameter '?{name}' to give to the plot",
+                    place=plot.place(("parameters", name)), found=name, valid=names,
+                )  # fmt: skip
+                yield Finding(missing, "parameters of the action")
+    for name, action in domain.actions.items():
+        yield from _mixed_effects(name, library)
+        if implemented and name not in implemented:
+            error = SchemaError(f"no plot implements the planning action '{name}'", place=action.place)
+            yield Finding(error, "every action has a plot", f"add a plot with `implements: {name}`")
+
+
+def _mixed_effects(action: str, library: Library) -> Iterator[Finding]:
+    for first, plot in pairwise(library.implementing(action)):
+        if plot.effects != first.effects:
+            error = SchemaError(
+                f"the plots '{first.name}' and '{plot.name}' implement '{action}', but only one says"
+                " `effects: assumed`",
+                place=plot.place(("effects",)) or plot.place(("implements",)),
+            )
+            yield Finding(error, "effects of the action", "say the same in all plots of an action")
+
 
 _sound: dict[tuple[int, ...], tuple[object, ...]] = {}
 """What was found to be sound together, by identity, and kept alive so that no identity is ever another's."""

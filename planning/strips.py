@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact
 from planning.plan import Plan, PlanStep, Timing
-from planning.quantities import Assignment, Bound, Numbers
-from planning.timeline import FINEST, Act, Changes, Event, Flaw, carried_out
+from planning.quantities import Assignment, Numbers, NumericBound
+from planning.timeline import FINEST, Act, Changes, Flaw, TimelineEvent, carried_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -28,7 +28,7 @@ _NONE: Numbers = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class ActionSpan:
     """What makes a ground action durative; its own conditions and effects are then those at its start.
 
     Attributes:
@@ -69,15 +69,15 @@ class GroundAction:
     adds: tuple[Fact, ...]
     deletes: tuple[Fact, ...]
     cost: float = 1.0
-    bounds: tuple[Bound, ...] = ()
+    bounds: tuple[NumericBound, ...] = ()
     assignments: tuple[Assignment, ...] = ()
-    span: Span | None = None
+    span: ActionSpan | None = None
 
     def applicable(self, state: Collection[Fact], numbers: Numbers = _NONE) -> bool:
         """Whether the precondition holds in `state` and with these numbers."""
         return self.lacks(state, numbers) is None
 
-    def lacks(self, state: Collection[Fact], numbers: Numbers = _NONE) -> Fact | Bound | None:
+    def lacks(self, state: Collection[Fact], numbers: Numbers = _NONE) -> Fact | NumericBound | None:
         """The first part of the precondition that does not hold."""
         missing = next((needed for needed in self.precondition if needed not in state), None)
         return missing or next((bound for bound in self.bounds if not bound.holds(numbers)), None)
@@ -111,7 +111,7 @@ class GroundAction:
 
 @dataclass(frozen=True)
 class Problem:
-    """What an engine is asked; made by `planning.posing.problem.pose`.
+    """What an engine is asked; made by `planning.problem.construction.pose`.
 
     Attributes:
         domain: the planning domain's name.
@@ -137,7 +137,7 @@ class Problem:
     unreachable: tuple[str, ...] = ()
     unsliced: Callable[[], Problem] | None = field(default=None, compare=False)
     numbers: Mapping[Fact, float] = field(default_factory=dict)
-    bounds: tuple[Bound, ...] = ()
+    bounds: tuple[NumericBound, ...] = ()
     notes: tuple[str, ...] = ()
     one_at_a_time: bool = False
     timed: Problem | None = None
@@ -229,9 +229,11 @@ def _missing(needed: tuple[Fact, ...], state: frozenset[Fact]) -> str | None:
     return next((str(one) for one in needed if one not in state), None)
 
 
-def _event(needed: tuple[Fact, ...], adds: tuple[Fact, ...], deletes: tuple[Fact, ...]) -> Event[frozenset[Fact]]:
+def _event(
+    needed: tuple[Fact, ...], adds: tuple[Fact, ...], deletes: tuple[Fact, ...]
+) -> TimelineEvent[frozenset[Fact]]:
     changes = {**dict.fromkeys(deletes, False), **dict.fromkeys(adds, True)}
-    return Event(partial(_missing, needed), lambda _: changes)
+    return TimelineEvent(partial(_missing, needed), lambda _: changes)
 
 
 def _changed(state: frozenset[Fact], changes: Changes) -> frozenset[Fact]:

@@ -36,9 +36,7 @@ class FaultyPlanner:
         reached: is told `while planning`, see `Crashes.reached`.
     """
 
-    def __init__(
-        self, planner: Planner, faults: Faults, reached: Callable[[str], Awaitable[None]] = _nothing
-    ) -> None:
+    def __init__(self, planner: Planner, faults: Faults, reached: Callable[[str], Awaitable[None]] = _nothing) -> None:
         self._planner = planner
         self._faults = faults
         self._reached = reached

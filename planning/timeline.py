@@ -25,7 +25,7 @@ FINEST = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Event(Generic[State]):
+class TimelineEvent(Generic[State]):
     """What happens at one end of an act.
 
     Attributes:
@@ -49,9 +49,9 @@ class Act(Generic[State]):
     """
 
     timing: Timing
-    start: Event[State]
+    start: TimelineEvent[State]
     lasting: Lacks[State] | None = None
-    end: Event[State] | None = None
+    end: TimelineEvent[State] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +62,7 @@ class Flaw:
     why: str
 
 
-def carried_out(
-    acts: Sequence[Act[State]], state: State, after: Callable[[State, Changes], State]
-) -> State | Flaw:
+def carried_out(acts: Sequence[Act[State]], state: State, after: Callable[[State, Changes], State]) -> State | Flaw:
     """The state when all acts are over, or the first flaw.
 
     Args:
@@ -72,7 +70,7 @@ def carried_out(
         state: the present.
         after: makes a state with changes of another, which stays as it is.
     """
-    moments: dict[int, list[tuple[int, Event[State]]]] = {}
+    moments: dict[int, list[tuple[int, TimelineEvent[State]]]] = {}
     for number, act in enumerate(acts):
         moments.setdefault(moment(act.timing.start), []).append((number, act.start))
         if act.end is not None:
@@ -97,7 +95,7 @@ def moment(seconds: float) -> int:
 
 
 def _flaw(
-    happening: Sequence[tuple[int, Event[State]]], state: State, after: Callable[[State, Changes], State]
+    happening: Sequence[tuple[int, TimelineEvent[State]]], state: State, after: Callable[[State, Changes], State]
 ) -> Flaw | None:
     for number, event in happening:
         missing = event.lacks(state)
@@ -120,7 +118,7 @@ def _differ(value: Content, other: Content) -> bool:
 
 
 def _together(
-    happening: Sequence[tuple[int, Event[State]]], state: State, after: Callable[[State, Changes], State]
+    happening: Sequence[tuple[int, TimelineEvent[State]]], state: State, after: Callable[[State, Changes], State]
 ) -> State:
     changes: dict[Fact, Content] = {}
     for _, event in happening:

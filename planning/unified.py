@@ -15,7 +15,7 @@ from unified_planning.model import Problem as UpProblem
 from knowledge_base.errors import InputError
 from knowledge_base.exchange.pddl import Metric, ProblemText, read_problem
 from planning.domain import PlanningDomain
-from planning.posing.costs import TOTAL_COST
+from planning.problem.costs import TOTAL_COST
 
 if TYPE_CHECKING:
     from knowledge_base import View
@@ -44,9 +44,7 @@ def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:
     return domain, read_problem(texts[1], domain.schema, f"{name} (problem)", domain.name)
 
 
-def to_unified(
-    domain: PlanningDomain, world: View, goal: str | Expression, metric: Metric | None = None
-) -> UpProblem:
+def to_unified(domain: PlanningDomain, world: View, goal: str | Expression, metric: Metric | None = None) -> UpProblem:
     """What is known and wanted as a problem of unified-planning, with types, things and actions as they are.
 
     Args:

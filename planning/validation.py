@@ -13,8 +13,8 @@ from knowledge_base.language.expression import Expression
 from knowledge_base.language.terms import as_number
 from knowledge_base.world.overlay import Overlay
 from planning.plan import Plan
-from planning.posing.derived import derivation
-from planning.timeline import FINEST, Act, Changes, Event, Flaw, carried_out
+from planning.problem.derived import derivation
+from planning.timeline import FINEST, Act, Changes, Flaw, TimelineEvent, carried_out
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from knowledge_base.language.vocabulary import Vocabulary
     from planning.domain import PlanningDomain
     from planning.plan import PlanStep, Timing
-    from planning.posing.derived import Derivation
+    from planning.problem.derived import Derivation
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,8 +118,8 @@ def _act(step: PlanStep, timing: Timing, domain: PlanningDomain, world: World) -
     return Act(timing, start, partial(_missing, timed.over_all, bindings), end)
 
 
-def _event(condition: Expression, effect: Effect, bindings: Mapping[str, Value]) -> Event[Overlay]:
-    return Event(partial(_missing, condition, bindings), partial(_changes, effect, bindings))
+def _event(condition: Expression, effect: Effect, bindings: Mapping[str, Value]) -> TimelineEvent[Overlay]:
+    return TimelineEvent(partial(_missing, condition, bindings), partial(_changes, effect, bindings))
 
 
 def _missing(condition: Expression, bindings: Mapping[str, Value], state: Overlay) -> str | None:

@@ -38,12 +38,15 @@ WHY = {
     "rich": ("trees, tables and progress on a terminal", IN_PROCESS),
     "ruamel.yaml": ("YAML 1.2 with places and comments", IN_PROCESS),
     "typer": ("the command line", IN_PROCESS),
-    "unified-planning": ("other planning engines, and problems in its form (`to_unified`)", "imported by `planning.unified` and in the engines' processes"),
+    "unified-planning": (
+        "other planning engines, and problems in its form (`to_unified`)",
+        "imported by `planning.unified` and in the engines' processes",
+    ),
     "up-pyperplan": ("pyperplan for who plans with unified-planning", "found by unified-planning; not imported"),
     "up-fast-downward": ("the engine `fast-downward`", APART),
     "up-enhsp": ("the engine `enhsp`, which is a Java program", APART),
     "up-aries": ("the engine `aries`", APART),
-    "py-trees": ("behaviour trees as skills", "imported by `dsc.components.trees`"),
+    "py-trees": ("behaviour trees as skills", "imported by `dsc.components.behaviour_trees`"),
     "starlette": ("the page's requests", "imported where a page is served"),
     "uvicorn": ("the page's server", "imported where a page is served"),
     "websockets": ("the page's socket", "imported where a page is served"),
@@ -121,7 +124,11 @@ def page() -> str:
     """docs/dependencies.md."""
     lines = [HEAD]
     for group, title in TITLES.items():
-        lines += [f"## {title}\n", "| package | from | licence | for | how it is met |", "| --- | --- | --- | --- | --- |"]
+        lines += [
+            f"## {title}\n",
+            "| package | from | licence | for | how it is met |",
+            "| --- | --- | --- | --- | --- |",
+        ]
         for one in requirements():
             if one.group == group:
                 why, how = WHY[one.package]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from knowledge_base.journal import memory
+from knowledge_base.journal import memory_history
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
 EVENTS = 6_000
@@ -26,7 +26,7 @@ def _quick_collections():
 @pytest.mark.usefixtures("_quick_collections")
 def test_a_run_holds_nothing_of_what_is_over(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(BENCHMARKS)
-    monkeypatch.setattr(memory, "MOST_KEPT", 100)  # the history of knowledge is full at once
+    monkeypatch.setattr(memory_history, "MOST_KEPT", 100)  # the history of knowledge is full at once
     from memory_run import Watch
 
     blocks = []
@@ -45,7 +45,17 @@ def test_a_run_holds_nothing_of_what_is_over(monkeypatch, tmp_path):
 
 
 def test_every_way_is_measured(tmp_path):
-    command = [sys.executable, BENCHMARKS / "memory.py", "--events", "200", "--ways", "store", "--json", "--folder", tmp_path]
+    command = [
+        sys.executable,
+        BENCHMARKS / "memory.py",
+        "--events",
+        "200",
+        "--ways",
+        "store",
+        "--json",
+        "--folder",
+        tmp_path,
+    ]
     samples = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert [one["events"] for one in samples] == [*range(20, 201, 20)]
     assert samples[-1]["hours"] == pytest.approx(24, rel=0.1)

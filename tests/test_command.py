@@ -91,7 +91,9 @@ def test_nothing_people_get_wrong_gives_a_traceback(dsc, tmp_path):
     recognise = (TABLE / "plots" / "recognise.yaml").read_text()
     file("recognise.yaml", recognise)
     good = {"use": "recognise", "target": "ended", "third": "not_possible: ended"}
-    problem = "(define (problem p) (:domain clean-up-table)\n (:objects red - {kind})\n (:init {fact})\n (:goal (tidy red)))"
+    problem = (
+        "(define (problem p) (:domain clean-up-table)\n (:objects red - {kind})\n (:init {fact})\n (:goal (tidy red)))"
+    )
     cases = [
         (["run", "clean-up-tabel"], "clean-up-table"),
         (["run", "clean-up-table", "--scenario", tmp_path / "none.yaml"], "there is no file"),
@@ -129,7 +131,11 @@ def test_bad_input_is_told_to_programs_as_json(dsc, tmp_path):
     ("words", "message", "nearest"),
     [
         (["run", "clean-up-table", "--sed", "3"], "no such option: --sed", "--seed"),
-        (["run", "clean-up-table", "--faults", "2"], "Invalid value for '--faults': Input should be less than or equal to 1", None),
+        (
+            ["run", "clean-up-table", "--faults", "2"],
+            "Invalid value for '--faults': Input should be less than or equal to 1",
+            None,
+        ),
         (["run", "clean-up-table", "--durability", "fo"], "is not one of 'process', 'power'", None),
         (["plan"], "Missing argument 'DOMAIN... PROBLEM'", None),
         (["fly"], "No such command 'fly'", None),
@@ -198,7 +204,9 @@ def outputs(folder):
     """Each option that names a file to be written, with a command that would write it."""
     problem = folder / "problem.pddl"
     (folder / "domain.pddl").write_text((TABLE / "domain.pddl").read_text())
-    problem.write_text("(define (problem p) (:domain clean-up-table) (:objects red - cup) (:init) (:goal (not (tidy red))))")
+    problem.write_text(
+        "(define (problem p) (:domain clean-up-table) (:objects red - cup) (:init) (:goal (not (tidy red))))"
+    )
     chart = folder / "chart.scxml"
     chart.write_text('<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0"><final id="end"/></scxml>')
     shutil.copytree(PLOTS, folder, dirs_exist_ok=True)
@@ -373,7 +381,7 @@ def test_no_kind_of_file_gives_a_traceback_or_a_wait(dsc, tmp_path, store, monke
         (tmp_path / name).write_text(text)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("knowledge_base.pddl.files.WRITER_S", 0.0)
-    monkeypatch.setattr("knowledge_base.outputs.PATIENCE_S", 0.0)
+    monkeypatch.setattr("knowledge_base.output_files.PATIENCE_S", 0.0)
     monkeypatch.setattr("dsc.viewer.cli.until_interrupt", lambda _: None)
     monkeypatch.setattr(CleanUpTable, "run", would_run)
     for path in bad_files(tmp_path / "bad", store):

@@ -8,7 +8,11 @@ import sys
 import pytest
 from dependencies import PAGE, TITLES, WHY, Requirement, licence, requirements
 
-ROWS = [tuple(cell.strip() for cell in line.split("|")[1:-1]) for line in PAGE.read_text().splitlines() if line.startswith("| ")]
+ROWS = [
+    tuple(cell.strip() for cell in line.split("|")[1:-1])
+    for line in PAGE.read_text().splitlines()
+    if line.startswith("| ")
+]
 
 
 def test_the_page_lists_all_that_the_project_names_and_nothing_else():

@@ -25,11 +25,11 @@ from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
-from dsc.text.plots import parse_plot
+from dsc.text.plot_files import parse_plot
 from dsc.trace import Trace
 from knowledge_base import Delta, Fact, KnowledgeBase, Schema, StoreError
-from knowledge_base.journal import journal, memory
-from knowledge_base.journal.memory import MemoryHistory
+from knowledge_base.journal import journal, memory_history
+from knowledge_base.journal.memory_history import MemoryHistory
 
 SCHEMA = Schema.parse("(define (domain d) (:predicates (quiet)))")
 QUIET, LOUD = Delta(added=(Fact("quiet"),)), Delta(removed=(Fact("quiet"),))
@@ -51,7 +51,7 @@ def exchanged(function, old, new):
 def exactly_the_last_keys_are_remembered():
     """A repeated key counts as long as it is one of the last `MOST_KEYS`, and not longer."""
     kb = KnowledgeBase(SCHEMA)
-    most, memory.MOST_KEYS = memory.MOST_KEYS, 3
+    most, memory_history.MOST_KEYS = memory_history.MOST_KEYS, 3
     try:
         for number in range(4):
             kb.apply(LOUD if number % 2 else QUIET, "a", key=f"key {number}")
@@ -61,7 +61,7 @@ def exactly_the_last_keys_are_remembered():
         kb.apply(QUIET, "a", key="key 0")
         assert kb.version == version + 1
     finally:
-        memory.MOST_KEYS = most
+        memory_history.MOST_KEYS = most
 
 
 def a_key_at_the_oldest_version_outlives_compaction(folder):
@@ -248,7 +248,9 @@ def judged(judge, folder):
     judge(*[folder] * len(inspect.signature(judge).parameters))
 
 
-@pytest.mark.parametrize("judge", dict.fromkeys([*(bug[-1] for bug in BUGS.values()), a_key_at_the_oldest_version_outlives_compaction]))
+@pytest.mark.parametrize(
+    "judge", dict.fromkeys([*(bug[-1] for bug in BUGS.values()), a_key_at_the_oldest_version_outlives_compaction])
+)
 def test_it_holds(judge, tmp_path):
     judged(judge, tmp_path)
 

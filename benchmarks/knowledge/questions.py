@@ -59,9 +59,7 @@ def compared(case: str, figures: Figures, bound: float | None = None, unit: str 
     return Row(case, unit, cells, ratio(figures, fastest, ENGINE), fastest, targets)
 
 
-def _by_text(
-    case: str, floor: Contender, own: Contender, method: str, asked: list[tuple[str, ...]], pace: Pace
-) -> Row:
+def _by_text(case: str, floor: Contender, own: Contender, method: str, asked: list[tuple[str, ...]], pace: Pace) -> Row:
     """What it takes to give the text of a question each time."""
     jobs = {FLOOR: _asking(floor, method, asked), ENGINE: _asking(own, f"{method}_by_text", asked)}
     figures = measure(jobs, pace)

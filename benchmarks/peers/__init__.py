@@ -15,7 +15,5 @@ FILES = {
 def contenders() -> list[Contender]:
     """Everyone who is installed."""
     return [
-        import_module(f"peers.{file}").CONTENDER
-        for file, package in FILES.items()
-        if not package or find_spec(package)
+        import_module(f"peers.{file}").CONTENDER for file, package in FILES.items() if not package or find_spec(package)
     ]

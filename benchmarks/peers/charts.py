@@ -60,9 +60,7 @@ def deep(levels: int = 5) -> Chart:
 
 def regions(count: int = 4) -> Chart:
     """Regions that are active together and all react."""
-    inside = {
-        f"r{n}": {f"x{n}": State({PING: f"y{n}"}), f"y{n}": State({PING: f"x{n}"})} for n in range(1, count + 1)
-    }
+    inside = {f"r{n}": {f"x{n}": State({PING: f"y{n}"}), f"y{n}": State({PING: f"x{n}"})} for n in range(1, count + 1)}
     leaves = [frozenset(f"{side}{n}" for n in range(1, count + 1)) for side in "xy"]
     return Chart(f"{count} regions", {"all": State(regions=inside)}, 2, lambda n: leaves[n % 2])
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from domains.clean_up_table.deployment import deploy as deploy
     from domains.clean_up_table.report import Report as Report
     from domains.clean_up_table.scenario import Scenario as Scenario
-    from domains.clean_up_table.world import World as World
+    from domains.clean_up_table.table_world import TableWorld as TableWorld
 
 __getattr__, __dir__, __all__ = lazy_exports(
     __name__,
@@ -19,7 +19,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "CleanUpTable": "deployment",
         "Report": "report",
         "Scenario": "scenario",
-        "World": "world",
+        "TableWorld": "table_world",
         "deploy": "deployment",
     },
 )

@@ -11,13 +11,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Self
 
-from domains.clean_up_table.foresight import Physics
+from domains.clean_up_table.components import Arm, Base, Camera, Voice, initial_knowledge
+from domains.clean_up_table.durable_world import DurableWorld, beside, require_free
+from domains.clean_up_table.physics import Physics
 from domains.clean_up_table.report import Report, summarise
 from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.second_robot import PatientCamera, SuctionArm, Tracks
-from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
-from domains.clean_up_table.world import World
-from domains.clean_up_table.world_file import LastingWorld, beside, require_free
+from domains.clean_up_table.table_world import TableWorld
 from domains.tally import Tally
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
@@ -26,7 +26,7 @@ from dsc.model.profile import Profile
 from dsc.profiles import adapted, configure
 from dsc.sequencer.run_tables import archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
-from dsc.text.plots import load_library
+from dsc.text.plot_files import load_library
 from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError, Place, StoreError, UnknownNameError
 from knowledge_base.journal.file import Durability
@@ -52,7 +52,7 @@ class CleanUpTable:
         profile: what the robot was made after; `None` is the usual one.
     """
 
-    world: World
+    world: TableWorld
     executive: Executive
     tally: Tally = field(default_factory=Tally)
     resumes: bool = False
@@ -69,7 +69,7 @@ class CleanUpTable:
     def close(self) -> None:
         """End the planner's process, if there is one of its own, and give back the files."""
         self.executive.close()
-        if isinstance(self.world, LastingWorld):
+        if isinstance(self.world, DurableWorld):
             self.world.close()
 
     def run(self, *, simulated: bool = True, prepare: Callable[[Sequencer], None] | None = None) -> Report:
@@ -152,7 +152,7 @@ def deploy(
     if has_run(store):
         raise InputError(f"'{store}' has a run already; go on with it by --resume, or take another file")
     require_free(beside(store))
-    lasting = LastingWorld.from_state(world.state())
+    lasting = DurableWorld.from_state(world.state())
     deployed = _wired(lasting, planner, listener, profile, store, durability)
     try:
         lasting.create(beside(store))
@@ -180,13 +180,13 @@ def resumed(
         raise StoreError(whose, place=Place(str(store)))
     said = run.header.get("settings")
     profile = None if said is None else Profile.model_validate(said)
-    deployed = _wired(LastingWorld.open(beside(store)), planner, listener, profile, store, durability)
+    deployed = _wired(DurableWorld.open(beside(store)), planner, listener, profile, store, durability)
     deployed.resumes = True
     return deployed
 
 
 def _wired(
-    world: World,
+    world: TableWorld,
     planner: Planner | None,
     listener: Listener | None,
     profile: Profile | None,
@@ -207,12 +207,12 @@ def _wired(
     return deployed
 
 
-def on_wheels(world: World) -> list[Component]:
+def on_wheels(world: TableWorld) -> list[Component]:
     """A base on wheels, an arm with a hand."""
     return [Base(world), Arm(world), Camera(world), Voice(world)]
 
 
-def on_tracks(world: World) -> list[Component]:
+def on_tracks(world: TableWorld) -> list[Component]:
     """A base on tracks, an arm that holds by suction; see `second_robot`."""
     return [Tracks(world), SuctionArm(world), PatientCamera(world), Voice(world)]
 
@@ -222,7 +222,7 @@ ROBOTS = {"on_wheels": on_wheels, "on_tracks": on_tracks}
 PROFILES = HOME / "profiles"
 
 
-def robot(profile: Profile | None) -> Callable[[World], list[Component]]:
+def robot(profile: Profile | None) -> Callable[[TableWorld], list[Component]]:
     """What makes the components of the robot that a profile names; raises `UnknownNameError`."""
     name = "on_wheels" if profile is None or profile.robot is None else profile.robot
     if name not in ROBOTS:
@@ -257,7 +257,7 @@ def bundle() -> Bundle:
 class _SceneWriter:
     """Writes a `scene` record whenever a component's answer has changed what there is to draw."""
 
-    def __init__(self, world: World, sequencer: Sequencer) -> None:
+    def __init__(self, world: TableWorld, sequencer: Sequencer) -> None:
         self._world = world
         self._trace = sequencer.trace
         self._drawn: list[dict[str, Any]] | None = None
@@ -269,5 +269,3 @@ class _SceneWriter:
         if scene != self._drawn:
             self._drawn = scene
             self._trace.record("scene", things=scene)
-
-

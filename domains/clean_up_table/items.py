@@ -52,9 +52,7 @@ def check_behind(name: str, fronts: Mapping[str, str | None]) -> None:
     front = fronts[name]
     while front is not None:
         if front not in fronts:
-            raise UnknownNameError(
-                f"'{name}' is behind '{front}', which does not exist", found=front, valid=fronts
-            )
+            raise UnknownNameError(f"'{name}' is behind '{front}', which does not exist", found=front, valid=fronts)
         if front in passed:
             raise InputError(f"'{name}' is behind items that stand behind each other", found=front)
         passed.add(front)
@@ -100,9 +98,7 @@ class Item:
         return self is not carrier and (self.kind, carrier.kind) in {(CUP, CUP), (CAN, CRISP_CAN)}
 
 
-def new_item(
-    kind: str, name: str, *, surface: str = "table", size: str = "small", behind: str | None = None
-) -> Item:
+def new_item(kind: str, name: str, *, surface: str = "table", size: str = "small", behind: str | None = None) -> Item:
     """An item standing on a surface; `size` matters for a crisp can only.
 
     Raises:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from domains.clean_up_table.results import Result, Sighting
-    from domains.clean_up_table.world import World
+    from domains.clean_up_table.table_world import TableWorld
 
 
 class _Notes:
@@ -53,7 +53,7 @@ class _Notes:
         return Delta(self.nodes, tuple(self.removed), tuple(self.added), self.values)
 
 
-def initial_knowledge(world: World) -> Delta:
+def initial_knowledge(world: TableWorld) -> Delta:
     """What the robot knows before it has looked: the places, itself, and how room is counted."""
     notes = _Notes()
     notes.nodes.update(TYPES)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
 from domains.tally import Tally
 from dsc.sequencer.sequencer import RunEnd
 from knowledge_base.store import KnowledgeBase
@@ -30,7 +30,7 @@ class LeftItem:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class ReportedFault:
     """A fault that the simulation let happen: its kind, whether it passes, and the items it hit."""
 
     kind: str
@@ -69,7 +69,7 @@ class Report:
     recoveries: Mapping[str, int]
     candidates_chosen: Mapping[str, int]
     excluded: Mapping[str, int]
-    faults: tuple[Fault, ...]
+    faults: tuple[ReportedFault, ...]
     touched: tuple[str, ...]
     simulated_s: float
     wall_s: float
@@ -99,11 +99,9 @@ class Report:
         return lines
 
 
-def summarise(world: World, knowledge: KnowledgeBase, tally: Tally, end: RunEnd, wall_s: float) -> Report:
+def summarise(world: TableWorld, knowledge: KnowledgeBase, tally: Tally, end: RunEnd, wall_s: float) -> Report:
     """The report of a run that has ended."""
-    left = tuple(
-        LeftItem(one.item, one.where, reason_for(one.item, knowledge, end)) for one in world.left()
-    )
+    left = tuple(LeftItem(one.item, one.where, reason_for(one.item, knowledge, end)) for one in world.left())
     return Report(
         goal_reached=not left and end.problem is None,
         items=sum(1 for item in world.items if item.on_table),
@@ -115,7 +113,7 @@ def summarise(world: World, knowledge: KnowledgeBase, tally: Tally, end: RunEnd,
         recoveries=dict(sorted(tally.recoveries.items())),
         candidates_chosen=dict(sorted(tally.candidates.items())),
         excluded=dict(sorted(tally.excluded.items())),
-        faults=tuple(Fault(one.kind, one.permanent, one.items) for one in world.fired),
+        faults=tuple(ReportedFault(one.kind, one.permanent, one.items) for one in world.fired),
         touched=tuple(sorted(world.touched())),
         simulated_s=round(tally.seconds, 3),
         wall_s=round(wall_s, 3),
@@ -146,4 +144,3 @@ def _why_it_ended(end: RunEnd) -> str:
     if any(event.name == STOPPED for event in end.emitted):
         return "the operator stopped the run"
     return end.problem or "the run ended before it was cleared away"
-

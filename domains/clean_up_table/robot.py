@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from domains.clean_up_table.faults import (
+from domains.clean_up_table.items import HAND, Item
+from domains.clean_up_table.places import DESTINATIONS
+from domains.clean_up_table.results import Attribute, Result, Sighting, gone, not_possible
+from domains.clean_up_table.room import Room
+from domains.clean_up_table.world_faults import (
     GRASP_FAILED,
     ITEM_ADDED,
     ITEM_MOVED,
@@ -14,16 +18,12 @@ from domains.clean_up_table.faults import (
     STACK_FELL,
     Draw,
 )
-from domains.clean_up_table.items import HAND, Item
-from domains.clean_up_table.places import DESTINATIONS
-from domains.clean_up_table.results import Attribute, Result, Sighting, gone, not_possible
-from domains.clean_up_table.room import Room
 from dsc.chance import choose
 
 _OUTCOMES = {GRASP_FAILED: "grasp_failed", NO_INVERSE_KINEMATICS: "no_ik"}
 
 
-class Robot(Room):
+class RobotBody(Room):
     """A room with a robot in it: one place at a time, one hand, one camera."""
 
     # What is in the way of a verb: a result, or `None` when nothing is.

@@ -10,11 +10,11 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Self
 
 from domains.clean_up_table import truth
-from domains.clean_up_table.faults import ITEM_ADDED, ITEM_MOVED, Draw, Faults, FiredFault
 from domains.clean_up_table.items import CAN, CUP, Inventory, Item, new_item
 from domains.clean_up_table.places import OPERATOR, PLACES, SURFACES
 from domains.clean_up_table.results import Result
 from domains.clean_up_table.scene import scene
+from domains.clean_up_table.world_faults import ITEM_ADDED, ITEM_MOVED, Draw, FiredFault, WorldFaults
 from dsc.chance import choose
 from knowledge_base.errors import InputError, UnknownNameError
 
@@ -44,7 +44,7 @@ class Room:
             raise UnknownNameError(f"there is no place '{robot_at}'", found=robot_at, valid=PLACES)
         # The room changes its items: copies keep two rooms made from one list apart.
         self.items = Inventory(copy.copy(item) for item in items)
-        self.faults = Faults(seed, faults)
+        self.faults = WorldFaults(seed, faults)
         self.robot_at = robot_at
         self.trips = 0
         self.said: list[str] = []
@@ -192,7 +192,7 @@ class Room:
             Room.__init__(self, (Item(**item) for item in state["items"]), robot_at=state["robot_at"])
             self.trips = state["trips"]
             self.said = list(state["said"])
-            self.faults = Faults.from_json(state["faults"])
+            self.faults = WorldFaults.from_json(state["faults"])
             drive, place = state["departure"]
             self.departure = drive, place
             self.done = {name: Result.from_json(data) for name, data in state["done"].items()}

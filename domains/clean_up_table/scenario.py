@@ -38,10 +38,10 @@ from domains.clean_up_table.items import (
     new_item,
 )
 from domains.clean_up_table.places import OPERATOR, PLACES
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
 from dsc.model.reading import Form
-from dsc.text.files import read_file
 from dsc.text.form import read_model
+from dsc.text.text_files import read_file
 from dsc.text.yaml import load_document
 from knowledge_base.errors import InputError, Place, UnknownNameError
 
@@ -113,7 +113,7 @@ class Scenario(_Form):
         """Four cups, three cans, a small and a large crisp can."""
         return cls(table=Table(cups=4, cans=3, crisp_cans=("small", "large")))
 
-    def world(self, seed: int | None = None, faults: float | None = None) -> World:
+    def world(self, seed: int | None = None, faults: float | None = None) -> TableWorld:
         """A new world as the scenario describes it.
 
         Args:
@@ -126,7 +126,7 @@ class Scenario(_Form):
         self.check()
         seed = self.seed if seed is None else seed
         faults = self.faults if faults is None else faults
-        return World(self._items(), seed=seed or 0, faults=faults or 0.0, robot_at=self.robot_at)
+        return TableWorld(self._items(), seed=seed or 0, faults=faults or 0.0, robot_at=self.robot_at)
 
     def check(self, place_of: PlaceOf = lambda _path: None) -> None:
         """Raise `InputError` for a name or word that is not valid, located by `place_of` its path of keys."""

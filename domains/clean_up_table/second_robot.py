@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-from domains.clean_up_table.places import PLACES, distance
-from domains.clean_up_table.skills import (
+from domains.clean_up_table.components import (
     Arm,
     Base,
     Camera,
@@ -21,6 +20,7 @@ from domains.clean_up_table.skills import (
     seconds,
     takes_out,
 )
+from domains.clean_up_table.places import PLACES, distance
 from dsc.calls import Outcome, SkillCall
 from dsc.components.parameters import Parameter
 from dsc.skills import skill

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from domains.clean_up_table.faults import GRASP_FAILED, NO_INVERSE_KINEMATICS, Faults
+from domains.clean_up_table.world_faults import GRASP_FAILED, NO_INVERSE_KINEMATICS, WorldFaults
 
 if TYPE_CHECKING:
     from domains.clean_up_table.items import Inventory, Item
@@ -28,7 +28,7 @@ class Left:
     reason: str | None
 
 
-def blame(item: Item, items: Inventory, faults: Faults) -> str | None:
+def blame(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
     """The permanent fault that keeps an item from its destination, in words; `None` when none does."""
     if item.disposed:
         return None
@@ -43,7 +43,7 @@ def blame(item: Item, items: Inventory, faults: Faults) -> str | None:
     return _stuck(item, items, faults)
 
 
-def _stuck(item: Item, items: Inventory, faults: Faults) -> str | None:
+def _stuck(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
     """The arm takes items out of carriers on a surface only; a carrier stuck inside another keeps its own."""
     carrier = items.get(item.where)
     outer = items.get(carrier.where) if carrier else None
@@ -52,7 +52,7 @@ def _stuck(item: Item, items: Inventory, faults: Faults) -> str | None:
     return None
 
 
-def left(items: Inventory, faults: Faults) -> list[Left]:
+def left(items: Inventory, faults: WorldFaults) -> list[Left]:
     """Every item that ever stood on the table and is not in its destination, in the order they came."""
     return [
         Left(item.name, _where(item, items), blame(item, items, faults))

@@ -9,12 +9,19 @@ from pathlib import Path
 from typing import Any, ClassVar, cast
 
 from dsc.calls import Ended, Outcome, SkillCall, Status
-from dsc.components.activations import Activations
-from dsc.components.declarations import check_declarations
+from dsc.components.component_dependencies import ALWAYS
+from dsc.components.event_activations import EventActivations
 from dsc.components.hooks import contained
-from dsc.components.life import NEUTRAL, Life, LifeCycle
-from dsc.components.needs import ALWAYS
-from dsc.components.parameters import Parameter, changed, check_relations, known, require_bound, unsaid
+from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
+from dsc.components.parameters import (
+    Parameter,
+    changed,
+    check_declarations,
+    check_relations,
+    known,
+    require_bound,
+    unsaid,
+)
 from dsc.components.streams import Push, Stream
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
@@ -64,7 +71,7 @@ class Component:
         self.life = LifeCycle()
         self._starting = False
         self._activators: set[int] = set()
-        self.activations = Activations()
+        self.activations = EventActivations()
         self.pushes: dict[str, Push] = {}
         self.streams: dict[str, Stream] = {}
         for port, declared in self._ports.items():

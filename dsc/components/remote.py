@@ -18,12 +18,12 @@ from dataclasses import asdict
 from typing import Any
 
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
+from dsc.components.activation import Heartbeat
 from dsc.components.component import Component
 from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError
-from dsc.components.heartbeats import Heart
 from dsc.components.hosted import HostedActions, outcome_of
-from dsc.components.life import Life
-from dsc.components.pushing import RENEWED, Publisher, Subscription
+from dsc.components.life_cycle import Life
+from dsc.components.publication import RENEWED, Publisher, Subscription
 from dsc.components.remote_streams import HostedStreams, ports_form, ports_of
 from dsc.components.transport import Transport
 from dsc.skills import SkillSignature
@@ -60,7 +60,7 @@ class Host:
         self.endpoint.answer("take", lambda _, said: component.take(said["port"], said["message"]))
         self.endpoint.answer("diagnose", lambda _, __: component.diagnose())
         self._is_active = asyncio.Event()
-        self._heart = Heart(self.endpoint, component.needed, self._activated)
+        self._heart = Heartbeat(self.endpoint, component.needed, self._activated)
         self._beating = asyncio.get_running_loop().create_task(self._heart.run())
         self._changed()
         component.life.listen(self._changed)
@@ -114,16 +114,14 @@ class RemoteComponent(Component):
     The host outlives programs, whose action ids are alike: there, they stand behind a name for the program's run.
     """
 
-    def __init__(
-        self, name: str, transport: Transport, endpoint: Endpoint, skills: dict[str, SkillSignature]
-    ) -> None:
+    def __init__(self, name: str, transport: Transport, endpoint: Endpoint, skills: dict[str, SkillSignature]) -> None:
         super().__init__(name)
         self._transport = transport
         self._endpoint = endpoint
         self._skills = skills
         self._run = endpoint.life
         self._there = Subscription(endpoint, name, CONDITION, self._heard)
-        self._heart = Heart(endpoint, lambda: [name], _unmoved, root=True)
+        self._heart = Heartbeat(endpoint, lambda: [name], _unmoved, root=True)
         self._working: tuple[asyncio.Task[None], ...] = ()
 
     def remember(self) -> str:

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from dsc.components.pushing import Publisher, Subscription
+from dsc.components.publication import Publisher, Subscription
 from dsc.components.streams import Hears, Push
 
 if TYPE_CHECKING:

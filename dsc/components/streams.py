@@ -1,33 +1,22 @@
-"""Data between components, which passes the plots by: *push newest*, *push timed*, and who takes it (S1.1, S1.15).
-
-    class Laser(Component):
-        scan = Push({"metres": "number"})                     # push newest: whenever there is something new
-        heat = Push({"celsius": "number"}, period=0.5)        # push timed: the newest, every half second
-
-    class Mapper(Component):
-        needs = {ALWAYS: ("laser",)}
-        scan = Stream("laser.scan", {"metres": "number"})
-
-`self.scan.put(metres=2.0)` there is `self.scan.value == {"metres": 2.0}` here: in one process, where the run connects
-them, or over a transport, where the hosts do. What is put is encoded, so that nothing is shared by accident.
-"""
+"""Streams carry data between components past the plots: *push newest* and *push timed* ports (S1.1, S1.15)."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 from dsc.components.endpoint import NoAnswerError, encoded
-from dsc.components.life import Life
+from dsc.components.life_cycle import Life
 from dsc.model.ranges import Range
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import shown
 
 if TYPE_CHECKING:
     from dsc.components.component import Component
+
 
 Values = Mapping[str, str | None]
 """What is pushed, by name with types: `number`, `boolean`, a word of any other type, or `None`: any plain data."""
@@ -217,3 +206,65 @@ def _checked(values: object, what: str) -> Values:
 
 
 _EXAMPLE = "{'metres': 'number'}"
+
+
+class Wiring:
+    """All connections between components that are deployed together; who is deployed late is connected then.
+
+    Raises:
+        UnknownNameError: a stream names a port, or a value of it, that its component does not have.
+        SchemaError: a value is of another type than the stream wants.
+    """
+
+    def __init__(self, components: Mapping[str, Component]) -> None:
+        self._components = components
+        self._connected: dict[Stream, Push] = {}
+        for component in components.values():
+            self._connect(component)
+
+    def deployed(self, component: Component) -> None:
+        """A component is there, maybe in place of another one."""
+        for stream, port in list(self._connected.items()):
+            if stream.publisher == component.name:
+                del self._connected[stream]
+                port.leave(stream.hear)
+        for one in self._components.values():
+            self._connect(one)
+
+    def close(self) -> None:
+        """Disconnect everything."""
+        for stream, port in self._connected.items():
+            port.leave(stream.hear)
+        self._connected = {}
+
+    def _connect(self, component: Component) -> None:
+        for stream in component.streams.values():
+            publisher = self._components.get(stream.publisher)
+            if publisher is not None and stream not in self._connected:
+                self._connected[stream] = port = port_for(stream, publisher)
+                port.listen(stream.hear)
+
+
+def port_for(stream: Stream, publisher: Component) -> Push:
+    """The port that a stream names, if it fits; raises `UnknownNameError` and `SchemaError` as `Wiring`."""
+    if stream.port not in publisher.pushes:
+        message = f"component '{publisher.name}' has no push port '{stream.port}'"
+        raise UnknownNameError(message, found=stream.port, valid=publisher.pushes)
+    require_fitting(stream.source, stream.values, publisher.pushes[stream.port].values)
+    return publisher.pushes[stream.port]
+
+
+def require_wired(components: Iterable[Component]) -> None:
+    """Raise an error unless all streams of these components have the ports that they name.
+
+    Raises:
+        UnknownNameError: there is no such component, port or value.
+        SchemaError: a value is of another type.
+    """
+    deployed = {component.name: component for component in components}
+    for component in deployed.values():
+        for stream in component.streams.values():
+            if stream.publisher not in deployed:
+                message = f"component '{component.name}' takes '{stream.source}', and there is no such component"
+                raise UnknownNameError(message, found=stream.publisher, valid=deployed)
+            port_for(stream, deployed[stream.publisher])

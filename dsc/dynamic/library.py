@@ -6,9 +6,9 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from dsc.dynamic.expansion import expand
+from dsc.dynamic.rule_expansion import expand
 from dsc.dynamic.substitution import stand_in
-from dsc.engine.compiler import compile_plot
+from dsc.engine.chart_compiler import compile_plot
 from dsc.engine.tables import CompiledPlot
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import Who

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from dsc.dynamic.added import Added
-from dsc.dynamic.outcomes import Plots
-from dsc.dynamic.steps import filled
+from dsc.dynamic.fresh_names import FreshNames
+from dsc.dynamic.plot_outcomes import Plots
+from dsc.dynamic.step_references import filled
 from dsc.events import DONE, FAILURES, GAVE_UP
 from dsc.model.actions import Assign, Emit, Internal, Tell
 from dsc.model.plot import ActionPlot
@@ -33,7 +33,7 @@ class Responses:
         added: gives names to what is added.
     """
 
-    def __init__(self, plot: ActionPlot, plots: Plots, added: Added) -> None:
+    def __init__(self, plot: ActionPlot, plots: Plots, added: FreshNames) -> None:
         self._plot = plot
         self._plots = plots
         self._added = added
@@ -176,14 +176,16 @@ def _spoken(rule: Rule) -> str:
 def because(outcome: str, giving_up: Transition) -> Transition:
     """A state's way out on `gave_up`, taken on another outcome: that outcome is the reason."""
     reason = {"event.reason": lang.Constant(outcome)}
-    return giving_up.model_copy(update={
-        "guard": None if giving_up.guard is None else lang.substitute(giving_up.guard, reason),
-        "assign": filled(giving_up.assign, reason),
-        "arguments": filled(giving_up.arguments, reason),
-        "passed": filled(giving_up.passed, reason),
-        "tell": None if giving_up.tell is None else substitute_effect(giving_up.tell, reason),
-        "do": tuple(_action_because(action, reason) for action in giving_up.do),
-    })
+    return giving_up.model_copy(
+        update={
+            "guard": None if giving_up.guard is None else lang.substitute(giving_up.guard, reason),
+            "assign": filled(giving_up.assign, reason),
+            "arguments": filled(giving_up.arguments, reason),
+            "passed": filled(giving_up.passed, reason),
+            "tell": None if giving_up.tell is None else substitute_effect(giving_up.tell, reason),
+            "do": tuple(_action_because(action, reason) for action in giving_up.do),
+        }
+    )
 
 
 def _action_because(action: Internal, reason: Terms) -> Internal:
@@ -194,7 +196,7 @@ def _action_because(action: Internal, reason: Terms) -> Internal:
             return Assign(assign=filled(action.assign, reason))
         case Emit():
             return action.model_copy(update={"arguments": filled(action.arguments, reason)})
-        case _:  # a log or a branch of profile scxml stays as it is
+        case _:  # a log or a branch of dialect scxml stays as it is
             return action
 
 
@@ -206,8 +208,10 @@ def _joined(rule: Rule, guard: lang.Expression | None, counting: Terms, after: T
         actions.append(Tell(tell=rule.do.tell))
     if counting:
         actions.append(Assign(assign=dict(counting)))
-    return after.model_copy(update={
-        "guard": None if not both else both[0] if len(both) == 1 else lang.And(tuple(both)),
-        "do": (*actions, *after.do),
-        "rule": rule.label,
-    })
+    return after.model_copy(
+        update={
+            "guard": None if not both else both[0] if len(both) == 1 else lang.And(tuple(both)),
+            "do": (*actions, *after.do),
+            "rule": rule.label,
+        }
+    )

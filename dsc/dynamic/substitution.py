@@ -60,8 +60,6 @@ def require_stand_in(original: ActionPlot, substitute: ActionPlot) -> None:
                 raise _refusal(original, substitute, lacking, name, attributes or ())
 
 
-def _refusal(
-    original: ActionPlot, substitute: ActionPlot, why: str, found: str, valid: Iterable[str]
-) -> InputError:
+def _refusal(original: ActionPlot, substitute: ActionPlot, why: str, found: str, valid: Iterable[str]) -> InputError:
     message = f"'{substitute.name}' cannot stand in for '{original.name}': it {why}"
     return SchemaError(message, place=substitute.place(("plot",)), found=found, valid=valid)

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from dsc.engine.configuration import Configuration, configuration_of
-from dsc.engine.entering import entry_set
+from dsc.engine.entry_set import entry_set
 from dsc.engine.membership import settle
-from dsc.engine.reaction import Action, Entrance, Exit, Part, Reaction, report
-from dsc.engine.selection import domain, left_by
+from dsc.engine.reaction import Action, CompiledReaction, Exit, ReactionPart, StateEntry, report
 from dsc.engine.steps import Taken
-from dsc.engine.tables import CompiledPlot, Edge, Node
+from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
+from dsc.engine.transition_selection import domain, left_by
 from dsc.events import DONE
 from dsc.model.actions import Block, Choose, Emit, Trigger
 from dsc.model.states import FinalState, HistoryState, State
@@ -23,26 +23,28 @@ from dsc.model.states import FinalState, HistoryState, State
 _AnyAction = TypeVar("_AnyAction", bound=Action)
 
 
-def reaction_of(configuration: Configuration, edges: tuple[Edge, ...], keeps: tuple[str, ...] = ()) -> Reaction:
+def reaction_of(
+    configuration: Configuration, edges: tuple[TransitionEdge, ...], keeps: tuple[str, ...] = ()
+) -> CompiledReaction:
     """The reaction of a configuration in which these transitions are taken."""
-    found: Reaction | None = configuration.reactions.get((edges, keeps))
+    found: CompiledReaction | None = configuration.reactions.get((edges, keeps))
     if found is None:
         found = configuration.reactions[edges, keeps] = _Work(configuration).taking(edges, keeps)
     return found
 
 
-def initial_reaction(compiled: CompiledPlot) -> Reaction:
+def initial_reaction(compiled: CompiledPlot) -> CompiledReaction:
     """How a plot is entered."""
-    found: Reaction | None = compiled.cache.get(None)
+    found: CompiledReaction | None = compiled.cache.get(None)
     if found is None:
         found = _Work(configuration_of(compiled, ())).entering()
         compiled.cache[None] = found
     return found
 
 
-def leaving_reaction(configuration: Configuration) -> Reaction:
+def leaving_reaction(configuration: Configuration) -> CompiledReaction:
     """How a plot is left because the state around it is, or because the run ends: all its states are interrupted."""
-    found: Reaction | None = configuration.reactions.get(None)
+    found: CompiledReaction | None = configuration.reactions.get(None)
     if found is None:
         found = configuration.reactions[None] = _Work(configuration).leaving()
     return found
@@ -66,7 +68,7 @@ class _Work:
     def compiled(self) -> CompiledPlot:
         return self.configuration.compiled
 
-    def taking(self, edges: tuple[Edge, ...], keeps: tuple[str, ...]) -> Reaction:
+    def taking(self, edges: tuple[TransitionEdge, ...], keeps: tuple[str, ...]) -> CompiledReaction:
         left_of = [left_by(self.compiled, edge, self.present, self.remembered) for edge in edges]
         own = {edge.source for edge, left in zip(edges, left_of, strict=True) if edge.source in left}
         exits = self._exits(set().union(*left_of), own)
@@ -75,21 +77,21 @@ class _Work:
             for history in edge.cleared:
                 self.remembered.pop(history, None)
         parts = [
-            Part(edge, effect, self._reached(edge), bool(effect or edge.passed))
+            ReactionPart(edge, effect, self._reached(edge), bool(effect or edge.passed))
             for edge, effect in zip(edges, effects, strict=True)
         ]
         return self._reaction(tuple(parts), exits, keeps, tuple([report(edge, self.compiled) for edge in edges]))
 
-    def entering(self) -> Reaction:
+    def entering(self) -> CompiledReaction:
         entrances = self._entrances(0, (self.compiled.nodes[0].initial,))
-        return self._reaction((Part(None, (), entrances, acts=False),), (), (), ())
+        return self._reaction((ReactionPart(None, (), entrances, acts=False),), (), (), ())
 
-    def leaving(self) -> Reaction:
+    def leaving(self) -> CompiledReaction:
         return self._reaction((), self._exits(self.present, set()), (), ())
 
     def _reaction(
-        self, parts: tuple[Part, ...], exits: tuple[Exit, ...], keeps: tuple[str, ...], taken: tuple[Taken, ...]
-    ) -> Reaction:
+        self, parts: tuple[ReactionPart, ...], exits: tuple[Exit, ...], keeps: tuple[str, ...], taken: tuple[Taken, ...]
+    ) -> CompiledReaction:
         entrances = [entrance for part in parts for entrance in part.entrances]
         following = configuration_of(
             self.compiled,
@@ -100,7 +102,7 @@ class _Work:
         quiet = not keeps and not self.waiting and not following.spontaneous
         silent = not parts and all(one.quiet for one in exits)
         still = quiet and bool(parts) and all(one.quiet for one in exits) and all(part.quiet for part in parts)
-        return Reaction(
+        return CompiledReaction(
             parts, exits, following, keeps, taken,
             exited=tuple(_names(one.node for one in exits)),
             entered=tuple(_names(one.node for one in entrances)),
@@ -134,12 +136,12 @@ class _Work:
                 kept = tuple([child for child in nodes[index].children if child in configuration.members])
             self.remembered[history] = kept
 
-    def _reached(self, edge: Edge) -> tuple[Entrance, ...]:
+    def _reached(self, edge: TransitionEdge) -> tuple[StateEntry, ...]:
         if not edge.targets:
             return ()
         return self._entrances(domain(self.compiled, edge, self.remembered), edge.targets)
 
-    def _entrances(self, around: int, targets: tuple[int, ...]) -> tuple[Entrance, ...]:
+    def _entrances(self, around: int, targets: tuple[int, ...]) -> tuple[StateEntry, ...]:
         entry = entry_set(self.compiled, around, targets, self.remembered)
         entrances = []
         for index in sorted(entry.nodes):
@@ -149,7 +151,7 @@ class _Work:
                 self.waiting.add(index)
             actions, after = self._settled(node.entry), self._settled(entry.after.get(index, ()))
             completes = tuple(self._completed(node))
-            entrances.append(Entrance(node, tuple(actions), tuple(after), completes, _outcome(node)))
+            entrances.append(StateEntry(node, tuple(actions), tuple(after), completes, _outcome(node)))
         return tuple(entrances)
 
     def _settled(self, actions: Iterable[_AnyAction]) -> Iterator[_AnyAction]:
@@ -170,12 +172,12 @@ class _Work:
     def _is_present(self, state: str) -> bool:
         return self.compiled.index.get(state) in self.present
 
-    def _completed(self, node: Node) -> Iterator[int]:
+    def _completed(self, node: StateNode) -> Iterator[int]:
         """The nodes whose content is complete now that this one is entered, if anybody wants to know."""
         nodes, scxml = self.compiled.nodes, self.compiled.scxml
         return (one for one in self._around_complete(node) if not one or scxml or DONE in nodes[one].edges)
 
-    def _around_complete(self, node: Node) -> Iterator[int]:
+    def _around_complete(self, node: StateNode) -> Iterator[int]:
         nodes = self.compiled.nodes
         if not node.final:
             if type(node.state) is State and not self.compiled.scxml:
@@ -207,11 +209,11 @@ class _Work:
         return any(child in self.present and nodes[child].final for child in inside)
 
 
-def _names(nodes: Iterable[Node]) -> Iterator[str]:
+def _names(nodes: Iterable[StateNode]) -> Iterator[str]:
     return (node.name for node in nodes if node.state is not None)
 
 
-def _outcome(node: Node) -> Emit | None:
+def _outcome(node: StateNode) -> Emit | None:
     final = node.state
     if not isinstance(final, FinalState) or final.emit is None:
         return None

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from dsc.engine.actions import fill_parameters
 from dsc.engine.determinisation import initial_reaction, leaving_reaction
+from dsc.engine.evaluation import fill_parameters
 from dsc.engine.frames import Frame
+from dsc.engine.machine_state import NOTHING
 from dsc.engine.performing import Performer
-from dsc.engine.reaction import Entrance, Exit, Part, Reaction
+from dsc.engine.reaction import CompiledReaction, Exit, ReactionPart, StateEntry
 from dsc.engine.situation import Decision, Situation
-from dsc.engine.state import NOTHING
-from dsc.engine.steps import Bound, Cancel, DecisionMade
+from dsc.engine.steps import Cancel, DecisionMade, PlotBound
 from dsc.engine.tables import Chart, CompiledPlot
 from dsc.errors import RunawayError
 from dsc.events import DONE, DONE_STATE, NO_CANDIDATE, Event
@@ -49,14 +49,16 @@ class Execution(Performer):
         """Leave all states of a plot and of the plots inside."""
         self.exit(frame, leaving_reaction(frame.configuration).exits)
 
-    def take(self, frame: Frame, reaction: Reaction) -> None:
+    def take(self, frame: Frame, reaction: CompiledReaction) -> None:
         """Leave, act and enter as a reaction of one plot says."""
         if reaction.exits:
             self.exit(frame, reaction.exits)
         frame.configuration = reaction.following
         self._act_and_enter([(frame, part) for part in reaction.parts])
 
-    def take_together(self, reactions: Mapping[Frame, Reaction], parts: Sequence[tuple[Frame, Part]]) -> None:
+    def take_together(
+        self, reactions: Mapping[Frame, CompiledReaction], parts: Sequence[tuple[Frame, ReactionPart]]
+    ) -> None:
         """The same for several plots at once; `parts` are those of all of them, in the order in which they act."""
         leaving = [(frame, one) for frame, reaction in reactions.items() for one in reaction.exits]
         for frame, one in sorted(leaving, key=lambda at: at[0].position(at[1].node.index), reverse=True):
@@ -65,13 +67,13 @@ class Execution(Performer):
             frame.configuration = reaction.following
         self._act_and_enter(parts)
 
-    def _act_and_enter(self, parts: Sequence[tuple[Frame, Part]]) -> None:
+    def _act_and_enter(self, parts: Sequence[tuple[Frame, ReactionPart]]) -> None:
         """All transitions act before anything is entered."""
         passed = [self._act(frame, part) if part.acts else NOTHING for frame, part in parts]
         for (frame, part), arguments in zip(parts, passed, strict=True):
             self._enter_part(frame, part, arguments)
 
-    def _act(self, frame: Frame, part: Part) -> Mapping[str, Any]:
+    def _act(self, frame: Frame, part: ReactionPart) -> Mapping[str, Any]:
         """The internal actions of a transition; returns what it passes to its target."""
         assert part.edge is not None  # noqa: S101  # what has no transition does not act
         source = frame.compiled.nodes[part.edge.source].name
@@ -127,7 +129,7 @@ class Execution(Performer):
         for part in initial_reaction(frame.compiled).parts:
             self._enter_part(frame, part, NOTHING)
 
-    def _enter_part(self, frame: Frame, part: Part, passed: Mapping[str, Any]) -> None:
+    def _enter_part(self, frame: Frame, part: ReactionPart, passed: Mapping[str, Any]) -> None:
         if not passed:
             for entrance in part.entrances:
                 self._enter(frame, entrance, NOTHING)
@@ -136,7 +138,7 @@ class Execution(Performer):
             for entrance in part.entrances:
                 self._enter(frame, entrance, passed if entrance.node.index == target else NOTHING)
 
-    def _enter(self, frame: Frame, entrance: Entrance, passed: Mapping[str, Any]) -> None:
+    def _enter(self, frame: Frame, entrance: StateEntry, passed: Mapping[str, Any]) -> None:
         node, state = entrance.node, entrance.node.state
         activation = 0
         if node.addressed:
@@ -203,7 +205,7 @@ class Execution(Performer):
 
     def _new_frame(self, compiled: CompiledPlot, arguments: Mapping[str, Any], path: str = "") -> Frame:
         variables = fill_parameters(compiled.plot, arguments, self.situation)
-        self.bound.append(Bound(path, compiled.plot))
+        self.bound.append(PlotBound(path, compiled.plot))
         return Frame(self.next_serial(), compiled, initial_reaction(compiled).following, variables)
 
     # -- completion --------------------------------------------------------------------------------------

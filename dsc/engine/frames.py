@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.engine.configuration import Configuration
-from dsc.engine.state import NOTHING, FrameState
+from dsc.engine.machine_state import NOTHING, FrameState
 from dsc.engine.tables import CompiledPlot
 from dsc.events import Event
 

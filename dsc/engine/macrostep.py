@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from dsc.engine.choice import Question, choice_of, settled
 from dsc.engine.configuration import configuration_of
 from dsc.engine.determinisation import reaction_of
 from dsc.engine.execution import Execution
 from dsc.engine.frames import Frame, freeze, thaw
-from dsc.engine.reaction import Part, Reaction, report
-from dsc.engine.selection import Addressed, Enabled, Trigger, select
+from dsc.engine.machine_state import FrameState, MachineState, at_rest
+from dsc.engine.reaction import CompiledReaction, ReactionPart, report
+from dsc.engine.reaction_choice import Question, choice_of, settled
 from dsc.engine.situation import Situation
-from dsc.engine.state import FrameState, MachineState, at_rest
 from dsc.engine.steps import Note, Step
-from dsc.engine.tables import Chart, Edge
+from dsc.engine.tables import Chart, TransitionEdge
+from dsc.engine.transition_selection import Addressed, Enabled, Trigger, select
 from dsc.errors import RunawayError
 from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, Event, goes_outwards
 from knowledge_base.errors import InputError
@@ -36,7 +36,7 @@ class Macrostep(Execution):
     def __init__(self, chart: Chart, situation: Situation, state: MachineState) -> None:
         super().__init__(chart, situation, state.serials)
         self._root = thaw(state.root) if state.root else None
-        self._broken_guards: set[tuple[int, Edge, int]] = set()
+        self._broken_guards: set[tuple[int, TransitionEdge, int]] = set()
         self._turn = 0
 
     def start(self, plot: str, arguments: Mapping[str, Any]) -> None:
@@ -177,7 +177,7 @@ class Macrostep(Execution):
         if not taken:
             return any(kept)
         self._check_progress()
-        by_frame: dict[Frame, list[Edge]] = {}
+        by_frame: dict[Frame, list[TransitionEdge]] = {}
         for one in taken:
             by_frame.setdefault(one.frame, []).append(one.edge)
         reactions = {frame: reaction_of(frame.configuration, tuple(edges)) for frame, edges in by_frame.items()}
@@ -194,12 +194,12 @@ class Macrostep(Execution):
 
     # -- guards ------------------------------------------------------------------------------------------
 
-    def _guard(self, frame: Frame, edge: Edge) -> bool:
+    def _guard(self, frame: Frame, edge: TransitionEdge) -> bool:
         if edge.guard is None:
             return True
         return self._holds(frame, edge, settled(edge.guard, frame.configuration))
 
-    def _holds(self, frame: Frame, edge: Edge, condition: Expression) -> bool:
+    def _holds(self, frame: Frame, edge: TransitionEdge, condition: Expression) -> bool:
         try:
             return self.holds(frame, condition)
         except InputError as error:
@@ -249,7 +249,7 @@ def _is_spontaneous(one: Frame | FrameState) -> bool:
     return one.configuration.spontaneous
 
 
-def _part_of(one: Enabled, reaction: Reaction) -> Part:
+def _part_of(one: Enabled, reaction: CompiledReaction) -> ReactionPart:
     return next(part for part in reaction.parts if part.edge is one.edge)
 
 

@@ -1,4 +1,4 @@
-"""`(in-state NAME)`: whether a state of the same plot is active, SCXML's `In()` (5.9.1). Only in profile `scxml`."""
+"""`(in-state NAME)`: whether a state of the same plot is active, SCXML's `In()` (5.9.1). Only in dialect `scxml`."""
 
 from __future__ import annotations
 

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any
 
-from dsc.engine.actions import delay_of, evaluate, output_of
+from dsc.engine.evaluation import delay_of, evaluate, output_of
 from dsc.engine.frames import Frame
-from dsc.engine.record import Record
+from dsc.engine.record import MacrostepRecord
 from dsc.engine.situation import Situation
 from dsc.engine.steps import Note, Revoke, SendLater, StartTimer
-from dsc.engine.tables import Node
+from dsc.engine.tables import StateNode
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, Event
 from dsc.model.actions import Assign, Block, Choose, Emit, ExternalAction, Internal, Log, Tell, Withdraw
 from dsc.model.language import TermField
@@ -25,7 +25,7 @@ SHORTEST_PERIOD = 0.001
 """Seconds; a period of nothing would leave no time for anything else."""
 
 
-class Performer(Record):
+class Performer(MacrostepRecord):
     """Carries out actions.
 
     Attributes:
@@ -63,12 +63,10 @@ class Performer(Record):
         name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
         self.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
 
-    def act(
-        self, frame: Frame, state: str, actions: Iterable[Action], activation: int = 0, first: int = 0
-    ) -> None:
+    def act(self, frame: Frame, state: str, actions: Iterable[Action], activation: int = 0, first: int = 0) -> None:
         """Carry out a block of actions of a state, numbered from `first` within its activation.
 
-        What cannot be evaluated fires an error; the others are carried out, in profile `scxml` only those
+        What cannot be evaluated fires an error; the others are carried out, in dialect `scxml` only those
         before it (SCXML 4.9). A condition of a branch that cannot be evaluated is false (SCXML 5.9.1).
         """
         for number, action in enumerate(actions, first):
@@ -83,7 +81,7 @@ class Performer(Record):
                 if frame.compiled.scxml:
                     return
 
-    def start_timers(self, frame: Frame, node: Node, activation: int) -> None:
+    def start_timers(self, frame: Frame, node: StateNode, activation: int) -> None:
         """Ask for all timers of a state that was entered."""
         if node.at_least is not None:
             self.start_timer(frame, node, activation, AT_LEAST, 0, node.at_least)
@@ -93,7 +91,7 @@ class Performer(Record):
             self.start_timer(frame, node, activation, EVERY, index, timed.seconds)
 
     def start_timer(
-        self, frame: Frame, node: Node, activation: int, event: str, index: int, seconds: TermField
+        self, frame: Frame, node: StateNode, activation: int, event: str, index: int, seconds: TermField
     ) -> None:
         """Ask for one timer of a state; a delay that cannot be worked out is a failure like others."""
         try:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from dsc.engine.configuration import Configuration
 from dsc.engine.steps import Taken
-from dsc.engine.tables import CompiledPlot, Edge, Node
+from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
 from dsc.model.actions import Emit, ExternalAction, Internal
 
 Action = ExternalAction | Internal
@@ -25,7 +25,7 @@ class Exit:
         cancels: whether it started what has to be stopped.
     """
 
-    node: Node
+    node: StateNode
     actions: tuple[Action, ...]
     cancels: bool
 
@@ -36,7 +36,7 @@ class Exit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Entrance:
+class StateEntry:
     """A node to be entered, and what it does then.
 
     Attributes:
@@ -46,7 +46,7 @@ class Entrance:
         emits: the outcome of a final state.
     """
 
-    node: Node
+    node: StateNode
     actions: tuple[Action, ...]
     after: tuple[Action, ...]
     completes: tuple[int, ...]
@@ -60,16 +60,16 @@ class Entrance:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class ReactionPart:
     """What one transition contributes: its internal actions, and what is entered because of it, in order.
 
     Attributes:
         acts: whether it has actions, or arguments to pass.
     """
 
-    edge: Edge | None
+    edge: TransitionEdge | None
     effect: tuple[Action, ...]
-    entrances: tuple[Entrance, ...]
+    entrances: tuple[StateEntry, ...]
     acts: bool
 
     @property
@@ -79,7 +79,7 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reaction:
+class CompiledReaction:
     """What happens in one plot.
 
     Attributes:
@@ -93,7 +93,7 @@ class Reaction:
         reports: what was taken, for plots inside, by the path of the state that holds them.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[ReactionPart, ...]
     exits: tuple[Exit, ...]
     following: Configuration
     keeps: tuple[str, ...] = ()
@@ -116,7 +116,7 @@ class Reaction:
         return found
 
 
-def report(edge: Edge, compiled: CompiledPlot, prefix: str = "") -> Taken:
+def report(edge: TransitionEdge, compiled: CompiledPlot, prefix: str = "") -> Taken:
     """How a transition that is taken is reported."""
     nodes = compiled.nodes
     target = prefix + nodes[edge.targets[0]].name if edge.targets else None

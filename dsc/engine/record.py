@@ -6,12 +6,12 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from dsc.engine.state import NOTHING
-from dsc.engine.steps import NO_CHANGE, Bound, DecisionMade, Microstep, Output, Taken
+from dsc.engine.machine_state import NOTHING
+from dsc.engine.steps import NO_CHANGE, DecisionMade, Microstep, Output, PlotBound, Taken
 from dsc.events import Event
 
 
-class Record:
+class MacrostepRecord:
     """Collects what will be the step.
 
     Attributes:
@@ -38,7 +38,7 @@ class Record:
         self.outputs: Mapping[str, Any] = NOTHING
         self.exited: list[str] = []
         self.entered: list[str] = []
-        self.bound: list[Bound] = []
+        self.bound: list[PlotBound] = []
 
     def next_serial(self) -> int:
         """A number never given out before in this run."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from dsc.engine.machine_state import NOTHING, MachineState
 from dsc.engine.situation import Decision
-from dsc.engine.state import NOTHING, MachineState
 from dsc.events import AFTER, Event
 from dsc.model.plot import ActionPlot
 from knowledge_base.facts import Delta
@@ -121,7 +121,7 @@ class Taken:
     place: tuple[str | int, ...] = ()
 
 
-class Bound(NamedTuple):
+class PlotBound(NamedTuple):
     """A plot that became the content of a state (named by its path; empty for the outermost plot), as it runs."""
 
     state: str
@@ -138,7 +138,7 @@ class Microstep(NamedTuple):
     taken: tuple[Taken, ...]
     exited: tuple[str, ...]
     entered: tuple[str, ...]
-    bound: tuple[Bound, ...] = ()
+    bound: tuple[PlotBound, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +162,7 @@ class Step(NamedTuple):
         output: external actions and timers, in order.
         emitted: outcome events of the outermost plot.
         errors: actions or guards that could not be evaluated and that no transition on `error` took; those of
-            plots in profile `scxml`, which go on, are notes in `output`.
+            plots in dialect `scxml`, which go on, are notes in `output`.
         outputs: what the outermost plot hands back, as it has reached its end with this step.
     """
 

@@ -15,7 +15,7 @@ from knowledge_base.language.expression import Expression
 
 
 @dataclass(slots=True, eq=False)  # never changed; frozen, it would take five times as long to make
-class Edge:
+class TransitionEdge:
     """A transition between nodes, by their indices; without targets nothing is left or entered.
 
     Attributes:
@@ -48,14 +48,14 @@ class Default:
 
 
 @dataclass(frozen=True, slots=True)
-class Timed:
+class TimedEdge:
     """A transition that time triggers."""
 
     seconds: TermField
-    edge: Edge
+    edge: TransitionEdge
 
 
-def _nothing(_node: Node) -> None:
+def _nothing(_node: StateNode) -> None:
     """It has no transitions."""
 
 
@@ -63,7 +63,7 @@ _TABLES = frozenset({"edges", "timeouts", "cycles", "always"})
 
 
 @dataclass(slots=True, eq=False)
-class Node:
+class StateNode:
     """A state, a region or (index 0) the plot itself.
 
     The tables of its transitions are made when one of them is first asked for: of a long plot, as those that are made
@@ -84,7 +84,7 @@ class Node:
         lay_out: makes these tables.
         always: transitions without trigger.
         histories: indices of the history nodes that remember what is inside.
-        transparent: a region that stands for its only state (profile `scxml`), no scope for transitions.
+        transparent: a region that stands for its only state (dialect `scxml`), no scope for transitions.
         parent: index of the node around it; -1 for the plot.
         final: whether it is a final state.
         orthogonal: whether all its children are active together.
@@ -107,11 +107,11 @@ class Node:
     histories: list[int] = field(default_factory=list)
     transparent: bool = False
 
-    lay_out: Callable[[Node], None] = field(default=_nothing, repr=False)
-    edges: dict[str, tuple[Edge, ...]] = field(init=False, repr=False)
-    timeouts: tuple[Timed, ...] = field(init=False, repr=False)
-    cycles: tuple[Timed, ...] = field(init=False, repr=False)
-    always: tuple[Edge, ...] = field(init=False, repr=False)
+    lay_out: Callable[[StateNode], None] = field(default=_nothing, repr=False)
+    edges: dict[str, tuple[TransitionEdge, ...]] = field(init=False, repr=False)
+    timeouts: tuple[TimedEdge, ...] = field(init=False, repr=False)
+    cycles: tuple[TimedEdge, ...] = field(init=False, repr=False)
+    always: tuple[TransitionEdge, ...] = field(init=False, repr=False)
     parent: int = field(init=False)
     final: bool = field(init=False)
     orthogonal: bool = field(init=False)
@@ -157,12 +157,12 @@ class CompiledPlot:
         index: state name -> node index.
         form: the plot as data if it was bound as a value, else `None`.
         defaults: history node -> what it stands for at first.
-        scxml: whether the plot is in profile `scxml`: events match by prefix and keep SCXML's names.
+        scxml: whether the plot is in dialect `scxml`: events match by prefix and keep SCXML's names.
         cache: what the engine has worked out about its configurations (see `configuration`).
     """
 
     plot: ActionPlot
-    nodes: tuple[Node, ...]
+    nodes: tuple[StateNode, ...]
     index: Mapping[str, int]
     form: Mapping[str, Any] | None = None
     defaults: Mapping[int, Default] = field(default_factory=dict)

@@ -66,7 +66,7 @@ class Tell(Frozen):
 class Emit(Frozen):
     """Fire an event: a declared outcome goes to the state that holds this plot, any other stays inside.
 
-    With `delay` (seconds; only in profile `scxml`) it comes as an event from outside, after whatever comes before;
+    With `delay` (seconds; only in dialect `scxml`) it comes as an event from outside, after whatever comes before;
     until then it can be withdrawn by its `id`. `into` is a variable that gets an id made for it (SCXML 6.2).
     """
 
@@ -84,20 +84,20 @@ class Emit(Frozen):
 
 
 class Withdraw(Frozen):
-    """Let the delayed events of that id, fired in this plot, not come (SCXML 6.3; only in profile `scxml`)."""
+    """Let the delayed events of that id, fired in this plot, not come (SCXML 6.3; only in dialect `scxml`)."""
 
     withdraw: TermField
 
 
 class Log(Frozen):
-    """Tell the trace: constants and variables, shown one after the other (SCXML 4.7; only in profile `scxml`)."""
+    """Tell the trace: constants and variables, shown one after the other (SCXML 4.7; only in dialect `scxml`)."""
 
     log: tuple[TermField, ...]
     label: str = ""
 
 
 class Choose(Frozen):
-    """The actions of one branch (SCXML 4.3; only in profile `scxml`).
+    """The actions of one branch (SCXML 4.3; only in dialect `scxml`).
 
     Attributes:
         condition: what decides (`if`).
@@ -111,7 +111,7 @@ class Choose(Frozen):
 
 
 class Block(Frozen):
-    """Actions of which an error skips the rest, and nothing after the block (SCXML 4.9; only in profile `scxml`).
+    """Actions of which an error skips the rest, and nothing after the block (SCXML 4.9; only in dialect `scxml`).
 
     A state with several `onentry` or `onexit` has one for each (SCXML 3.8, 3.9).
     """
@@ -150,7 +150,7 @@ Action = Annotated[
     | Annotated[Block, Tag("block")],
     by_key("trigger", "set", "switch", "send", "assign", "tell", "emit", "withdraw", "log", "if", "block"),
 ]
-"""What entry and exit may hold; internal actions only in profile `scxml` (SCXML 3.8)."""
+"""What entry and exit may hold; internal actions only in dialect `scxml` (SCXML 3.8)."""
 
 
 def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalAction | Internal]:

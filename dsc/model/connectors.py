@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from dsc.model.language import TermField
 from dsc.model.reading import LOCATED, FormPath
-from dsc.model.transitions import Source, Transition, Transitions, as_transition
+from dsc.model.transitions import Transition, Transitions, TransitionSource, as_transition
 from knowledge_base.facts import Value
 from knowledge_base.language.expression import And, Comparison, Constant
 from knowledge_base.spelling import TRUTH_VALUES, is_number
@@ -20,7 +20,7 @@ CHOICE = "choice"
 """Label of the transitions of connectors, which have no trigger."""
 
 
-class Connector(Source):
+class Connector(TransitionSource):
     """What is passed through on the way to a state; its transitions are tried in order, and the last one holds."""
 
     @model_validator(mode="after")

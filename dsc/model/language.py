@@ -20,7 +20,7 @@ from knowledge_base.facts import Value
 from knowledge_base.language.depth import check_depth
 from knowledge_base.language.effect import AllOf, Effect
 from knowledge_base.language.expression import Constant, Expression, Term
-from knowledge_base.language.memory import IdentityCache
+from knowledge_base.language.identity_cache import IdentityCache
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
 from knowledge_base.language.printer import to_text
 
@@ -156,10 +156,12 @@ TermField = Annotated[
     Term,
     PlainValidator(_term),
     PlainSerializer(_term_out),
-    WithJsonSchema({
-        "type": ["string", "number", "boolean"],
-        "description": "a constant, a variable such as ?item or ?event.level, or arithmetic such as (+ ?n 1)",
-    }),
+    WithJsonSchema(
+        {
+            "type": ["string", "number", "boolean"],
+            "description": "a constant, a variable such as ?item or ?event.level, or arithmetic such as (+ ?n 1)",
+        }
+    ),
 ]
 """A value: a constant, a variable, or arithmetic over them."""
 
@@ -167,10 +169,12 @@ EffectField = Annotated[
     Effect,
     PlainValidator(_effect),
     PlainSerializer(_text_out),
-    WithJsonSchema({
-        "type": ["string", "array"],
-        "items": {"type": "string"},
-        "description": "a PDDL effect, e.g. (and (unreachable ?item) (not (graspable ?item)))",
-    }),
+    WithJsonSchema(
+        {
+            "type": ["string", "array"],
+            "items": {"type": "string"},
+            "description": "a PDDL effect, e.g. (and (unreachable ?item) (not (graspable ?item)))",
+        }
+    ),
 ]
 """A change of the knowledge base in the form of a PDDL effect."""

@@ -35,7 +35,7 @@ _STATE_NAME = re.compile(r"[^/#][^/]*")
 # Names of states stand in paths, between slashes; what begins with # is a region's place in a stored state.
 
 
-class Parameter(Frozen):
+class PlotParameter(Frozen):
     """A one-way parameter with its role (S1.11).
 
     Attributes:
@@ -70,7 +70,7 @@ class Parameter(Frozen):
         return {"type": value} if isinstance(value, str) else value
 
 
-class Variable(Frozen):
+class PlotVariable(Frozen):
     """A variable or output of the plot's scope; gone when the plot is left (S0.7)."""
 
     type: str
@@ -102,15 +102,15 @@ class ActionPlot(Frozen):
         rules: contingency rules, in order of priority.
         handlers: event handlers, in order of priority.
         generated: whether it was made from a plan.
-        profile: `dsc`, or `scxml` for charts that use what only SCXML has: transitions across borders, history,
+        dialect: `dsc`, or `scxml` for charts that use what only SCXML has: transitions across borders, history,
             events matched by prefix, internal actions in entry and exit.
     """
 
     name: str = Field(alias="plot", pattern=r"^[a-zA-Z_][\w\-#.]*$")
     about: str | None = None
-    parameters: dict[str, Parameter] = Field(default_factory=dict)
-    variables: dict[str, Variable] = Field(default_factory=dict)
-    outputs: dict[str, Variable] = Field(default_factory=dict)
+    parameters: dict[str, PlotParameter] = Field(default_factory=dict)
+    variables: dict[str, PlotVariable] = Field(default_factory=dict)
+    outputs: dict[str, PlotVariable] = Field(default_factory=dict)
     receives: dict[str, dict[str, str] | None] = Field(default_factory=dict)
     emits: dict[str, dict[str, str] | None] = Field(default_factory=dict)
     when: ConditionField | None = None
@@ -122,7 +122,7 @@ class ActionPlot(Frozen):
     rules: tuple[Rule, ...] = ()
     handlers: tuple[Handler, ...] = ()
     generated: bool = Field(default=False, strict=True)
-    profile: Literal["dsc", "scxml"] = "dsc"
+    dialect: Literal["dsc", "scxml"] = "dsc"
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
     _text: str | None = PrivateAttr(default=None)
 
@@ -279,7 +279,6 @@ Scope = ActionPlot | CompositeState | Region
 
 
 def initial_of(scope: Scope) -> str:
-    """The name of the state to enter first; in profile `scxml` it may be deeper inside (SCXML 3.3)."""
+    """The name of the state to enter first; in dialect `scxml` it may be deeper inside (SCXML 3.3)."""
     proper = (name for name, state in scope.states.items() if not isinstance(state, HistoryState))
     return scope.initial or next(proper, next(iter(scope.states)))
-

@@ -15,11 +15,13 @@ from dsc.model.transitions import as_tuple
 
 RETRY, CONTINUE, REPLAN, GIVE_UP, ENTER = "retry", "continue", "replan", "give_up", "enter"
 
-RESPONSES: Mapping[str, tuple[str, ...]] = MappingProxyType({
-    "on": (RETRY, CONTINUE, REPLAN, GIVE_UP),
-    "before": (ENTER, CONTINUE, REPLAN, GIVE_UP),
-    "after": (CONTINUE, RETRY, REPLAN, GIVE_UP),
-})
+RESPONSES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "on": (RETRY, CONTINUE, REPLAN, GIVE_UP),
+        "before": (ENTER, CONTINUE, REPLAN, GIVE_UP),
+        "after": (CONTINUE, RETRY, REPLAN, GIVE_UP),
+    }
+)
 """What a rule may do besides going to a named state, by where it answers; the first is what it does by default."""
 
 STEP = "step."

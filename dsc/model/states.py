@@ -14,21 +14,21 @@ from dsc.model.reading import FormPath
 from dsc.model.transitions import (
     CyclicTransitions,
     Duration,
-    Source,
     TimedTransitions,
     Transition,
     Transitions,
+    TransitionSource,
     as_tuple,
 )
 
 Actions = Annotated[tuple[Action, ...], BeforeValidator(as_tuple)]
 
 
-class State(Source):
+class State(TransitionSource):
     """A simple state: a configuration of the skill layer, set in entry and reverted by exit (S0.15).
 
     Attributes:
-        entry, exit, on_break: external actions; in profile `scxml` internal ones too. `on_break` runs in place of
+        entry, exit, on_break: external actions; in dialect `scxml` internal ones too. `on_break` runs in place of
             `exit` when the state is interrupted: left by a transition that is not its own (S2.3). If it is empty,
             `exit` runs then too.
         at_least: seconds for which the state's own transitions wait (S3.1); an event that one of them would take
@@ -86,7 +86,7 @@ class OrthogonalState(State):
 
     Attributes:
         regions: the regions by name.
-        connectors: histories of the whole (only in profile `scxml`).
+        connectors: histories of the whole (only in dialect `scxml`).
     """
 
     regions: dict[str, Region] = Field(min_length=1)
@@ -130,7 +130,7 @@ class DynamicState(State):
 class FinalState(Frozen):
     """The end of its region or plot; entering it completes the state around (S0.11, S2.2).
 
-    `entry` holds internal actions, and only in profile `scxml`.
+    `entry` holds internal actions, and only in dialect `scxml`.
     """
 
     about: str | None = None
@@ -141,7 +141,7 @@ class FinalState(Frozen):
 
 
 class HistoryState(Frozen):
-    """Stands for what was active when the state around was last left (SCXML 3.10; only in profile `scxml`).
+    """Stands for what was active when the state around was last left (SCXML 3.10; only in dialect `scxml`).
 
     Attributes:
         history: `shallow` remembers the states directly inside, `deep` the innermost ones. What ran inside a

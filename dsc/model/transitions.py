@@ -41,10 +41,10 @@ class Transition(Frozen):
         passed: arguments (`pass`) for the plot of the target, a submachine or dynamic state, over its own `with`;
             event attributes and this plot's parameters and variables are the sources (S2.1).
         clear: states whose histories are forgotten on the way; with `*` behind the name those of all levels
-            below too (Harel's clear-history(state) and clear-history(state*); only in profile `scxml`).
+            below too (Harel's clear-history(state) and clear-history(state*); only in dialect `scxml`).
         rule: label of the contingency rule that put the transition there.
-        also: more targets, in other regions (only in profile `scxml`).
-        internal: a composite source is not left if the target is inside it (SCXML 3.5; only in profile `scxml`).
+        also: more targets, in other regions (only in dialect `scxml`).
+        internal: a composite source is not left if the target is inside it (SCXML 3.5; only in dialect `scxml`).
     """
 
     target: str | None = Field(default=None, alias="to")
@@ -118,7 +118,8 @@ Transitions = Annotated[tuple[Transition, ...], BeforeValidator(_as_transitions)
 TimedTransitions = Annotated[tuple[TimedTransition, ...], BeforeValidator(as_tuple)]
 CyclicTransitions = Annotated[tuple[CyclicTransition, ...], BeforeValidator(as_tuple)]
 
-class Source(Frozen):
+
+class TransitionSource(Frozen):
     """What transitions lead away from: a state or a connector."""
 
     about: str | None = None

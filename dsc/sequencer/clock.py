@@ -187,9 +187,7 @@ class _Due(NamedTuple):
     context: Context | None
 
 
-def _unless_cancelled(
-    timer: asyncio.TimerHandle, callback: Callable[[Unpack[_Args]], object], *args: *_Args
-) -> None:
+def _unless_cancelled(timer: asyncio.TimerHandle, callback: Callable[[Unpack[_Args]], object], *args: *_Args) -> None:
     """What was due together with it may have cancelled it."""
     if not timer.cancelled():
         callback(*args)

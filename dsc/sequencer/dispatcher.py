@@ -17,14 +17,14 @@ from typing import Any
 
 from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
-from dsc.components.activity import Activity
+from dsc.components.abandonment import GRACE, give_up
+from dsc.components.activation import ComponentActivation
 from dsc.components.component import Component
+from dsc.components.component_registry import ComponentRegistry, require_instances
 from dsc.components.hooks import contained, is_own
 from dsc.components.reports import Reports
-from dsc.components.roster import Roster, require_instances
-from dsc.components.stopping import GRACE, give_up
-from dsc.components.support import Support
-from dsc.components.wiring import Wiring
+from dsc.components.skill_dependencies import SkillDependencies
+from dsc.components.streams import Wiring
 from dsc.engine.steps import (
     Cancel,
     Output,
@@ -37,14 +37,12 @@ from dsc.engine.steps import (
     SwitchMode,
 )
 from dsc.events import SKILL_ERROR
-from dsc.sequencer.attributes import Declared
+from dsc.sequencer.cancellation import PendingCleanups, TimeLimit
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.endings import Endings
-from dsc.sequencer.ends import broken, declared, encoded, late
 from dsc.sequencer.messages import Message, SkillMessage, TimerMessage
-from dsc.sequencer.taking_up import Earlier, PastClock, asked_after
-from dsc.sequencer.telling import CLOSING, Telling, failure
-from dsc.sequencer.time_limit import TimeLimit
+from dsc.sequencer.outbox import CLOSING, Outbox, failure
+from dsc.sequencer.outcome_checks import Declared, broken, declared, encoded, late
+from dsc.sequencer.resumed_skills import InterruptedSkill, PastClock, asked_after
 from dsc.sequencer.timers import Timers
 from dsc.skills import Pattern
 from knowledge_base.errors import InputError, UnknownNameError, described
@@ -66,7 +64,7 @@ class Dispatcher:
 
     Attributes:
         activity: who is switched on.
-        telling: what components are told.
+        outbox: what components are told.
         timers: what is due later.
     """
 
@@ -79,22 +77,22 @@ class Dispatcher:
     ) -> None:
         self._part_of = part_of
         self._components = {component.name: component for component in require_instances(components)}
-        self._roster = Roster(self._components)
-        self.activity = Activity(self._roster, self._at_work)
+        self._registry = ComponentRegistry(self._components)
+        self.activity = ComponentActivation(self._registry, self._at_work)
         self._wiring = Wiring(self._components)
         self._given_up: list[str] = []
         self._clock = clock
         self._post = post
         self._running: dict[str, _Running] = {}
-        self._endings = Endings(self.activity.look)
+        self._endings = PendingCleanups(self.activity.look)
         self._forgetting: set[asyncio.Task[None]] = set()
-        self.telling = Telling()
+        self.outbox = Outbox()
         self.timers = Timers(clock, post)
 
     def deploy(self, component: Component) -> None:
         """Add a component; it replaces one of the same name. Who has waited for it goes on."""
         self.activity.deployed(component)
-        self._roster.deploy(component)
+        self._registry.deploy(component)
         self._wiring.deployed(component)
 
     def started(self) -> tuple[Start, ...]:
@@ -155,7 +153,7 @@ class Dispatcher:
         elif isinstance(output, Revoke):
             self.timers.revoke(output)
         elif isinstance(output, SetParameter | SwitchMode | SendMessage):
-            self.telling.tell(self.component(output.component), output)
+            self.outbox.tell(self.component(output.component), output)
             if isinstance(output, SwitchMode):
                 self.activity.switched(output.component, output.mode)
         # What is left is a note, which the trace has.
@@ -231,12 +229,12 @@ class Dispatcher:
 
     def tell_again(self, component: str, in_force: Sequence[SetParameter | SwitchMode]) -> None:
         """Put in force what was before a restart; raises `UnknownNameError`."""
-        self.telling.tell_again(self.component(component), in_force)
+        self.outbox.tell_again(self.component(component), in_force)
         for told in in_force:
             if isinstance(told, SwitchMode):
                 self.activity.switched(component, told.mode)
 
-    def take_up(self, start: Start, earlier: Earlier) -> None:
+    def take_up(self, start: Start, earlier: InterruptedSkill) -> None:
         """Go on with a skill that was under way before a restart; raises `UnknownNameError`."""
         self._start(start, earlier)
 
@@ -265,7 +263,7 @@ class Dispatcher:
         for activation in {start.activation for start in self.started()}:
             self._cancel(activation)
         self.timers.close()
-        tasks = [*self._endings.tasks(), *self._forgetting, *self.telling.tasks()]
+        tasks = [*self._endings.tasks(), *self._forgetting, *self.outbox.tasks()]
         if tasks:
             stopped, others = await asyncio.wait(tasks, timeout=CLOSING)
             for task in others:
@@ -275,9 +273,9 @@ class Dispatcher:
                 failure(task)  # of a skill that was cancelled, nobody wants to hear it
         await self.activity.close()
         self._wiring.close()
-        return [*self.telling.untaken(), *self._given_up]
+        return [*self.outbox.untaken(), *self._given_up]
 
-    def _start(self, start: Start, earlier: Earlier | None = None) -> None:
+    def _start(self, start: Start, earlier: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)
         within = self._within(start)
         due = within + (self._clock.now() if earlier is None else earlier.began)
@@ -320,12 +318,12 @@ class Dispatcher:
         if why is not None and self._running.get(running.start.action_id) is running:
             self._answer(running, broken(running.start, described(why)))
 
-    async def _execute(self, component: Component, running: _Running, earlier: Earlier | None) -> None:
+    async def _execute(self, component: Component, running: _Running, earlier: InterruptedSkill | None) -> None:
         self._answer(running, await self._outcome(component, running, earlier))
         assert running.task is not None  # noqa: S101
         running.task.remove_done_callback(running.over)  # each takes a turn of the loop
 
-    async def _outcome(self, component: Component, running: _Running, earlier: Earlier | None) -> Outcome:
+    async def _outcome(self, component: Component, running: _Running, earlier: InterruptedSkill | None) -> Outcome:
         start, within, limit, heard = running.start, running.within, running.limit, 0
 
         def report(outcome: Outcome) -> None:
@@ -336,7 +334,7 @@ class Dispatcher:
                 running.reports = running.reports or Reports(partial(self._report, start))
                 running.reports.put(declared(component, start, outcome))
 
-        support = Support(self._roster, self.activity, component)
+        support = SkillDependencies(self._registry, self.activity, component)
         clock: Clock = PastClock(self._clock, earlier.began) if earlier else self._clock
         call = SkillCall(self._id(start), clock, report, clock.now() + within, self._fault)
         try:
@@ -357,11 +355,11 @@ class Dispatcher:
         # What it observed is so, however late it says so.
         return replace(late(start, within), observed=outcome.observed) if limit.passed else outcome
 
-    async def _ready(self, component: Component, start: Start, support: Support) -> None:
+    async def _ready(self, component: Component, start: Start, support: SkillDependencies) -> None:
         """Wait until the skill can begin."""
         if self._has_to_wait(start):
             await self._endings.over(component.name)
-        await self.telling.taken(component)
+        await self.outbox.taken(component)
         await support.ready()
 
     def _cancel(self, activation: int) -> None:
@@ -389,7 +387,7 @@ async def _forgotten(component: Component, action_id: str) -> None:
         await component.forget(action_id)
 
 
-def _failed(error: BaseException, running: _Running, support: Support) -> Outcome | None:
+def _failed(error: BaseException, running: _Running, support: SkillDependencies) -> Outcome | None:
     """How a skill ends that raised; `None` if others end its task."""
     start, limit = running.start, running.limit
     cancelled = issubclass(type(error), asyncio.CancelledError)

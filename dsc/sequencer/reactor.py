@@ -8,18 +8,17 @@ from typing import Any
 
 from dsc.calls import OBSERVED
 from dsc.components.hooks import contained
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
-from dsc.engine.state import MachineState
+from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Cancel, Output, SendLater, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
-from dsc.sequencer.attributes import Declared, require_things
-from dsc.sequencer.ends import broken
 from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.sequencer.outcome_checks import Declared, broken, require_things
 from dsc.sequencer.run_forms import Kept
-from dsc.sequencer.tracing import StepTracer
+from dsc.sequencer.step_tracing import StepTracer
 from dsc.trace import Trace
 from knowledge_base.errors import InputError, described
 from knowledge_base.facts import Delta

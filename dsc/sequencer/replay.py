@@ -9,16 +9,16 @@ from pathlib import Path
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, Start
 from dsc.json_text import text_of
-from dsc.sequencer.changed import plots_of
+from dsc.sequencer.design_changes import plots_of
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import full, message_of
 from dsc.sequencer.run_tables import RunArchive, RunRow, StepRow, archive
 from dsc.trace import Trace
-from knowledge_base.exchange.forms import delta_form
+from knowledge_base.exchange.json_forms import delta_form
 from knowledge_base.facts import Delta
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.history import Version
-from knowledge_base.journal.memory import MemoryHistory
+from knowledge_base.journal.memory_history import MemoryHistory
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dsc.calls import Outcome
-from dsc.engine.state import NOTHING, FrameState, MachineState
+from dsc.engine.machine_state import NOTHING, FrameState, MachineState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import NO_ATTRIBUTES, Event
 from dsc.sequencer.messages import (
@@ -27,7 +27,7 @@ from dsc.sequencer.messages import (
 )
 from dsc.sequencer.run_tables import RunRow
 from dsc.trace import Record
-from knowledge_base.exchange.forms import delta_form, delta_of
+from knowledge_base.exchange.json_forms import delta_form, delta_of
 
 Form = dict[str, Any]
 Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage

@@ -7,9 +7,9 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import asdict
 from typing import Any
 
-from dsc.components.life import Life
+from dsc.components.life_cycle import Life
 from dsc.dynamic.library import Library
-from dsc.engine.state import FrameState, MachineState
+from dsc.engine.machine_state import FrameState, MachineState
 from dsc.engine.steps import (
     Cancel,
     Output,
@@ -24,6 +24,7 @@ from dsc.engine.steps import (
 from dsc.events import Event
 from dsc.json_text import text_of
 from dsc.sequencer.messages import LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.sequencer.outbox import Told
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import (
     Awaited,
@@ -38,15 +39,14 @@ from dsc.sequencer.run_forms import (
     frame_form,
     frame_news,
 )
-from dsc.sequencer.run_standing import Row
+from dsc.sequencer.run_standing import SnapshotRow
 from dsc.sequencer.run_tables import RunArchive, RunRow
-from dsc.sequencer.telling import Told
 
 _Key = tuple[str, str]
 """Kind and name of something pending."""
 
 
-class Present:
+class RunState:
     """Frames, what is awaited, and what is in force; `short` puts the plots in it away."""
 
     def __init__(self, short: Shortener) -> None:
@@ -54,12 +54,12 @@ class Present:
         self._frames: dict[int, FrameState] = {}
         self._root: FrameState | None = None
         self._remembered: tuple[Any, ...] = ()  # by the reactor
-        self._rows: dict[int, Row] = {}  # what is pending, by place; the earliest first
+        self._rows: dict[int, SnapshotRow] = {}  # what is pending, by place; the earliest first
         self._places: dict[_Key, list[int]] = {}  # the earliest first
         self._activations: dict[int, set[_Key]] = {}
         self._cancelled: list[int] = []  # places of what the last macrostep cancelled
         self._in_force: dict[_Key, int] = {}  # places of parameters and modes
-        self._telling: dict[int, Told] = {}  # by place: of this it is not known whether it has been taken
+        self._outbox: dict[int, Told] = {}  # by place: of this it is not known whether it has been taken
         self._last_place = 0
         self._memories: dict[str, str] = {}
         self._reactor: Form = {}
@@ -77,7 +77,7 @@ class Present:
                 self._in_force[_key(one.what)] = one.place
             form = awaited_form(one.what, self._short)
             kind = type(one.what).__name__
-            self._rows[one.place] = Row(kind, one.step, one.at, form, one.reports, one.cause, one.cancelled)
+            self._rows[one.place] = SnapshotRow(kind, one.step, one.at, form, one.reports, one.cause, one.cancelled)
             if one.cancelled:
                 self._cancelled += self._places.pop(_key(one.what))
 
@@ -133,9 +133,9 @@ class Present:
         for place in self._cancelled:
             self._drop_row(place)
         self._cancelled.clear()
-        for place, told in list(self._telling.items()):
+        for place, told in list(self._outbox.items()):
             if not any(told is one for one in under_way):
-                del self._telling[place]
+                del self._outbox[place]
                 if any(told is one for one in refused):
                     self._drop_row(place)
                     if self._in_force.get(_key(told)) == place:  # again, after a restart
@@ -167,7 +167,7 @@ class Present:
         """One thing that is awaited, or in force."""
         place = self._last_place + 1
         self._note(what, place)
-        self._put_row(place, Row(type(what).__name__, step, at, awaited_form(what, self._short), 0, cause))
+        self._put_row(place, SnapshotRow(type(what).__name__, step, at, awaited_form(what, self._short), 0, cause))
 
     def _reached(self, root: FrameState | None) -> None:
         before, now = self._frames, _by_serial(root)
@@ -181,7 +181,7 @@ class Present:
             news.update(dict.fromkeys(before.keys() - now.keys()))
         self._news["frames"] = news
 
-    def _put_row(self, place: int, row: Row) -> None:
+    def _put_row(self, place: int, row: SnapshotRow) -> None:
         self._rows[place] = row
         self._news.setdefault("pending", {})[place] = row
 
@@ -193,7 +193,7 @@ class Present:
         key = _key(what)
         self._last_place = place
         if isinstance(what, SetParameter | SwitchMode | SendMessage):
-            self._telling[place] = what
+            self._outbox[place] = what
             return
         self._places.setdefault(key, []).append(place)
         if isinstance(what, Start | StartTimer):
@@ -236,7 +236,7 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
     """
     find = runs.form
     steps = list(runs.steps(run.number))
-    last, now = steps[-1], runs.standing()
+    last, now = steps[-1], runs.latest_snapshot()
     reactor = now.reactor
     root = None if reactor["root"] is None else frame_form(reactor["root"], now.frames, find)
     state = {"root": root, "serials": last.serials, "finished": reactor["finished"]}
@@ -249,13 +249,13 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         in_vain=frozenset((activation, index) for activation, index in reactor["in_vain"]),
         problem=reactor["problem"],
         settings=tuple([ParameterMessage(**setting) for setting in reactor["settings"]]),
-        pending=tuple([_pending(place, Row(*row), find) for place, row in sorted(now.pending.items())]),
+        pending=tuple([_pending(place, SnapshotRow(*row), find) for place, row in sorted(now.pending.items())]),
         memory={name: json.loads(memory) for name, memory in now.memory.items()},
         records=tuple(record for step in steps for record in step.records),
     )  # fmt: skip
 
 
-def _pending(place: int, row: Row, find: Callable[[str], Any]) -> Pending:
+def _pending(place: int, row: SnapshotRow, find: Callable[[str], Any]) -> Pending:
     what = awaited_of(row.kind, row.what, find)
     return Pending(place, what, row.step, row.at, row.reports, row.cause, row.cancelled)
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 Form = dict[str, Any]
 
 
-class Row(NamedTuple):
+class SnapshotRow(NamedTuple):
     """Something that is awaited or in force, as plain data: what `run_forms.Pending` says of it."""
 
     kind: str
@@ -28,13 +28,13 @@ class Row(NamedTuple):
 
 
 @dataclass(slots=True)
-class Standing:
+class RunSnapshot:
     """The present of a run, as plain data.
 
     Attributes:
         reactor: what it remembers besides the machine's frames.
         frames: running plots by serial number, as `run_forms.frame_news` gives them.
-        pending: what is awaited or in force by its number, as `Row`.
+        pending: what is awaited or in force by its number, as `SnapshotRow`.
         memory: what components have to remember, as text by name.
     """
 
@@ -60,7 +60,7 @@ class Standing:
                 self.pending[int(place)] = row
 
 
-def standing(latest_first: Iterable[str]) -> Standing:
+def latest_snapshot(latest_first: Iterable[str]) -> RunSnapshot:
     """What stands after the first of these macrosteps, each of them lines of changes; no more are read than needed."""
     needed: list[Form] = []
     for text in latest_first:
@@ -68,7 +68,7 @@ def standing(latest_first: Iterable[str]) -> Standing:
         needed += reversed(changes)
         if changes and changes[0].get("whole"):
             break
-    found = Standing()
+    found = RunSnapshot()
     for change in reversed(needed):
         found.take(change)
     return found

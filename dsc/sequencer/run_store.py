@@ -10,14 +10,14 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output
 from dsc.json_text import text_of
-from dsc.sequencer.changed import require_unchanged
+from dsc.sequencer.design_changes import require_unchanged
 from dsc.sequencer.messages import LateMessage, Message
+from dsc.sequencer.outbox import Told
 from dsc.sequencer.reactor import Reactor
 from dsc.sequencer.run_forms import Kept, Shortener, message_form
-from dsc.sequencer.run_present import Present, read
+from dsc.sequencer.run_present import RunState, read
 from dsc.sequencer.run_tables import RunArchive, archive, unfinished
-from dsc.sequencer.run_writing import Writing
-from dsc.sequencer.telling import Told
+from dsc.sequencer.run_writing import RunWriter
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
@@ -53,7 +53,7 @@ class RunStore:
         domain: Mapping[str, str] | None = None,
     ) -> None:
         self.path = path
-        self.writing = Writing(knowledge, path)
+        self.writing = RunWriter(knowledge, path)
         self.last_late = 0
         self._knowledge = knowledge
         self._header = header or {}
@@ -62,7 +62,7 @@ class RunStore:
         self._records: list[Record] = []
         self.hear: Callable[[Record], None] = self._records.append
         self._short = Shortener(self._put_form)
-        self._present = Present(self._short)
+        self._present = RunState(self._short)
 
     @property
     def begun(self) -> bool:
@@ -87,7 +87,7 @@ class RunStore:
         (open_runs,) = self.writing.connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
         if open_runs:
             raise StoreError("the store has an unfinished run, which can be resumed", place=Place(str(self.path)))
-        self._number, self._present = 0, Present(self._short)
+        self._number, self._present = 0, RunState(self._short)
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
         row = (
             plot, text_of(self._short(arguments)), self._knowledge.version, text_of(self._header), text_of(plots),

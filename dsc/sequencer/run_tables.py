@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dsc.engine.steps import Start
-from dsc.sequencer.run_standing import Row, Standing, standing
+from dsc.sequencer.run_standing import RunSnapshot, SnapshotRow, latest_snapshot
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.file import is_there, located, reading
@@ -47,7 +47,7 @@ TABLES = {
     "forms": "CREATE TABLE forms (hash TEXT PRIMARY KEY, form TEXT NOT NULL) WITHOUT ROWID",
     "fence": "CREATE TABLE fence (epoch INTEGER NOT NULL, format INTEGER NOT NULL)",
 }
-FORMAT = 3
+FORMAT = 4
 """Of these tables; the first had no number."""
 CHAIN = "steps"
 """Of runs and their macrosteps, in the store's table of ends."""
@@ -177,13 +177,13 @@ class RunArchive:
         """The lines of a run's trace from the macrostep at place `since` of the file on, each with its place there."""
         return ((row.place, line) for row in self._rows(run, since) for line in row.records.split("\n") if line)
 
-    def standing(self) -> Standing:
+    def latest_snapshot(self) -> RunSnapshot:
         """What stands after the last macrostep of all."""
-        return standing(row.change for row in self._latest(self.run().number))
+        return latest_snapshot(row.change for row in self._latest(self.run().number))
 
     def under_way(self) -> list[tuple[Start, float]]:
         """The skills of the unfinished run that have not ended, with the second at which they were started."""
-        rows = [Row(*row) for _, row in sorted(self.standing().pending.items())]
+        rows = [SnapshotRow(*row) for _, row in sorted(self.latest_snapshot().pending.items())]
         return [(Start(**row.what), row.at) for row in rows if row.kind == Start.__name__ and not row.cancelled]
 
     def serials_before(self, run: int) -> int:

@@ -28,7 +28,7 @@ Boundary = Literal["before commit", "after commit"]
 """Where a process that dies makes a difference: either nothing of the macrostep was, or nothing has left yet."""
 
 
-class Writing:
+class RunWriter:
     """A context manager for one transaction after the other; whoever makes one takes all earlier ones' right away.
 
     Args:

@@ -12,17 +12,16 @@ from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
 from dsc.events import GAVE_UP, NO_PLAN, Event
-from dsc.sequencer import entrance, together
+from dsc.sequencer import commit_grouping, input_checks
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.coming import Coming
 from dsc.sequencer.dispatcher import Dispatcher
-from dsc.sequencer.inbox import Inbox
+from dsc.sequencer.inbox import Inbox, ScheduledInput
+from dsc.sequencer.livelock import LivelockGuard
 from dsc.sequencer.messages import FromOutside, LateMessage, Message, SkillMessage
 from dsc.sequencer.reactor import Reactor, StepListener
-from dsc.sequencer.resuming import require_components, take_up
+from dsc.sequencer.recovery import require_components, take_up
 from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.standstill import Standstill
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -80,7 +79,7 @@ class Sequencer:
         store: RunStore | None = None,
         part_of: str = "",
     ) -> None:
-        entrance.require_parts(library, knowledge, clock, trace, store)
+        input_checks.require_parts(library, knowledge, clock, trace, store)
         self.library = library
         self.knowledge = knowledge
         self.trace = trace or Trace(clock.now)
@@ -92,7 +91,7 @@ class Sequencer:
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, part_of)
         self._open_ended = open_ended
-        self._coming = Coming(clock, self._inbox.put)
+        self._coming = ScheduledInput(clock, self._inbox.put)
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
@@ -147,7 +146,7 @@ class Sequencer:
                 plain data.
             StoreError: it could not be kept.
         """
-        self._hand_in(entrance.event(event), after)
+        self._hand_in(input_checks.event(event), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
         """Hand in a change of knowledge that somebody else made; from the loop's own thread.
@@ -161,7 +160,7 @@ class Sequencer:
             InputError: the change contradicts the schema; nothing was changed.
             StoreError: it could not be kept.
         """
-        self._hand_in(entrance.change(delta, author, self.knowledge), after)
+        self._hand_in(input_checks.change(delta, author, self.knowledge), after)
 
     def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
         """Hand in what an operator says a parameter is worth from now on; from the loop's own thread.
@@ -180,7 +179,7 @@ class Sequencer:
             InputError: the value is out of range, breaks a relation, or is not for operators to say.
             StoreError: it could not be kept.
         """
-        self._hand_in(entrance.parameter(owner, name, value, self.dispatcher.components, self.library), after)
+        self._hand_in(input_checks.parameter(owner, name, value, self.dispatcher.components, self.library), after)
 
     async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
         """Run the plot until it ends, or until nothing can happen any more.
@@ -189,7 +188,7 @@ class Sequencer:
             InputError: the plot is unknown, or a parameter is missing or unknown.
             StoreError: the store cannot be written; what was committed before can be resumed.
         """
-        given = entrance.arguments(self.library.plot(plot), {} if arguments is None else arguments)
+        given = input_checks.arguments(self.library.plot(plot), {} if arguments is None else arguments)
 
         async def begin() -> None:
             self._start(plot, given)
@@ -213,7 +212,7 @@ class Sequencer:
         reactor = self._reactor
         # Before anybody who is started by the run subscribes: what follows from a change is recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
-        standstill = Standstill(self.clock) if self.clock.simulated else None
+        livelock = LivelockGuard(self.clock) if self.clock.simulated else None
         try:
             await begin()
             while not self.machine.state.finished and reactor.problem is None:
@@ -225,7 +224,7 @@ class Sequencer:
                 for wait in self._before_events:
                     await wait()
                 message = self._inbox.take()
-                if standstill is not None and (problem := standstill.problem(message)):
+                if livelock is not None and (problem := livelock.problem(message)):
                     reactor.problem = problem
                     break
                 self._take(message)
@@ -284,8 +283,8 @@ class Sequencer:
         else:
             with self.store.writing:
                 output = self._react_and_keep(message)
-                for _ in range(together.MOST - 1):
-                    if self._before_events or not together.may_wait(message, output, self._reactor, self._inbox):
+                for _ in range(commit_grouping.MOST - 1):
+                    if self._before_events or not commit_grouping.may_wait(message, output, self._reactor, self._inbox):
                         break
                     message = self._inbox.take()
                     output = self._react_and_keep(message)
@@ -318,10 +317,10 @@ class Sequencer:
 
     def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:
         assert self.store is not None  # noqa: S101
-        telling = self.dispatcher.telling
+        outbox = self.dispatcher.outbox
         memories = self.dispatcher.memories()
-        now, refused = self.clock.now(), telling.refused()
-        self.store.step(now, message, output, self._reactor, telling.under_way, refused, memories)
+        now, refused = self.clock.now(), outbox.refused()
+        self.store.step(now, message, output, self._reactor, outbox.under_way, refused, memories)
 
     def _carry_out(self, output: Iterable[Output]) -> None:
         try:
@@ -333,7 +332,7 @@ class Sequencer:
     # -- from outside ------------------------------------------------------------------------------------
 
     def _hand_in(self, message: FromOutside, after: float) -> None:
-        entrance.require_seconds(after)
+        input_checks.require_seconds(after)
         if after <= 0:
             self._inbox.put(message)
             return

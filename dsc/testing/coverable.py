@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import HistoryState
-from dsc.model.transitions import Source
+from dsc.model.transitions import TransitionSource
 from knowledge_base.errors import Place
 
 Kind = Literal["state", "transition", "rule"]
@@ -18,7 +18,7 @@ Key = tuple[Kind, str, Path]
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class CoverageItem:
     """Something that a run may reach.
 
     Attributes:
@@ -49,7 +49,7 @@ class Item:
         return {"kind": self.kind, "text": self.text, "path": list(self.path), **written}
 
 
-def items_of(plot: ActionPlot) -> Iterator[Item]:
+def items_of(plot: ActionPlot) -> Iterator[CoverageItem]:
     """Everything in a plot as it was written, in document order; rules of one label are one item.
 
     What rules expand to is not the plot's own: however many states a rule answers for, it is there once. History
@@ -57,16 +57,16 @@ def items_of(plot: ActionPlot) -> Iterator[Item]:
     """
     for name, state, path in plot.walk():
         if not isinstance(state, HistoryState):
-            yield Item(("state", name, ()), f"state '{name}' was never entered", path, plot.place(path))
-        if isinstance(state, Source):
+            yield CoverageItem(("state", name, ()), f"state '{name}' was never entered", path, plot.place(path))
+        if isinstance(state, TransitionSource):
             for at, trigger, transition in state.placed_transitions():
                 here = (*path, *at)
                 goal = "(stays)" if transition.target is None else f"-> {transition.target}"
                 text = f"'{name}' never took {trigger} {goal}"
-                yield Item(("transition", name, at), text, here, plot.place(here))
+                yield CoverageItem(("transition", name, at), text, here, plot.place(here))
     reactions = {"rules": [rule.label for rule in plot.rules], "handlers": [one.label for one in plot.handlers]}
     for group, labels in reactions.items():
         for number, label in enumerate(labels):
             if label not in labels[:number]:
                 here = (group, number)
-                yield Item(("rule", label, ()), f"rule '{label}' never answered", here, plot.place(here))
+                yield CoverageItem(("rule", label, ()), f"rule '{label}' never answered", here, plot.place(here))

@@ -8,7 +8,7 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Microstep, Step, Taken
 from dsc.model.plot import ActionPlot
-from dsc.testing.coverable import KINDS, Item, Key, Kind, items_of
+from dsc.testing.coverable import KINDS, CoverageItem, Key, Kind, items_of
 from knowledge_base.errors import InputError, UnknownNameError
 
 
@@ -48,7 +48,7 @@ class Coverage:
                 holder, _, name = path.rpartition("/")
                 self._count(self._holding(holder), ("state", name, ()))
 
-    def missing(self, plot: str | None = None) -> tuple[Item, ...]:
+    def missing(self, plot: str | None = None) -> tuple[CoverageItem, ...]:
         """What was not reached, in the order of plots and texts; of one plot, or of all.
 
         Raises:
@@ -146,8 +146,8 @@ class Coverage:
             raise UnknownNameError(f"the plot '{plot}' is not covered", found=plot, valid=self._items)
         return (plot,)
 
-    def _missing(self, plot: str) -> Iterator[Item]:
-        items: Mapping[Key, Item] = self._items[plot]
+    def _missing(self, plot: str) -> Iterator[CoverageItem]:
+        items: Mapping[Key, CoverageItem] = self._items[plot]
         return (item for key, item in items.items() if (plot, key) not in self._reached)
 
     def _lines(self, plot: str, width: int) -> Iterator[str]:

@@ -6,14 +6,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Cancel, Output, Revoke, SendLater, Start, StartTimer, Step
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
-from dsc.sequencer.ends import late
+from dsc.sequencer.outcome_checks import late
 from dsc.sequencer.reactor import CHART
 from dsc.testing.worlds import change_of, world
 from knowledge_base.errors import InputError, UnknownNameError

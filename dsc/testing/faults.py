@@ -19,7 +19,7 @@ from typing import Any, NoReturn, TypeVar
 from dsc.calls import Outcome, SkillCall
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
-from dsc.components.life import Life, LifeCycle
+from dsc.components.life_cycle import Life, LifeCycle
 from dsc.engine.steps import Start, Step
 from dsc.events import Event
 from dsc.sequencer.sequencer import Sequencer

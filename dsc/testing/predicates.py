@@ -12,10 +12,10 @@ from typing import Any, Protocol
 
 from dsc.engine.steps import Microstep, SetParameter, Start, Step, SwitchMode, Taken
 from dsc.model.plot import ActionPlot
-from dsc.testing.vocabulary import Vocabulary
+from dsc.testing.vocabulary import KnownNames
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
-from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, NumericEffect
 from knowledge_base.language.expression import Atom, Call, Constant
 from knowledge_base.language.parser import parse_effect
 
@@ -153,7 +153,7 @@ def _check(run: Run, **names: str | None) -> None:
     if isinstance(run, Step | Iterable):
         return
     bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)  # with what rules and planners added
-    Vocabulary([*run.library, *bound]).check(**names)
+    KnownNames([*run.library, *bound]).check(**names)
 
 
 def _steps(run: Run) -> Iterable[Step]:
@@ -186,18 +186,18 @@ def _is_event(event: Any, name: str, attributes: dict[str, Any]) -> bool:
     return event is not None and event.name == name and _has(event.attributes, attributes)
 
 
-def _parts(effect: Effect) -> Iterator[Add | Delete | Assign]:
+def _parts(effect: Effect) -> Iterator[Add | Delete | NumericEffect]:
     if isinstance(effect, AllOf):
         for part in effect.parts:
             yield from _parts(part)
-    elif isinstance(effect, Add | Delete) or (isinstance(effect, Assign) and effect.operator == "assign"):
+    elif isinstance(effect, Add | Delete) or (isinstance(effect, NumericEffect) and effect.operator == "assign"):
         yield effect
     else:
         raise InputError("what was told is asked for as facts, (not FACT) and (assign (FUNCTION ...) NUMBER)")
 
 
-def _tells(step: Step, part: Add | Delete | Assign) -> bool:
-    if isinstance(part, Assign):
+def _tells(step: Step, part: Add | Delete | NumericEffect) -> bool:
+    if isinstance(part, NumericEffect):
         value = part.value.value if isinstance(part.value, Constant) else None
         return step.knowledge.values.get(_fact(part.call)) == value
     return _fact(part.atom) in (step.knowledge.added if isinstance(part, Add) else step.knowledge.removed)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from dsc.testing.coverage import Coverage
-from dsc.text.plots import load_library
+from dsc.text.plot_files import load_library
 
 _COVERAGE = pytest.StashKey[Coverage]()
 

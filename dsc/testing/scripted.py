@@ -33,9 +33,7 @@ class ScriptedSkills:
         InputError: the script names a skill, outcome or attribute that a component in `like` does not have.
     """
 
-    def __init__(
-        self, knowledge: KnowledgeBase, script: Mapping[str, Replies], like: Iterable[Component] = ()
-    ) -> None:
+    def __init__(self, knowledge: KnowledgeBase, script: Mapping[str, Replies], like: Iterable[Component] = ()) -> None:
         self.knowledge = knowledge
         self.calls: list[Call] = []
         self.problems: list[Exception] = []
@@ -65,18 +63,14 @@ class ScriptedSkills:
         """
         self.calls.append(call)
         if call.skill not in self._replies:
-            raise UnknownNameError(
-                f"the script has no skill '{call.skill}'", found=call.skill, valid=self._replies
-            )
+            raise UnknownNameError(f"the script has no skill '{call.skill}'", found=call.skill, valid=self._replies)
         return self._replies[call.skill].next(call)
 
 
 class _ScriptedComponent(Component):
     """One component of the script, imitating another's skills or free."""
 
-    def __init__(
-        self, name: str, script: ScriptedSkills, imitated: Mapping[str, SkillSignature] | None
-    ) -> None:
+    def __init__(self, name: str, script: ScriptedSkills, imitated: Mapping[str, SkillSignature] | None) -> None:
         super().__init__(name)
         self._script = script
         self._imitates = imitated is not None
@@ -120,9 +114,7 @@ class _ScriptedComponent(Component):
         if not self._imitates:
             self._signatures.setdefault(name, SkillSignature(self.name, name, {}, {}, {}))
         if name not in self._signatures:
-            raise UnknownNameError(
-                f"component '{self.name}' has no skill '{name}'", found=name, valid=self._signatures
-            )
+            raise UnknownNameError(f"component '{self.name}' has no skill '{name}'", found=name, valid=self._signatures)
         for answer in (one for whole in answers for one in (*whole.reports, whole)):
             if self._imitates:
                 check_outcome(skill, self._signatures[name], answer)

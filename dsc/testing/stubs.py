@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from dsc.events import DONE
-from dsc.model.plot import ActionPlot, Variable
+from dsc.model.plot import ActionPlot, PlotVariable
 from knowledge_base.errors import InputError, UnknownNameError
 
 
@@ -38,21 +38,23 @@ def ends_with(
     ending |= {"assign": given} if outcome == DONE else {"emit": outcome, "with": given}
     wait = {"after": {"seconds": after, **ending}} if after > 0 else {"always": ending}
     about = f"Stands in for '{original.name}' and ends with '{outcome}'."
-    return ActionPlot.model_validate({
-        "plot": original.name,
-        "about": about,
-        "parameters": original.parameters,
-        "emits": original.emits,
-        "outputs": {name: _output(output) for name, output in original.outputs.items()},
-        "when": original.when,
-        "implements": original.implements,
-        "effects": original.effects,
-        "confirm": original.confirm,
-        "states": {"standing_in": wait, "ended": {"final": True}},
-    })
+    return ActionPlot.model_validate(
+        {
+            "plot": original.name,
+            "about": about,
+            "parameters": original.parameters,
+            "emits": original.emits,
+            "outputs": {name: _output(output) for name, output in original.outputs.items()},
+            "when": original.when,
+            "implements": original.implements,
+            "effects": original.effects,
+            "confirm": original.confirm,
+            "states": {"standing_in": wait, "ended": {"final": True}},
+        }
+    )
 
 
-def _output(output: Variable) -> dict[str, Any]:
+def _output(output: PlotVariable) -> dict[str, Any]:
     """An output that has a value in any case, though nobody reads it where the ending is not `done`."""
     nothing = 0 if output.type == "number" else "nothing"
     return {"type": output.type, "initial": nothing if output.initial is None else output.initial}

@@ -20,19 +20,17 @@ from typing import Any, ClassVar
 import pytest
 
 from dsc.calls import Outcome, SkillCall
-from dsc.components.activity import Activity
+from dsc.components.activation import BEAT, SILENCE, ComponentActivation, Heartbeat
 from dsc.components.component import Component
+from dsc.components.component_registry import ComponentRegistry, NotAliveError
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
-from dsc.components.heartbeats import BEAT, SILENCE, Heart
-from dsc.components.life import Life
+from dsc.components.life_cycle import Life
 from dsc.components.ports import event, query, takes
-from dsc.components.pushing import Publisher, Subscription
+from dsc.components.publication import Publisher, Subscription
 from dsc.components.remote import Host, RemoteComponent
-from dsc.components.roster import NotAliveError, Roster
-from dsc.components.streams import Push, Stream
-from dsc.components.support import Support
+from dsc.components.skill_dependencies import SkillDependencies
+from dsc.components.streams import Push, Stream, Wiring
 from dsc.components.transport import Transport
-from dsc.components.wiring import Wiring
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from knowledge_base.errors import InputError
@@ -42,7 +40,7 @@ PATIENCE = 20.0
 """Seconds of loop time in which what was promised has to come true."""
 
 
-class Robot(Component):
+class SuiteRobot(Component):
     """Has every port there is."""
 
     name = "robot"
@@ -341,8 +339,8 @@ class TransportSuite:
     # -- components --------------------------------------------------------------------------------------
 
     @asynccontextmanager
-    async def _robot(self) -> AsyncIterator[tuple[Robot, RemoteComponent, Host]]:
-        transport, robot = self.transport(), Robot()
+    async def _robot(self) -> AsyncIterator[tuple[SuiteRobot, RemoteComponent, Host]]:
+        transport, robot = self.transport(), SuiteRobot()
         host = Host(robot, transport, LoopClock())
         remote = await RemoteComponent.connect("robot", transport, PATIENCE)
         await remote.come_alive()
@@ -396,7 +394,7 @@ class TransportSuite:
         """The skill fails, the component is in FatalError; the next skill finds it again."""
 
         async def main() -> None:
-            transport, robot = self.transport(), Robot()
+            transport, robot = self.transport(), SuiteRobot()
             host = Host(robot, transport, LoopClock())
             remote = await RemoteComponent.connect("robot", transport, PATIENCE)
             await remote.come_alive()
@@ -407,7 +405,7 @@ class TransportSuite:
             with pytest.raises(NoAnswerError):
                 await task
             assert remote.life.state == "fatal_error"
-            again = Host(Robot(), transport, LoopClock())
+            again = Host(SuiteRobot(), transport, LoopClock())
             await remote.come_alive()
             assert remote.life.state == "alive"
             assert await remote.execute("doubled", SkillCall("a5.0", LoopClock(), lambda _: None), {"n": 4}) == Outcome(
@@ -454,13 +452,13 @@ class TransportSuite:
         """Deployed here, or offered where the component is; late, lost without a word, and back again."""
 
         async def main() -> None:
-            transport, robot, clock = self.transport(), Robot(), LoopClock()
+            transport, robot, clock = self.transport(), SuiteRobot(), LoopClock()
             robot.mode = "scanning"
             host = Host(robot, transport, clock)
             remote = await RemoteComponent.connect("robot", transport, PATIENCE)
-            roster = Roster({"robot": remote, "light": Component("light")})
-            activity = Activity(roster, lambda: {"robot"})
-            support = Support(roster, activity, remote)
+            registry = ComponentRegistry({"robot": remote, "light": Component("light")})
+            activity = ComponentActivation(registry, lambda: {"robot"})
+            support = SkillDependencies(registry, activity, remote)
             waiting = asyncio.ensure_future(support.ready())
             await asyncio.sleep(2.0)
             assert not waiting.done()
@@ -476,7 +474,7 @@ class TransportSuite:
                     await asyncio.wait_for(working, PATIENCE)
                 assert robot.log[-1] == "cancelled"
                 assert remote.life.state == "alive"
-                support = Support(roster, activity, remote)
+                support = SkillDependencies(registry, activity, remote)
                 waiting = asyncio.ensure_future(support.ready())
             waiting.cancel()
             await host.close()
@@ -514,7 +512,7 @@ class TransportSuite:
                 pass
 
             host = Host(Camera(), transport, LoopClock())
-            root = Heart(Endpoint("sequencer", transport), lambda: ["camera"], ignore, root=True)
+            root = Heartbeat(Endpoint("sequencer", transport), lambda: ["camera"], ignore, root=True)
             async with running(root.run()):
                 await until(lambda: told == [True])
             await until(lambda: told == [True, False])
@@ -531,14 +529,14 @@ class TransportSuite:
             transport = self.transport()
             active: set[str] = set()
             needs = {"root": ["arm"], "arm": ["motor"], "motor": [], "camera": []}
-            hearts: dict[str, Heart] = {}
+            hearts: dict[str, Heartbeat] = {}
 
             def heart(name: str) -> Coroutine[Any, Any, None]:
                 async def changed(now: bool) -> None:  # noqa: FBT001
                     (active.add if now else active.discard)(name)
 
                 endpoint = Endpoint(name, transport)
-                hearts[name] = Heart(endpoint, lambda: needs[name], changed, root=name == "root")
+                hearts[name] = Heartbeat(endpoint, lambda: needs[name], changed, root=name == "root")
                 return hearts[name].run()
 
             async with running(heart("root"), heart("motor"), heart("camera")) as tasks:
@@ -571,8 +569,8 @@ class TransportSuite:
                 told.append(now)
 
             dying = Endpoint("arm", transport)
-            arm = Heart(dying, lambda: ["motor"], ignore, root=True)
-            motor = Heart(Endpoint("motor", transport), list, note)
+            arm = Heartbeat(dying, lambda: ["motor"], ignore, root=True)
+            motor = Heartbeat(Endpoint("motor", transport), list, note)
             async with running(motor.run()):
                 task = asyncio.ensure_future(arm.run())
                 await until(lambda: told == [True])

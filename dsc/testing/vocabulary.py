@@ -8,13 +8,13 @@ from dsc.events import AFTER, EVERY
 from dsc.model.actions import Trigger, flat
 from dsc.model.plot import ActionPlot
 from dsc.model.states import AnyState, State
-from dsc.model.transitions import Source
+from dsc.model.transitions import TransitionSource
 from knowledge_base.errors import UnknownNameError
 
 ALWAYS = "always"
 
 
-class Vocabulary:
+class KnownNames:
     """States, triggers, rules and skills of some plots.
 
     Attributes:
@@ -30,7 +30,7 @@ class Vocabulary:
         self.rules: set[str] = set()
         self.skills: set[str] = set()
         for plot in plots:
-            if plot.profile == "scxml":
+            if plot.dialect == "scxml":
                 self.triggers = None
             self.rules.update(rule.label for rule in plot.rules)
             self.rules.update(handler.label for handler in plot.handlers)
@@ -39,7 +39,7 @@ class Vocabulary:
                 self._add(state)
 
     def _add(self, state: AnyState) -> None:
-        if not isinstance(state, Source):
+        if not isinstance(state, TransitionSource):
             return
         for trigger, transition in state.transitions():
             if self.triggers is not None:

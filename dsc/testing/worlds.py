@@ -6,7 +6,7 @@ from pathlib import Path
 
 from knowledge_base.exchange.problem_text import read_problem
 from knowledge_base.facts import Delta
-from knowledge_base.language.application import apply_effect
+from knowledge_base.language.effect_application import apply_effect
 from knowledge_base.language.parser import parse_effect
 from knowledge_base.language.terms import Bindings
 from knowledge_base.pddl.domain_text import read_domain

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from dsc.model.plot import ActionPlot, Path, initial_of
 from dsc.model.states import CompositeState, HistoryState, OrthogonalState
-from dsc.model.transitions import Source
+from dsc.model.transitions import TransitionSource
 from knowledge_base.errors import UnknownNameError
 
 
@@ -29,6 +29,6 @@ def _named(plot: ActionPlot) -> Iterator[tuple[str, Path]]:
             yield from ((initial_of(one), (*path, "regions", key, "initial")) for key, one in state.regions.items())
         elif isinstance(state, HistoryState):
             yield state.target, (*path, "to")
-        if isinstance(state, Source):
+        if isinstance(state, TransitionSource):
             for inside, _, transition in state.placed_transitions():
                 yield from ((target, (*path, *inside, "to")) for target in transition.targets)

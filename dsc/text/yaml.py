@@ -33,7 +33,7 @@ from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 from ruamel.yaml.scanner import Scanner, ScannerError
 
 from dsc.model.reading import FormPath
-from dsc.text.files import check_size
+from dsc.text.text_files import check_size
 from knowledge_base.errors import ParseError, Place
 from knowledge_base.language.inputs import require_text
 

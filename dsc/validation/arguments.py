@@ -1,4 +1,4 @@
-"""What plots are handed, by `with` and by `pass`: names exist, and nothing that a plot needs is missing."""
+"""Arguments, parameters and outputs of plots: names exist, values keep their ranges, nothing needed is missing."""
 
 from __future__ import annotations
 
@@ -8,14 +8,109 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Step, concerns, contents_of
+from dsc.dynamic.step_references import Step, concerns, contents_of, entered_by
 from dsc.errors import Finding
-from dsc.model.plot import ActionPlot, Parameter, Path, initial_of
+from dsc.model.actions import Assign, ExternalAction, Internal, flat
+from dsc.model.plot import ActionPlot, Path, PlotParameter, initial_of
+from dsc.model.ranges import Who, refuse_change
 from dsc.model.rules import Reaction, Rule
-from dsc.model.states import HistoryState, SubmachineState
-from dsc.model.transitions import Source, Transition
+from dsc.model.states import AnyState, FinalState, HistoryState, State, SubmachineState
+from dsc.model.transitions import Transition, TransitionSource
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.expression import Constant, Term
+
+
+def check_parameters(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
+    """Findings about the roles of a plot's own parameters, and about what it hands to others."""
+    for name, parameter in plot.parameters.items():
+        yield from _own(plot, name, parameter)
+    for _, state, path in nesting.states:
+        if isinstance(state, Step) and state.arguments:
+            for used in contents_of(state, library):
+                yield from _handed(plot, used, state.arguments, "plots", (*path, "with"))
+        for inside, _, way in nesting.leaving(path):
+            target = nesting.state(way.target) if way.passed and way.target is not None else None
+            for used in contents_of(target, library) if isinstance(target, Step) else ():
+                yield from _handed(plot, used, way.passed, "plots", (*path, *inside, "pass"))
+    yield from _by_rules(plot, library)
+
+
+def _by_rules(plot: ActionPlot, library: Library) -> Iterator[Finding]:
+    for group, reactions in (("rules", [r.do for r in plot.rules]), ("handlers", [h.do for h in plot.handlers])):
+        for number, do in enumerate(reactions):
+            if do.use is not None:
+                yield from _handed(plot, library.plot(do.use), do.arguments, "rules", (group, number, "do", "with"))
+    for number, rule in enumerate(plot.rules):
+        for one in entered_by(rule, plot, library) if rule.do.passed else ():
+            yield from _handed(plot, one, rule.do.passed, "rules", ("rules", number, "do", "pass"))
+
+
+def _own(plot: ActionPlot, name: str, parameter: PlotParameter) -> Iterator[Finding]:
+    here: Path = ("parameters", name)
+    for problem in parameter.range.problems():
+        yield Finding(SchemaError(f"parameter '{name}': {problem}", place=plot.place(here)), "parameter roles")
+        return
+    if parameter.default is None:
+        if parameter.changed_by != "plots":
+            message = f"'{name}' needs a default, as not everybody who uses the plot may say its value"
+            error = SchemaError(message, place=plot.place(here))
+            yield Finding(error, "parameter roles", "a profile may say another one")
+    elif isinstance(parameter.default, Constant) and parameter.bounded:
+        yield from _fits(plot, f"{plot.name}.{name}", parameter, parameter.default, (*here, "default"))
+
+
+def _handed(
+    plot: ActionPlot, used: ActionPlot, arguments: Mapping[str, Term], who: Who, path: Path
+) -> Iterator[Finding]:
+    for name, term in arguments.items():
+        parameter = used.parameters.get(name)
+        if parameter is None:  # it is for another candidate, or a finding of its own
+            continue
+        full, here = f"{used.name}.{name}", (*path, name)
+        try:
+            refuse_change(full, who, parameter.changed_by)
+        except SchemaError as refused:
+            refused.place = plot.place(here)
+            yield Finding(refused, "parameter roles", "say it in a profile, or let `changed_by` allow it")
+            continue
+        if isinstance(term, Constant) and parameter.bounded:
+            yield from _fits(plot, full, parameter, term, here)
+
+
+def _fits(plot: ActionPlot, name: str, parameter: PlotParameter, term: Constant, path: Path) -> Iterator[Finding]:
+    try:
+        parameter.range.check(name, term.value)
+    except InputError as error:
+        error.place = plot.place(path)
+        yield Finding(error, "parameter roles")
+
+
+def check_outputs(plot: ActionPlot) -> Iterator[Finding]:
+    """Findings about outputs that nothing gives a value."""
+    open_ones = [name for name, output in plot.outputs.items() if output.initial is None]
+    if not open_ones:
+        return
+    assigned = {name for _, state, _ in plot.walk() for name in _assigned(_actions(state))}
+    for name in open_ones:
+        if name not in assigned:
+            error = SchemaError(f"the output '{name}' never gets a value", place=plot.place(("outputs", name)))
+            yield Finding(error, "outputs are given", "`assign` it on the way to the end, or add `initial`")
+
+
+def _assigned(actions: Iterable[ExternalAction | Internal]) -> Iterator[str]:
+    return (name for action in flat(actions) if isinstance(action, Assign) for name in action.assign)
+
+
+def _actions(state: AnyState) -> Iterator[ExternalAction | Internal]:
+    if isinstance(state, State):
+        for _, actions in state.blocks():
+            yield from actions
+    if isinstance(state, TransitionSource):
+        for _, transition in state.transitions():
+            yield from transition.effect
+    else:
+        yield from state.entry if isinstance(state, FinalState) else state.do
 
 
 def check_arguments(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
@@ -46,9 +141,7 @@ def _used(plot: ActionPlot, do: Reaction, path: Path, library: Library) -> Itera
             yield _missing(plot, _Need(used.name, name), here)
 
 
-def _passed_by_rule(
-    plot: ActionPlot, rule: Rule, path: Path, library: Library, nesting: Nesting
-) -> Iterator[Finding]:
+def _passed_by_rule(plot: ActionPlot, rule: Rule, path: Path, library: Library, nesting: Nesting) -> Iterator[Finding]:
     """Some step that the rule is for takes what it passes; others are not handed it."""
     if not rule.do.passed:
         return
@@ -126,7 +219,7 @@ class _WayIn:
     path: Path | None
 
 
-def _needed(parameters: Mapping[str, Parameter]) -> Iterable[str]:
+def _needed(parameters: Mapping[str, PlotParameter]) -> Iterable[str]:
     return (name for name, parameter in parameters.items() if parameter.default is None)
 
 
@@ -155,7 +248,7 @@ class _Entrances:
             expanded = self._plot
         found: defaultdict[str, list[_WayIn]] = defaultdict(list)
         for name, state, path in expanded.walk():
-            for inside, _, transition in state.placed_transitions() if isinstance(state, Source) else ():
+            for inside, _, transition in state.placed_transitions() if isinstance(state, TransitionSource) else ():
                 written = name in self._nesting.names and transition.rule is None
                 way = _WayIn(transition, (*path, *inside) if written else None)
                 for target in transition.targets:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.outcomes import Outcomes, answerable, outputs_of
-from dsc.dynamic.steps import Step, concerns, mentioned_in, terms_of
+from dsc.dynamic.plot_outcomes import Outcomes, answerable, outputs_of
+from dsc.dynamic.step_references import Step, concerns, mentioned_in, terms_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
@@ -26,14 +26,13 @@ from dsc.model.actions import (
     Withdraw,
 )
 from dsc.model.connectors import Connector, SelectState
-from dsc.model.plot import ActionPlot, Parameter, Path, Variable
+from dsc.model.plot import ActionPlot, Path, PlotParameter, PlotVariable
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, State, SubmachineState
 from dsc.model.transitions import TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
-from dsc.validation.attributes import Skills, attributes_of
 from dsc.validation.nesting import Nesting
-from dsc.validation.rule_scope import RuleScope, Types
+from dsc.validation.rules import RuleScope, Skills, Types, attributes_of
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.binding import unbound_error
 from knowledge_base.language.check import check, check_effect, check_term
@@ -62,7 +61,7 @@ class _Data:
         self._skills = skills
         self._nesting = nesting
         self._assigned = {**plot.variables, **plot.outputs}
-        declared: dict[str, Parameter | Variable] = {**plot.parameters, **self._assigned}
+        declared: dict[str, PlotParameter | PlotVariable] = {**plot.parameters, **self._assigned}
         self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
         self._rules = RuleScope(plot, library, skills, nesting, self._type)
 
@@ -142,7 +141,7 @@ class _Data:
         if self._schema is None:
             return
         valid = FREE_TYPES | set(self._schema.types)
-        declared: dict[str, Mapping[str, Parameter | Variable]] = {
+        declared: dict[str, Mapping[str, PlotParameter | PlotVariable]] = {
             "parameters": self._plot.parameters, "variables": self._plot.variables, "outputs": self._plot.outputs,
         }  # fmt: skip
         for kind, declarations in declared.items():
@@ -255,7 +254,7 @@ class _Data:
                     found=name, valid=self._nesting.names,
                 )  # fmt: skip
                 yield Finding(error, "condition")
-        if self._plot.profile == "scxml":
+        if self._plot.dialect == "scxml":
             condition = settle(condition, lambda _: True)
         if self._schema is not None:
             try:
@@ -276,16 +275,14 @@ class _Data:
         for name in sorted(mentioned(effect) - scope.keys()):
             yield Finding(_at(unbound_error(name, None, scope), self._plot, path), "effect")
 
-    def _terms(
-        self, terms: Iterable[tuple[str, Term]], attributes: Types | None, path: Path
-    ) -> Iterator[Finding]:
+    def _terms(self, terms: Iterable[tuple[str, Term]], attributes: Types | None, path: Path) -> Iterator[Finding]:
         for key, term in terms:
             yield from self._only({key: term}, self._scope(attributes, term), path)
 
     def _only(self, terms: Mapping[str, Term], scope: Types, path: Path) -> Iterator[Finding]:
         for key, term in terms.items():
             unknown = sorted(free_variables(term) - set(scope))
-            if not unknown and self._schema is not None and self._plot.profile == "dsc":
+            if not unknown and self._schema is not None and self._plot.dialect == "dsc":
                 yield from self._term(term, scope, (*path, key))
             for name in unknown:
                 error = UnknownNameError(

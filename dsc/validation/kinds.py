@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Step, contents_of, entered_by
+from dsc.dynamic.step_references import Step, contents_of, entered_by
 from dsc.errors import Finding
 from dsc.model.actions import Assign, Emit, ExternalAction, Internal, Trigger, flat
 from dsc.model.connectors import SelectState, case_value
@@ -16,9 +16,8 @@ from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import Reaction
 from dsc.model.states import FinalState, State
 from dsc.model.transitions import TimedTransition, Transition
-from dsc.validation.attributes import Attributes, Skills, attributes_of
 from dsc.validation.nesting import Nesting
-from dsc.validation.rule_scope import RuleScope
+from dsc.validation.rules import Attributes, RuleScope, Skills, attributes_of
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.expression import Constant, Term, Variable
 from knowledge_base.language.printer import to_text
@@ -32,7 +31,7 @@ def check_kinds(
     plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
 ) -> Iterator[Finding]:
     """Findings about values that do not fit the types they are given to; SCXML's data have no types."""
-    if plot.profile == "dsc":
+    if plot.dialect == "dsc":
         yield from _Kinds(plot, library, schema, skills, nesting).findings()
 
 
@@ -117,9 +116,7 @@ class _Kinds:
         elif isinstance(action, Emit):
             yield from self._emitted(action.emit, action.arguments, scope, path)
         elif isinstance(action, Trigger) and action.trigger in self._skills:
-            yield from self._all(
-                action.arguments, self._skills[action.trigger].parameters, scope, (*path, "with")
-            )
+            yield from self._all(action.arguments, self._skills[action.trigger].parameters, scope, (*path, "with"))
 
     def _given(
         self, used: ActionPlot, arguments: Mapping[str, Term], scope: Attributes, path: Path
@@ -133,9 +130,7 @@ class _Kinds:
         declared = self._plot.emits.get(event or "")
         yield from self._all(arguments, declared or {}, scope, (*path, "with"))
 
-    def _all(
-        self, terms: Mapping[str, Term], wanted: Attributes, scope: Attributes, path: Path
-    ) -> Iterator[Finding]:
+    def _all(self, terms: Mapping[str, Term], wanted: Attributes, scope: Attributes, path: Path) -> Iterator[Finding]:
         for name, term in terms.items():
             yield from self._fits(term, wanted.get(name), scope, (*path, name))
 

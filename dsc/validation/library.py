@@ -9,17 +9,14 @@ from dsc.dynamic.library import Library
 from dsc.errors import Finding, PlotError
 from dsc.model.plot import ActionPlot
 from dsc.skills import SkillSignature
-from dsc.validation.arguments import check_arguments
-from dsc.validation.components import Components, check_components
+from dsc.validation.arguments import check_arguments, check_outputs, check_parameters
 from dsc.validation.data import check_data
+from dsc.validation.deployment import Components, check_components
+from dsc.validation.flow import check_wiring
 from dsc.validation.kinds import check_kinds
 from dsc.validation.nesting import Nesting
-from dsc.validation.outputs import check_outputs
-from dsc.validation.parameters import check_parameters
 from dsc.validation.reach import check_reach
-from dsc.validation.size import check_size
-from dsc.validation.structure import check_structure
-from dsc.validation.wiring import check_wiring
+from dsc.validation.shape import check_size, check_structure
 from knowledge_base.language.inputs import require, require_several
 from knowledge_base.world.schema import Schema
 

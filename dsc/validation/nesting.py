@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.reading import FormPath
 from dsc.model.states import AnyState, State
-from dsc.model.transitions import Source, Transition
+from dsc.model.transitions import Transition, TransitionSource
 
 
 class Nesting:
@@ -23,11 +23,13 @@ class Nesting:
         self.names = {name: path for name, _, path in self.states}
         self._states = {path: state for _, state, path in self.states}
         self._leaving = {
-            path: tuple(state.placed_transitions()) for _, state, path in self.states if isinstance(state, Source)
+            path: tuple(state.placed_transitions())
+            for _, state, path in self.states
+            if isinstance(state, TransitionSource)
         }
 
     def leaving(self, path: Path) -> tuple[tuple[FormPath, str, Transition], ...]:
-        """See `Source.placed_transitions`; nothing leaves what is no source."""
+        """See `TransitionSource.placed_transitions`; nothing leaves what is no source."""
         return self._leaving.get(path, ())
 
     def way(self, path: Path) -> Iterator[Path]:

@@ -25,13 +25,13 @@ def view_command(
 ) -> None:
     """Look at a recorded run, or at a store as others change it, in the browser; Ctrl-C ends it."""
     viewer_installed()
-    from dsc.viewer.entrance import Entrance
-    from dsc.viewer.opening import records_of
+    from dsc.viewer.address import PageAddress
+    from dsc.viewer.record_sources import records_of
     from dsc.viewer.server import Viewer
 
     with records_of(file) as log:
         _complain(file, log)
-        with page(Viewer(log, Entrance.on(port)), opens=not no_open) as viewer:
+        with page(Viewer(log, PageAddress.on(port)), opens=not no_open) as viewer:
             until_interrupt(viewer)
 
 

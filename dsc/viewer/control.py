@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dsc.events import Event
 from dsc.sequencer.clock import LoopClock
-from dsc.viewer.answers import require_short
+from dsc.viewer.queries import require_short
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.bounds import Bounds
 from knowledge_base.language.check import check
 from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.question_bounds import Bounds
 
 if TYPE_CHECKING:
     from dsc.engine.steps import Step

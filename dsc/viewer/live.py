@@ -19,7 +19,7 @@ from knowledge_base.errors import InputError, described
 
 if TYPE_CHECKING:
     from dsc.trace import Record
-    from dsc.viewer.entrance import Entrance
+    from dsc.viewer.address import PageAddress
 
 COMMAND = (sys.executable, "-P", "-m", "dsc.viewer.page_process")
 TELL_EVERY_S = 1 / 30
@@ -48,7 +48,7 @@ class LivePage:
         token: in the address for people, a key that stays.
     """
 
-    def __init__(self, first_line: str, entrance: Entrance, *, control: bool = False) -> None:
+    def __init__(self, first_line: str, entrance: PageAddress, *, control: bool = False) -> None:
         self.control = Control(self._tell_paused) if control else None
         self.url, self.one_time_url = entrance.url, entrance.one_time_url
         self.port, self.token = entrance.port, entrance.token

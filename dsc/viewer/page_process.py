@@ -17,7 +17,7 @@ from itertools import count
 from socket import socket
 from typing import IO, Any
 
-from dsc.viewer.entrance import Entrance
+from dsc.viewer.address import PageAddress
 from dsc.viewer.records import RecordLog
 from dsc.viewer.server import Viewer
 from knowledge_base.errors import InputError
@@ -85,7 +85,7 @@ def main() -> None:
     begin = json.loads(lines.readline())
     log = RecordLog(begin["begin"], live=True)
     hands = FarHands(sys.stdout, log.wake)
-    entrance = Entrance(socket(fileno=begin["socket"]), begin["token"], begin["code"])
+    entrance = PageAddress(socket(fileno=begin["socket"]), begin["token"], begin["code"])
     viewer = Viewer(log, entrance, hands if begin["control"] else None)
     viewer.start()
     take_in(lines, log, hands)

@@ -24,13 +24,12 @@ from starlette.websockets import WebSocket
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from dsc.viewer.access import COOKIE, Access, Keys
-from dsc.viewer.answers import Answers, Left
-from dsc.viewer.asked import CONTROL, FACTS, MOST_BYTES, QUERY, Form, asked
+from dsc.viewer.address import PageAddress
+from dsc.viewer.broadcast import Broadcast, BrowserStream
 from dsc.viewer.control import Hands
-from dsc.viewer.entrance import Entrance
+from dsc.viewer.queries import Left, PageQueries
 from dsc.viewer.records import RecordLog
-from dsc.viewer.rounds import Rounds
-from dsc.viewer.stream import Stream
+from dsc.viewer.requests import CONTROL, FACTS, MOST_BYTES, QUERY, Form, asked
 from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,14 +59,14 @@ class Viewer:
         token: in the address for people, a key that stays.
     """
 
-    def __init__(self, log: RecordLog, entrance: Entrance, control: Hands | None = None) -> None:
+    def __init__(self, log: RecordLog, entrance: PageAddress, control: Hands | None = None) -> None:
         self._log, self._control, self._socket = log, control, entrance.listening
         self.url, self.one_time_url = entrance.url, entrance.one_time_url
         self.port, self.token = entrance.port, entrance.token
         self._keys = Keys(entrance.token, entrance.code)
-        self._answers = Answers(log)
+        self._answers = PageQueries(log)
         self._calm = Calm(self._routed())
-        self._rounds = Rounds(log, self._status)
+        self._rounds = Broadcast(log, self._status)
         config = uvicorn.Config(
             self.application(),
             lifespan="off",
@@ -159,7 +158,7 @@ class Viewer:
 
     async def _stream(self, socket: WebSocket) -> None:
         await socket.accept()
-        await Stream(socket, self._log, self._rounds, control=self._control is not None).serve()
+        await BrowserStream(socket, self._log, self._rounds, control=self._control is not None).serve()
 
     def _status(self) -> dict[str, Any]:
         return {"ended": not self._log.live, "paused": self._control.paused if self._control else None}

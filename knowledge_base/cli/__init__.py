@@ -3,4 +3,4 @@
 from __future__ import annotations
 
 from knowledge_base.cli.app import app as app
-from knowledge_base.cli.sources import readers as readers
+from knowledge_base.cli.inputs import readers as readers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from knowledge_base.cli import asking, exchanging, following, telling
+from knowledge_base.cli import changes, exchange, follow, queries
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -12,19 +12,19 @@ app = typer.Typer(
     help="A world model: ask what holds, tell what is new, look back, watch, draw.",
 )
 for command in (
-    telling.new,
-    asking.show,
-    asking.query,
-    asking.ask,
-    telling.tell,
-    telling.retract,
-    following.watch,
-    following.history,
-    following.check,
-    asking.at,
-    telling.compact,
+    changes.new,
+    queries.show,
+    queries.query,
+    queries.ask,
+    changes.tell,
+    changes.retract,
+    follow.watch,
+    follow.history,
+    follow.check,
+    queries.at,
+    changes.compact,
 ):
     app.command()(command)
-app.command("import")(exchanging.import_)
-app.command()(exchanging.export)
-app.command()(exchanging.draw)
+app.command("import")(exchange.import_)
+app.command()(exchange.export)
+app.command()(exchange.draw)

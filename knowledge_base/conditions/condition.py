@@ -10,13 +10,13 @@ from threading import Lock
 from types import TracebackType
 from typing import Literal, Protocol, Self
 
-from knowledge_base.conditions.holding import Hold
-from knowledge_base.conditions.rows import Row
-from knowledge_base.conditions.shape import Args
+from knowledge_base.conditions.alpha_index import ConditionRow
+from knowledge_base.conditions.condition_shape import Args
+from knowledge_base.conditions.damping import Hold
 from knowledge_base.conditions.waiters import Waiters
 from knowledge_base.errors import ConditionCancelledError, InputError
 from knowledge_base.facts import Value
-from knowledge_base.world.turn import Turn
+from knowledge_base.world.read_write_lock import ReadWriteLock
 
 Fire = Literal["edge", "each"]
 FIRE: tuple[Fire, ...] = ("edge", "each")
@@ -77,7 +77,7 @@ class Owner(Protocol):
     version: int
 
     @property
-    def lock(self) -> Turn:
+    def lock(self) -> ReadWriteLock:
         """Held while conditions are judged."""
         ...
 
@@ -101,7 +101,13 @@ class Condition:
     """
 
     def __init__(
-        self, owner: Owner, text: str, rows: tuple[Row, Row], names: tuple[str, ...], terms: Terms, number: int
+        self,
+        owner: Owner,
+        text: str,
+        rows: tuple[ConditionRow, ConditionRow],
+        names: tuple[str, ...],
+        terms: Terms,
+        number: int,
     ) -> None:
         rise, _ = self.rows = rows
         self.text = text
@@ -218,7 +224,7 @@ class Condition:
         if self._now.truth:
             self._hold()
 
-    def judge(self, version: int, changed: Container[Row]) -> None:
+    def judge(self, version: int, changed: Container[ConditionRow]) -> None:
         """Its rows are up to date with `version`, which `changed` the witnesses of at least one of them."""
         rise, stay = self.rows
         was = self._now.truth

@@ -9,29 +9,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from knowledge_base.conditions.announcement import Announcer
-from knowledge_base.conditions.clock import Clock
+from knowledge_base.conditions.alpha_index import AlphaIndex, ConditionRow
 from knowledge_base.conditions.condition import FIRE, Condition, Fire, Terms
+from knowledge_base.conditions.condition_shape import Args, Lifted, Shape, lifted
+from knowledge_base.conditions.damping import Hold, TimerClock, relaxed
 from knowledge_base.conditions.dependencies import BOTH, Kind, Occurrence
-from knowledge_base.conditions.holding import Hold
-from knowledge_base.conditions.hysteresis import relaxed
-from knowledge_base.conditions.readers import Readers
-from knowledge_base.conditions.relation import Relation
-from knowledge_base.conditions.rows import Row
-from knowledge_base.conditions.shape import Args, Lifted, Shape, lifted
+from knowledge_base.conditions.join import Join
+from knowledge_base.conditions.notification import Notifier
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.expression import Expression, substitute
 from knowledge_base.language.inputs import shown
 from knowledge_base.language.printer import to_text
+from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
-from knowledge_base.world.turn import Turn
 
 MORE, LESS = 1, -1
 
 
-def terms(fire: Fire, *, hold_s: float, once: bool, clock: Clock | None) -> Terms:
+def terms(fire: Fire, *, hold_s: float, once: bool, clock: TimerClock | None) -> Terms:
     """The terms on which a condition fires, checked; see `KnowledgeBase.install`.
 
     Raises:
@@ -56,15 +53,15 @@ Event = tuple[Kind, str, Args, int]
 class Installed:
     """The relations of a knowledge base's conditions by shape; all but `later` and `deliver` under its lock."""
 
-    def __init__(self, world: WorldState, version: int, lock: Turn, announcer: Announcer) -> None:
+    def __init__(self, world: WorldState, version: int, lock: ReadWriteLock, announcer: Notifier) -> None:
         self.lock = lock
         self.version = version
         self._world = world
         self._announcer = announcer
-        self._relations: dict[Shape, Relation] = {}
-        self._readers: dict[tuple[Kind, str], Readers] = {}
-        self._told: dict[Row, dict[Condition, None]] = {}
-        self._changed: dict[Row, None] = {}
+        self._relations: dict[Shape, Join] = {}
+        self._readers: dict[tuple[Kind, str], AlphaIndex] = {}
+        self._told: dict[ConditionRow, dict[Condition, None]] = {}
+        self._changed: dict[ConditionRow, None] = {}
         self._numbers = 0
 
     def install(self, e: Expression, params: Mapping[str, Value], terms: Terms, hysteresis: float | None) -> Condition:
@@ -164,12 +161,12 @@ class Installed:
         for condition in sorted(touched, key=lambda c: c.number):
             condition.judge(self.version, self._changed)
 
-    def _row(self, found: Lifted) -> Row:
+    def _row(self, found: Lifted) -> ConditionRow:
         relation = self._relations.get(found.shape)
         if relation is None:
-            relation = Relation(found.shape, self._world, self._readers_of, self._changed)
+            relation = Join(found.shape, self._world, self._readers_of, self._changed)
             self._relations[found.shape] = relation
         return relation.row(found.key)
 
-    def _readers_of(self, occurrence: Occurrence) -> Readers:
-        return self._readers.setdefault((occurrence.kind, occurrence.name), Readers())
+    def _readers_of(self, occurrence: Occurrence) -> AlphaIndex:
+        return self._readers.setdefault((occurrence.kind, occurrence.name), AlphaIndex())

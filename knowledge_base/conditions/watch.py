@@ -9,7 +9,7 @@ from threading import Lock
 from types import TracebackType
 from typing import Protocol, Self
 
-from knowledge_base.conditions.announcement import Listener
+from knowledge_base.conditions.notification import Listener
 from knowledge_base.conditions.pattern import Touches, touches
 from knowledge_base.conditions.waiters import Waiters
 from knowledge_base.errors import InputError

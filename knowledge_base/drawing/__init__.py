@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from knowledge_base.drawing.layout import arranged
-from knowledge_base.drawing.scene import scene
-from knowledge_base.drawing.svg import to_svg
+from knowledge_base.drawing.picture import picture_of
+from knowledge_base.drawing.placement import arranged
+from knowledge_base.drawing.rendering import to_svg
 from knowledge_base.view import View
 
 MOST_DRAWN = 150
@@ -22,4 +22,4 @@ def draw(world: View, thing: str | None = None, hops: int = 1) -> str:
     Raises:
         UnknownNameError: there is no such thing.
     """
-    return to_svg(arranged(scene(world, thing, hops, MOST_DRAWN)))
+    return to_svg(arranged(picture_of(world, thing, hops, MOST_DRAWN)))

@@ -8,10 +8,10 @@ from graphlib import TopologicalSorter
 from typing import TypeVar
 
 from knowledge_base.errors import InputError
+from knowledge_base.language.durative import Duration, DurativeParts
 from knowledge_base.language.effect import NO_EFFECT, AllOf, Effect
 from knowledge_base.language.expression import TRUE, And, Constant, Expression, TypedVariable
 from knowledge_base.language.printer import to_text
-from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.language.typed_list import TypedName
 from knowledge_base.language.vocabulary import ROOT_TYPE
 from knowledge_base.pddl.action_text import ACTION, DURATIVE_ACTION, ActionText
@@ -106,7 +106,7 @@ def _duration(duration: Duration) -> str:
     return bounds[0] if len(bounds) == 1 else f"(and {' '.join(bounds)})" if bounds else "()"
 
 
-def _conditions(timed: Timed) -> str:
+def _conditions(timed: DurativeParts) -> str:
     def parts(e: Expression) -> tuple[Expression, ...]:
         return e.parts if isinstance(e, And) else (e,)
 
@@ -114,7 +114,7 @@ def _conditions(timed: Timed) -> str:
     return _by_time({when: () if e == TRUE else parts(e) for when, e in named.items()}, to_text)
 
 
-def _effects(timed: Timed) -> str:
+def _effects(timed: DurativeParts) -> str:
     def parts(e: Effect) -> tuple[Effect, ...]:
         return e.parts if isinstance(e, AllOf) else (e,)
 

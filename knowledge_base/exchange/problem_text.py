@@ -231,7 +231,6 @@ class _Init:
             case _:
                 raise ParseError("':init' has facts and (= (FUNCTION ...) NUMBER)", place=e.place)
 
-
     def confirm(self, type_name: str, thing: Value, place: Place | None) -> None:
         """`(truck t1)` says nothing new where t1 is one, and cannot make it one."""
         if not self.schema.is_a(self.objects.get(str(thing), ""), type_name):

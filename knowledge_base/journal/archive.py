@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from knowledge_base.errors import ConflictError, Place, StoreError
-from knowledge_base.exchange.forms import FORM_ERRORS, delta_of, schema_of, world_of
+from knowledge_base.exchange.json_forms import FORM_ERRORS, delta_of, schema_of, world_of
 from knowledge_base.facts import Change
+from knowledge_base.journal.atomic_files import TABLES
 from knowledge_base.journal.file import reading
 from knowledge_base.journal.history import Version, Writer, gone, too_early
 from knowledge_base.journal.integrity import (
@@ -25,9 +26,8 @@ from knowledge_base.journal.integrity import (
     require_sound,
     require_tables,
 )
-from knowledge_base.journal.making import TABLES
-from knowledge_base.world.compatibility import require_extension
 from knowledge_base.world.schema import Schema
+from knowledge_base.world.schema_compatibility import require_extension
 from knowledge_base.world.state import WorldState
 
 _JOURNAL = """SELECT version, time, author, delta, digest FROM changes WHERE version > ? AND version <= ?

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Literal
 
 from knowledge_base.errors import DamagedStoreError, Place, StoreError
-from knowledge_base.journal.neighbours import INDEX, LOG, OLD_LOG, regular, require_no_strangers, unlocked
-from knowledge_base.journal.still import changed, is_still, open_still, stamp_of
+from knowledge_base.journal.read_only import changed, is_still, open_still, stamp_of
+from knowledge_base.journal.sidecar_files import INDEX, LOG, OLD_LOG, regular, require_no_strangers, unlocked
 from knowledge_base.pddl.files import files_beside
 
 Durability = Literal["memory", "process", "power"]

@@ -9,9 +9,10 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 from knowledge_base.errors import ConflictError, InputError, Place, StoreError
-from knowledge_base.exchange.forms import compact, delta_form, schema_form, schema_hash, world_form
+from knowledge_base.exchange.json_forms import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
 from knowledge_base.journal.archive import Archive, schema_at
+from knowledge_base.journal.atomic_files import making
 from knowledge_base.journal.checkpoints import CHECKPOINTS
 from knowledge_base.journal.file import (
     Durability,
@@ -34,10 +35,9 @@ from knowledge_base.journal.integrity import (
     require_sound,
 )
 from knowledge_base.journal.lock import WriterLock
-from knowledge_base.journal.making import making
-from knowledge_base.journal.transaction import Group, Transaction
-from knowledge_base.world.compatibility import missing_constants, require_extension, require_functional
+from knowledge_base.journal.write_transaction import TransactionGroup, WriteTransaction
 from knowledge_base.world.schema import Schema
+from knowledge_base.world.schema_compatibility import missing_constants, require_extension, require_functional
 from knowledge_base.world.state import WorldState
 
 SNAPSHOT_AFTER = 2_000_000
@@ -100,8 +100,8 @@ class Journal(Archive):
                 _make(path, schema, durability, clock())
             self._connection = writing(path, durability)
             self._token = os.urandom(SIZE)
-            self._transaction = Transaction(self._connection, path, durability, self._token)
-            self._group = Group(self._transaction, self._place)
+            self._transaction = WriteTransaction(self._connection, path, durability, self._token)
+            self._group = TransactionGroup(self._transaction, self._place)
             try:
                 self._prepare(schema, clock)
                 self._lay_out_log()

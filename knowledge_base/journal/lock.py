@@ -8,8 +8,8 @@ import re
 from pathlib import Path
 
 from knowledge_base.errors import Place, StoreError
-from knowledge_base.journal.neighbours import LOCK, foreign, open_own
-from knowledge_base.journal.placing import place
+from knowledge_base.journal.atomic_files import place
+from knowledge_base.journal.sidecar_files import LOCK, foreign, open_own
 
 _MARK = re.compile(rb"dsc writer +(\d+)\n")
 """The content of a lock file, always of the same length; there is never one without it."""

@@ -11,7 +11,7 @@ from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.binding import check_answers, unbound_error
 from knowledge_base.language.depth import check_depth
-from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.expression import (
     And,
     Arithmetic,
@@ -192,10 +192,10 @@ class _Checker:
             case When(condition, inner):
                 self.condition(condition)
                 self.effect(inner)
-            case Assign():
+            case NumericEffect():
                 self.assignment(effect)
 
-    def assignment(self, effect: Assign) -> None:
+    def assignment(self, effect: NumericEffect) -> None:
         """What is assigned must be what the function may be worth; all else works on numbers."""
         result = self.schema.result(effect.call.function, effect.call.place)
         self.term(effect.call)

@@ -33,7 +33,16 @@ from knowledge_base.language.expression import (
     Variable,
     free_variables,
 )
-from knowledge_base.language.joins import Conjunct, Range, Step, as_range, candidates, conjuncts, opposite, order
+from knowledge_base.language.joins import (
+    Conjunct,
+    JoinStep,
+    TypeRange,
+    as_range,
+    candidates,
+    conjuncts,
+    opposite,
+    order,
+)
 from knowledge_base.language.lookups import Answer, Answering, Lookup, Search, alternatives, distinct, smallest, things
 from knowledge_base.language.terms import (
     Bindings,
@@ -130,11 +139,11 @@ def _refuting(e: Forall, schema: Vocabulary) -> list[Conjunct]:
     return [*_ranges(e.variables, schema), *conjuncts(opposite(e.body))]
 
 
-def _ranges(variables: tuple[TypedVariable, ...], schema: Vocabulary) -> list[Range]:
+def _ranges(variables: tuple[TypedVariable, ...], schema: Vocabulary) -> list[TypeRange]:
     for variable in variables:
         for type_name in variable.types:
             schema.require_type(type_name, variable.place)
-    return [Range(v) for v in variables]
+    return [TypeRange(v) for v in variables]
 
 
 def _atom(atom: Atom, schema: Vocabulary) -> Test:
@@ -399,17 +408,17 @@ class SearchPlan:
         return Stage(_all(tests) if tests else None, choices, tuple(open_steps), bound, last, answering)
 
     def _test(self, conjunct: Conjunct) -> Test:
-        if not isinstance(conjunct, Range):
+        if not isinstance(conjunct, TypeRange):
             return compile_test(conjunct, self._schema)
         variable = conjunct.variable
         return _type_test(compile_term(Variable(variable.name), self._schema), variable.types, self._schema)
 
 
-def _lookup(step: Step, schema: Vocabulary, bound: frozenset[str]) -> Lookup | Search:
+def _lookup(step: JoinStep, schema: Vocabulary, bound: frozenset[str]) -> Lookup | Search:
     """Finds values for the variables of a condition that are not in `bound`."""
     finds = step.free - bound
     match step.conjunct:
-        case Range(variable):
+        case TypeRange(variable):
             return things(variable)
         case Atom() as atom:
             check_arity(schema.predicate(atom.predicate, atom.place), len(atom.args), atom.place)

@@ -7,9 +7,9 @@ they first come in.
 from __future__ import annotations
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.expression import Constant, Expression, Term, Variable, parts_of
-from knowledge_base.language.memory import IdentityCache
+from knowledge_base.language.identity_cache import IdentityCache
 from knowledge_base.language.sexpr import MAX_DEPTH
 
 _Node = Expression | Term | Effect
@@ -42,7 +42,7 @@ def _parts(node: _Node) -> tuple[_Node, ...]:
             return (effect,)
         case When(condition, effect):
             return (condition, effect)
-        case Assign(_, call, value):
+        case NumericEffect(_, call, value):
             return (call, value)
         case _:
             return parts_of(node)

@@ -59,7 +59,7 @@ class When(Located):
 
 
 @dataclass(frozen=True, slots=True)
-class Assign(Located):
+class NumericEffect(Located):
     """What a function is worth changes: `(increase (failures ?i) 1)`; `operator` is one of `ASSIGNMENTS`."""
 
     operator: str
@@ -67,7 +67,7 @@ class Assign(Located):
     value: Term
 
 
-Effect = Add | Delete | AllOf | ForEach | When | Assign
+Effect = Add | Delete | AllOf | ForEach | When | NumericEffect
 
 NO_EFFECT = AllOf(())
 """`(and)`, the effect that changes nothing."""
@@ -85,9 +85,9 @@ def substitute_effect(effect: Effect, bindings: Mapping[str, Value | Term]) -> E
         return ForEach(effect.variables, substitute_effect(effect.effect, unshadowed(effect.variables, bindings)))
     if isinstance(effect, When):
         return When(substitute(effect.condition, bindings), substitute_effect(effect.effect, bindings))
-    if isinstance(effect, Assign):
+    if isinstance(effect, NumericEffect):
         call = Call(effect.call.function, tuple(substitute_term(arg, bindings) for arg in effect.call.args))
-        return Assign(effect.operator, call, substitute_term(effect.value, bindings))
+        return NumericEffect(effect.operator, call, substitute_term(effect.value, bindings))
     atom = Atom(effect.atom.predicate, tuple(substitute_term(arg, bindings) for arg in effect.atom.args))
     return type(effect)(atom)
 
@@ -113,7 +113,7 @@ def mentioned(part: Expression | Term | Effect) -> frozenset[str]:
         return mentioned(part.effect) - {variable.name for variable in part.variables}
     if isinstance(part, When):
         return free_variables(part.condition) | mentioned(part.effect)
-    if isinstance(part, Assign):
+    if isinstance(part, NumericEffect):
         return free_variables(part.call) | free_variables(part.value)
     return free_variables(part)
 
@@ -129,9 +129,9 @@ def effect_parts(effect: Effect) -> Iterator[Effect]:
             yield from effect_parts(body)
 
 
-def effect_leaves(effect: Effect) -> Iterator[Add | Delete | Assign]:
+def effect_leaves(effect: Effect) -> Iterator[Add | Delete | NumericEffect]:
     """The changes an effect consists of."""
-    return (part for part in effect_parts(effect) if isinstance(part, Add | Delete | Assign))
+    return (part for part in effect_parts(effect) if isinstance(part, Add | Delete | NumericEffect))
 
 
 def effect_conditions(effect: Effect) -> Iterator[Expression]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from knowledge_base.language.application import apply_effect
-from knowledge_base.language.asking import evaluate_argument, evaluate_term, holds, query
+from knowledge_base.language.effect_application import apply_effect
+from knowledge_base.language.evaluator import evaluate_argument, evaluate_term, holds, query
 from knowledge_base.language.explanation import Explanation, explain
 from knowledge_base.language.world import World
 

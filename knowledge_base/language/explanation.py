@@ -10,11 +10,11 @@ from typing import Any
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
-from knowledge_base.language.application import choices
-from knowledge_base.language.asking import NO_BINDINGS, evaluate_term, holds, prepare
 from knowledge_base.language.binding import check_bound
 from knowledge_base.language.compiler import counterexamples, witnesses
 from knowledge_base.language.depth import check_depth
+from knowledge_base.language.effect_application import choices
+from knowledge_base.language.evaluator import NO_BINDINGS, evaluate_term, holds, prepare
 from knowledge_base.language.expression import (
     And,
     Arithmetic,

@@ -31,19 +31,19 @@ from knowledge_base.language.vocabulary import Vocabulary
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class TypeRange:
     """The condition that a variable is a thing of one of its types."""
 
     variable: TypedVariable
 
 
-Conjunct = Expression | Range
+Conjunct = Expression | TypeRange
 
 _MOST_COMPARED = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class JoinStep:
     """One look-up, with the variables that it tests or finds values for."""
 
     conjunct: Conjunct
@@ -68,7 +68,7 @@ class Step:
                 open_args = sum(isinstance(a, Variable) and a.name not in bound for a in args)
                 found = 3 if open_args < len(args) else 4
                 return (found if unbound else 0, open_args, -len(args))
-            case Range():
+            case TypeRange():
                 return (5 if unbound else 1, unbound, 0)
             case Comparison():
                 return (1, 0, 0)
@@ -89,7 +89,7 @@ def as_range(conjunct: Conjunct, schema: Vocabulary) -> Conjunct:
     """A type's atom about a variable ranges over the things of that type."""
     match conjunct:
         case Atom(name, (Variable(variable),)) if schema.is_type(name, 1):
-            return Range(TypedVariable(variable, (name,), place=conjunct.place))
+            return TypeRange(TypedVariable(variable, (name,), place=conjunct.place))
         case _:
             return conjunct
 
@@ -107,19 +107,19 @@ def opposite(e: Expression) -> Expression:
             return Not(e, place=e.place)
 
 
-def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabulary) -> list[Step]:
+def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabulary) -> list[JoinStep]:
     """The look-ups in a good order when the variables `bound` have values and no numbers of facts are known.
 
     Raises:
         InputError: a variable is only tested and nothing finds values for it.
     """
-    steps = [Step(c, _free(c), schema) for c in conditions]
+    steps = [JoinStep(c, _free(c), schema) for c in conditions]
     known = set(bound)
     users: dict[str, list[int]] = {}
     for i, step in enumerate(steps):
         for name in step.free - known:
             users.setdefault(name, []).append(i)
-    taken: dict[int, Step] = {}
+    taken: dict[int, JoinStep] = {}
     agenda = [(s.cost(known), i) for i, s in enumerate(steps) if s.is_ready(known)]
     heapify(agenda)
     while agenda:
@@ -137,7 +137,7 @@ def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabul
     return list(taken.values())
 
 
-def candidates(steps: Mapping[int, Step], bound: frozenset[str]) -> list[tuple[int, Step]]:
+def candidates(steps: Mapping[int, JoinStep], bound: frozenset[str]) -> list[tuple[int, JoinStep]]:
     """The look-ups that may come next, of `steps` in the order of `order`: atoms, or else a single other.
 
     Only a few, because they are compared by number of matches each time.
@@ -148,17 +148,17 @@ def candidates(steps: Mapping[int, Step], bound: frozenset[str]) -> list[tuple[i
 
 
 def _free(conjunct: Conjunct) -> frozenset[str]:
-    if isinstance(conjunct, Range):
+    if isinstance(conjunct, TypeRange):
         return frozenset((conjunct.variable.name,))
     return free_variables(conjunct)
 
 
 def _finds(conjunct: Conjunct, bound: frozenset[str], schema: Vocabulary) -> frozenset[str]:
-    return _free(conjunct) if isinstance(conjunct, Range) else found_variables(conjunct, schema, bound)
+    return _free(conjunct) if isinstance(conjunct, TypeRange) else found_variables(conjunct, schema, bound)
 
 
-def _unfound(pending: list[Step], bound: AbstractSet[str]) -> InputError:
-    stuck = [s.conjunct for s in pending if not isinstance(s.conjunct, Range)]
+def _unfound(pending: list[JoinStep], bound: AbstractSet[str]) -> InputError:
+    stuck = [s.conjunct for s in pending if not isinstance(s.conjunct, TypeRange)]
     names = sorted(frozenset().union(*map(free_variables, stuck)) - bound)
     place = next((p for e in stuck if (p := variable_place(e, names[0])) is not None), None)
     return InputError(f"nothing finds values for '?{names[0]}', which is only tested", place=place)

@@ -16,10 +16,10 @@ from knowledge_base.language.effect import (
     EFFECT_KEYWORDS,
     Add,
     AllOf,
-    Assign,
     Delete,
     Effect,
     ForEach,
+    NumericEffect,
     When,
 )
 from knowledge_base.language.expression import (
@@ -158,7 +158,7 @@ def _keyword_effect(head: str, args: Sequence[Node], group: Group) -> Effect:
         condition, effect = _take(args, 2, group, "(when CONDITION EFFECT)")
         return When(parse_condition(condition), parse_effect(effect), place=place)
     fluent, value = _take(args, 2, group, f"({head} (FUNCTION ...) NUMBER)")
-    return Assign(head, _fluent(fluent), parse_term(value), place=place)
+    return NumericEffect(head, _fluent(fluent), parse_term(value), place=place)
 
 
 def _fluent(node: Node) -> Call:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.expression import (
     And,
     Arithmetic,
@@ -24,7 +24,7 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.spelling import value_text
 
-_Form = Call | Arithmetic | Atom | And | Or | Not | Imply | Comparison | AllOf | Delete | When | Assign
+_Form = Call | Arithmetic | Atom | And | Or | Not | Imply | Comparison | AllOf | Delete | When | NumericEffect
 
 
 def to_text(node: Expression | Term | Effect) -> str:
@@ -74,6 +74,6 @@ def _form(node: _Form) -> tuple[str, Sequence[Expression | Term | Effect]]:
             form = "imply", (premise, conclusion)
         case When(condition, effect):
             form = "when", (condition, effect)
-        case Comparison(operator, left, right) | Assign(operator, left, right):
+        case Comparison(operator, left, right) | NumericEffect(operator, left, right):
             form = operator, (left, right)
     return form

@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from knowledge_base.facts import Value
-from knowledge_base.language.asking import NO_BINDINGS
 from knowledge_base.language.binding import check_answers
 from knowledge_base.language.compiler import SearchPlan, Stage
 from knowledge_base.language.depth import check_depth
+from knowledge_base.language.evaluator import NO_BINDINGS
 from knowledge_base.language.expression import (
     Atom,
     Exists,
@@ -23,7 +23,7 @@ from knowledge_base.language.expression import (
     substitute_term,
     variables_in_order,
 )
-from knowledge_base.language.joins import Conjunct, Range, Step, conjuncts
+from knowledge_base.language.joins import Conjunct, JoinStep, TypeRange, conjuncts
 from knowledge_base.language.lookups import Lookup, Search, smallest
 from knowledge_base.language.printer import to_text
 from knowledge_base.language.terms import Bindings
@@ -140,13 +140,13 @@ class _Follower:
             while self._candidate is not None and not stage.test(self._world, self._candidate):
                 self._candidate = next(found, None)
 
-    def _lookup(self, step: Step, bound: frozenset[str], lookup: Lookup | Search) -> QueryStep:
+    def _lookup(self, step: JoinStep, bound: frozenset[str], lookup: Lookup | Search) -> QueryStep:
         match step.conjunct:
             case Atom(_, args):
                 unknown = step.free - bound
                 by = tuple(self._text(arg) for arg in args if free_variables(arg).isdisjoint(unknown))
                 return self._step("look up" if by else "scan", step.conjunct, bound, by, self._matches(lookup))
-            case Range(variable):
+            case TypeRange(variable):
                 things = {thing for t in variable.types or ("object",) for thing in self._world.objects(t)}
                 return self._step("things", step.conjunct, bound, matches=len(things))
             case Exists():
@@ -178,7 +178,7 @@ class _Follower:
 
 
 def _expression(conjunct: Conjunct) -> Expression:
-    if not isinstance(conjunct, Range):
+    if not isinstance(conjunct, TypeRange):
         return conjunct
     variable = conjunct.variable
     kinds = tuple(Atom(t, (Variable(variable.name),)) for t in variable.types or ("object",))

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from knowledge_base.errors import ParseError, Place, SchemaError
+from knowledge_base.language.durative import Duration, DurativeParts
 from knowledge_base.language.effect import NO_EFFECT, Effect
 from knowledge_base.language.expression import TRUE, Expression, TypedVariable
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_variables
 from knowledge_base.language.printer import to_text, variables_text
 from knowledge_base.language.sexpr import Group, Node, Word
-from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.pddl.beyond import ACTION_PARTS, refuse_forms, refused
 from knowledge_base.pddl.durative_text import read_duration, read_timed
 from knowledge_base.pddl.sections import word
@@ -32,7 +32,7 @@ class ActionText:
     """A planning action as written; what is left out is `()`, true, or no effect.
 
     A durative action has a `duration` and what is `timed` about it; its precondition and effect are what these
-    amount to when nothing else happens meanwhile (see `Timed`).
+    amount to when nothing else happens meanwhile (see `DurativeParts`).
     """
 
     name: str
@@ -41,7 +41,7 @@ class ActionText:
     effect: Effect
     place: Place | None = field(compare=False)
     duration: Duration | None = None
-    timed: Timed | None = None
+    timed: DurativeParts | None = None
 
 
 def read_actions(sections: Iterable[tuple[str, Group]]) -> tuple[ActionText, ...]:
@@ -86,7 +86,7 @@ def _written(action: ActionText) -> Iterator[str]:
     duration, timed = action.duration, action.timed
     yield "none" if duration is None else f"from {to_text(duration.least)} to {to_text(duration.most)}"
     if timed is None:
-        timed = Timed(start=action.precondition, end_effect=action.effect)
+        timed = DurativeParts(start=action.precondition, end_effect=action.effect)
     yield from map(to_text, (timed.start, timed.over_all, timed.end, timed.start_effect, timed.end_effect))
 
 
@@ -128,9 +128,7 @@ def _action_parts(keyword: str, nodes: Sequence[Node], name: Word) -> dict[str, 
             raise refused(ACTION_PARTS[part], part, key.place)
         if part not in _PARTS[keyword]:
             what = "a durative action" if keyword == DURATIVE_ACTION else "an action"
-            raise ParseError(
-                f"{what} has no part '{key.text}'", place=key.place, found=key.text, valid=_PARTS[keyword]
-            )
+            raise ParseError(f"{what} has no part '{key.text}'", place=key.place, found=key.text, valid=_PARTS[keyword])
         if part in parts:
             raise ParseError(f"a second '{part}' of the action '{name.text}'", place=key.place)
         if position + 1 == len(nodes):

@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import TypeVar
 
 from knowledge_base.errors import ParseError
-from knowledge_base.language.effect import AllOf, Assign, Effect, ForEach, When
+from knowledge_base.language.durative import Duration, DurativeParts
+from knowledge_base.language.effect import AllOf, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.expression import (
     And,
     Arithmetic,
@@ -21,7 +22,6 @@ from knowledge_base.language.expression import (
 )
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term, parse_variables
 from knowledge_base.language.sexpr import Group, Node, Word
-from knowledge_base.language.timed import Duration, Timed
 from knowledge_base.pddl.beyond import ACROSS_TIMES, CHOSEN_DURATION, DURATION_AT_END, refused
 
 _DURATION = Variable("duration")
@@ -46,7 +46,7 @@ def read_duration(node: Node) -> Duration:
     return Duration(least, most)
 
 
-def read_timed(condition: Node | None, effect: Node | None, duration: Duration) -> Timed:
+def read_timed(condition: Node | None, effect: Node | None, duration: Duration) -> DurativeParts:
     """A durative action's condition and effect, by time.
 
     Raises:
@@ -60,7 +60,7 @@ def read_timed(condition: Node | None, effect: Node | None, duration: Duration) 
     if effect is not None:
         _effect(effect, done, lambda e: e)
     timed = {when: _all(AllOf, [_with_duration(e, duration) for e in parts]) for when, parts in done.items()}
-    return Timed(
+    return DurativeParts(
         start=_all(And, needed[_START]),
         over_all=_all(And, needed[_OVER_ALL]),
         end=_all(And, needed[_END]),
@@ -103,7 +103,7 @@ def _condition(node: Node, found: _ByTime[Expression], scope: Callable[[Expressi
         case "forall", 3:
             variables = parse_variables(group.items[1])
             _condition(group.items[2], found, lambda e: scope(Forall(variables, e, place=group.place)))
-        case ("at" | "over"), 3 if (when := _time(group)) in found:
+        case (("at" | "over"), 3) if (when := _time(group)) in found:
             found[when].append(scope(parse_condition(group.items[2])))
         case _:
             raise ParseError(
@@ -168,7 +168,7 @@ def _with_duration(effect: Effect, duration: Duration) -> Effect:
             return replace(effect, parts=tuple(_with_duration(part, duration) for part in parts))
         case ForEach(_, inner) | When(_, inner):
             return replace(effect, effect=_with_duration(inner, duration))
-        case Assign(_, _, value) if _DURATION.name in free_variables(value):
+        case NumericEffect(_, _, value) if _DURATION.name in free_variables(value):
             if not duration.fixed:
                 raise refused(CHOSEN_DURATION, "?duration", effect.place)
             return replace(effect, value=_term_with_duration(value, duration))

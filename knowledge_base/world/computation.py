@@ -88,9 +88,7 @@ class Computed(Generic[_Inputs]):
         return truth
 
 
-def computed(
-    declaration: str, *, reads: Sequence[str] = ()
-) -> Callable[[Callable[_Inputs, bool]], Computed[_Inputs]]:
+def computed(declaration: str, *, reads: Sequence[str] = ()) -> Callable[[Callable[_Inputs, bool]], Computed[_Inputs]]:
     """Make a function a predicate; `Schema.with_computed` makes it known.
 
     The function depends on its inputs alone: what else it looks at is not noticed when it changes.

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.language.vocabulary import Vocabulary
 from knowledge_base.language.world import World
-from knowledge_base.world.admission import check_delta
-from knowledge_base.world.functional import rivals
+from knowledge_base.world.change_checks import check_delta, rivals
 from knowledge_base.world.index import FactIndex
 
 

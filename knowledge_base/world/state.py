@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterable, Mapping
 
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.world.index import FactIndex
+from knowledge_base.world.read_write_lock import Stamp
 from knowledge_base.world.schema import Schema
-from knowledge_base.world.turn import Stamp
 
 
 class WorldState:

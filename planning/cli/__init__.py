@@ -5,6 +5,6 @@ The commands import what they run, so that `dsc --help` stays light.
 
 from __future__ import annotations
 
-from planning.cli.bundles import bundles_command as bundles_command
-from planning.cli.doctor import doctor_command as doctor_command
-from planning.cli.plan import plan_command as plan_command
+from planning.cli.commands import bundles_command as bundles_command
+from planning.cli.commands import doctor_command as doctor_command
+from planning.cli.commands import plan_command as plan_command

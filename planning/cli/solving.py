@@ -30,7 +30,7 @@ def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, Knowledg
     from knowledge_base.errors import InputError, Place
     from knowledge_base.exchange.pddl import read_problem
     from knowledge_base.store import KnowledgeBase
-    from planning.cli.notes import without_derived
+    from planning.cli.plan_report import without_derived
     from planning.domain import PlanningDomain
 
     if len(files) < 2:
@@ -51,24 +51,24 @@ def solved(
     """The problem and what comes of it; the time is for both together.
 
     Raises:
-        OutOfPatienceError: it was not even posed in time.
+        WorkLimitError: it was not even posed in time.
     """
     import asyncio
 
+    from planning.cancellable_work import WorkLimit, aside
     from planning.engines.registry import chosen, timing
-    from planning.patience import Patience, aside
     from planning.plan import TimedOut
-    from planning.posing.axioms import Derivable
-    from planning.posing.problem import pose
+    from planning.problem.axioms import Derivable
+    from planning.problem.construction import build_problem
 
-    patience = Patience(seconds)
+    patience = WorkLimit(seconds)
     durations = bool(timing()) or engine is not None
 
     def posed() -> Problem:
         form = Derivable.of(domain)
         if form is not None:
-            return form.pose(world, read.goal, read.metric, durations=durations, patience=patience)
-        return pose(domain, world, read.goal, read.metric, durations=durations, patience=patience)
+            return form.build_problem(world, read.goal, read.metric, durations=durations, patience=patience)
+        return build_problem(domain, world, read.goal, read.metric, durations=durations, patience=patience)
 
     async def solve() -> tuple[Problem, PlanningOutcome]:
         with _progress("grounding the problem"):
@@ -89,11 +89,11 @@ def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, se
     """Why there is no plan, one sentence a line, or that this was not found out in time."""
     import asyncio
 
-    from planning.patience import OutOfPatienceError, Patience, aside
-    from planning.posing.axioms import Derivable
-    from planning.posing.unsolvable import why_unsolvable
+    from planning.cancellable_work import WorkLimit, WorkLimitError, aside
+    from planning.problem.axioms import Derivable
+    from planning.problem.unsolvability import why_unsolvable
 
-    patience = Patience(seconds)
+    patience = WorkLimit(seconds)
 
     def why() -> tuple[str, ...]:
         form = Derivable.of(domain)
@@ -101,7 +101,7 @@ def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, se
 
     try:
         return list(asyncio.run(aside(why, patience)))
-    except OutOfPatienceError:
+    except WorkLimitError:
         return [f"what is missing was not found out within {seconds:g} s"]
 
 

@@ -104,9 +104,7 @@ def sas(request: Request) -> str:
     number, init, goal, actions = len(request["facts"]), set(request["init"]), request["goal"], request["actions"]
     prices = {cost: Fraction(cost).limit_denominator(_FINEST_COST) for cost in {action[4] for action in actions}}
     unit = lcm(*(price.denominator for price in prices.values()))
-    variables = [
-        f"begin_variable\nvar{n}\n-1\n2\nNegatedAtom f{n}()\nAtom f{n}()\nend_variable" for n in range(number)
-    ]
+    variables = [f"begin_variable\nvar{n}\n-1\n2\nNegatedAtom f{n}()\nAtom f{n}()\nend_variable" for n in range(number)]
     lines = ["begin_version", "3", "end_version", "begin_metric", "1", "end_metric", str(number), *variables]
     lines += ["0", "begin_state", *("1" if n in init else "0" for n in range(number)), "end_state"]
     lines += ["begin_goal", str(len(goal)), *(f"{n} 1" for n in goal), "end_goal", str(len(actions))]

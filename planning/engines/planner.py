@@ -1,8 +1,4 @@
-"""Asking an engine for a plan without ever waiting longer than allowed.
-
-The event loop may run in simulated time, so nothing here uses its timers: a thread waits for the engine in
-real time and wakes the loop, while `clock_hold` keeps the simulated clock where it is.
-"""
+"""Planner asks one engine for a plan and never waits longer than allowed."""
 
 from __future__ import annotations
 
@@ -13,19 +9,33 @@ import threading
 import time
 from contextlib import AbstractContextManager, aclosing, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from planning.elimination import indispensable
+from planning.action_elimination import indispensable
+from planning.cancellable_work import aside
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import can_time, cannot, in_concert, nobody
 from planning.engines.request import written
-from planning.patience import aside
 from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable, Sequence
 
+    from planning.plan import PlanningOutcome
     from planning.strips import Problem
+
+
+@runtime_checkable
+class Improving(Protocol):
+    """What a `Planner` can offer besides `solve`; asked for in real time only, since no two such runs are the same."""
+
+    def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+        """First what `solve` says, then each better plan that is found within the `seconds` of real time.
+
+        It is closed when no better plan is of use any more, which ends the search.
+        """
+        ...
+
 
 ENGINE = "pyperplan"
 """The embedded engine: always there, and always the same plan for the same problem."""
@@ -250,9 +260,7 @@ def _times(timed: Any) -> list[tuple[int, float, float]]:
     return times
 
 
-async def _answers(
-    process: EngineProcess, request: bytes, seconds: float
-) -> AsyncGenerator[dict[str, Any], None]:
+async def _answers(process: EngineProcess, request: bytes, seconds: float) -> AsyncGenerator[dict[str, Any], None]:
     """What the process answers, as it comes; closing this ends the search.
 
     Raises:

@@ -17,10 +17,10 @@ from itertools import chain
 from typing import Any
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.memory import IdentityCache
+from knowledge_base.language.identity_cache import IdentityCache
 from planning.plan import PlanStep
-from planning.quantities import Assignment, Bound, from_json, to_json
-from planning.strips import GroundAction, Problem, Span
+from planning.quantities import Assignment, NumericBound, from_json, to_json
+from planning.strips import ActionSpan, GroundAction, Problem
 
 _Row = tuple[str, tuple[Fact, ...]]
 """The text of an action with gaps, and the facts that belong there."""
@@ -52,7 +52,7 @@ def read(request: Mapping[str, Any]) -> Problem:
                 cost,
                 tuple(map(_bound_from_json, bounds)),
                 tuple(Assignment(_fluent(one), from_json(amount), more) for one, amount, more in assignments),
-                None if span is None else Span(span[0], span[1], *map(named, span[2:])),
+                None if span is None else ActionSpan(span[0], span[1], *map(named, span[2:])),
             )
             for step, pre, add, gone, cost, bounds, assignments, span in request["actions"]
         ),
@@ -111,12 +111,12 @@ def _text(part: Any) -> str:
     return json.dumps(part).replace("%", "%%")
 
 
-def _bound_to_json(bound: Bound) -> list[Any]:
+def _bound_to_json(bound: NumericBound) -> list[Any]:
     return [bound.operator, to_json(bound.left), to_json(bound.right)]
 
 
-def _bound_from_json(data: Sequence[Any]) -> Bound:
-    return Bound(data[0], from_json(data[1]), from_json(data[2]))
+def _bound_from_json(data: Sequence[Any]) -> NumericBound:
+    return NumericBound(data[0], from_json(data[1]), from_json(data[2]))
 
 
 def _fluent(data: Any) -> Fact:

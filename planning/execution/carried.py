@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.printer import to_text
-from planning.execution.course import Course
+from planning.execution.progress import PlanProgress
 from planning.execution.repair import Attempt
 from planning.execution.watched import Watched
 from planning.plan import PlanStep
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from knowledge_base.language.expression import Expression
     from planning.execution.improvements import Improvements
-    from planning.posing.derived import Settled
+    from planning.problem.derived import Settled
 
 _PLAIN = (
     "name", "holder", "seconds", "replans", "following_name", "following_kept", "stopped",
@@ -49,7 +49,7 @@ class Carried:
 
     name: str
     goal: Expression
-    course: Course
+    course: PlanProgress
     attempt: Attempt
     holder: str
     seconds: float
@@ -93,7 +93,7 @@ class Carried:
         goal = parse_condition(form["goal"])
         carried = cls(
             goal=goal,
-            course=Course.from_json(form["course"], now.domain, now.condition(goal)),
+            course=PlanProgress.from_json(form["course"], now.domain, now.condition(goal)),
             attempt=Attempt.from_json(form["attempt"]),
             following=None if form["following"] is None else tuple(map(PlanStep.from_json, form["following"])),
             told=set(form["told"]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from planning.generation.steps import implementing
+from planning.generation.carried_steps import implementing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -15,15 +15,15 @@ from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition
 from planning.execution.carried import Carried
 from planning.execution.choices import Choices
-from planning.execution.course import Course
-from planning.execution.ladder import Ladder
+from planning.execution.escalation import Escalation
+from planning.execution.plan_records import PlanRecords
 from planning.execution.plans import Plans
 from planning.execution.plotting import Plotting
+from planning.execution.progress import PlanProgress
 from planning.execution.repair import Attempt
 from planning.execution.search import NotFound, Search
-from planning.execution.telling import Telling
 from planning.execution.watching import Watching
-from planning.posing.derived import derivation
+from planning.problem.derived import derivation
 
 if TYPE_CHECKING:
     from dsc.dynamic.library import Library
@@ -79,12 +79,12 @@ class PlanningComponent(Component):
         self._knowledge = knowledge
         self._clock = clock
         self._working_for = working_for
-        self._telling = Telling(trace)
+        self._telling = PlanRecords(trace)
         self._search = Search(domain, knowledge, planner, clock, self._telling, foresight)
         self._plans = Plans()
         self._plotting = Plotting(self._derivation, library, knowledge, parallel, {self.name, *shared})
         self._choices = Choices(self._derivation.domain, library)
-        self._ladder = Ladder(
+        self._ladder = Escalation(
             self._derivation, self._plotting, self._plans, self._choices, self._search, self._telling
         )
         self._answers: dict[str, Outcome] = {}  # by action; of some it is not known yet whether they were heard
@@ -246,7 +246,7 @@ class PlanningComponent(Component):
             now = self._derivation.at(self._knowledge)
             known = found.order if found.version == self._knowledge.version else None
             order = self._plotting.order(found.answer.plan, wanted, known)
-            course = Course(found.steps, now.domain, now.condition(wanted), order.before)
+            course = PlanProgress(found.steps, now.domain, now.condition(wanted), order.before)
             attempt = Attempt() if before is None else before.attempt
             carried = Carried(self._plans.new_name(), wanted, course, attempt, holder, seconds, replans, found.better)
             form = self._plotting.form(carried, order)

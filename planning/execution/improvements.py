@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Self
 
 from knowledge_base.errors import described
-from planning.execution import bounds
+from planning.execution import planner_deadline
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator
@@ -30,13 +30,13 @@ class Improvements:
         return self
 
     async def __anext__(self) -> PlanningOutcome:
-        return await bounds.bounded(anext(self._better), math.inf, self._name)
+        return await planner_deadline.bounded(anext(self._better), math.inf, self._name)
 
     async def aclose(self) -> None:
         """No better plan is of use any more."""
         try:
-            await bounds.bounded(self._better.aclose(), bounds.STOPPING, self._name)
-        except bounds.LateError:  # it has been blamed if it did not obey
+            await planner_deadline.bounded(self._better.aclose(), planner_deadline.STOPPING, self._name)
+        except planner_deadline.LateError:  # it has been blamed if it did not obey
             return
         except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
-            bounds.blame(self._name, f"it cannot be closed: {described(error)}")
+            planner_deadline.blame(self._name, f"it cannot be closed: {described(error)}")

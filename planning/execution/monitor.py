@@ -18,9 +18,9 @@ from knowledge_base.language.expression import Atom, Expression
 from knowledge_base.language.printer import to_text
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.execution.course import Course, shortest_end, thinned
+from planning.execution.progress import PlanProgress, shortest_end, thinned
 from planning.execution.regression import conjuncts
-from planning.generation.steps import expectation
+from planning.generation.carried_steps import expectation
 from planning.plan import Plan, PlanStep
 from planning.validation import validate
 
@@ -52,13 +52,13 @@ class Shorter:
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
+class GoalReached:
     """The goal holds, and steps are left."""
 
     author: str
 
 
-News = Broken | Shorter | Reached
+News = Broken | Shorter | GoalReached
 
 
 def news_form(news: News) -> dict[str, Any]:
@@ -68,7 +68,7 @@ def news_form(news: News) -> dict[str, Any]:
             return {"broken": asdict(news)}
         case Shorter(steps):
             return {"shorter": [step.to_json() for step in steps]}
-        case Reached(author):
+        case GoalReached(author):
             return {"reached": author}
 
 
@@ -77,7 +77,7 @@ def news_from(form: Mapping[str, Any]) -> News:
     ((kind, said),) = form.items()
     if kind == "broken":
         return Broken(**said)
-    return Reached(said) if kind == "reached" else Shorter(tuple(map(PlanStep.from_json, said)))
+    return GoalReached(said) if kind == "reached" else Shorter(tuple(map(PlanStep.from_json, said)))
 
 
 class Monitor:
@@ -92,7 +92,7 @@ class Monitor:
 
     def __init__(
         self,
-        course: Course,
+        course: PlanProgress,
         domain: PlanningDomain,
         knowledge: KnowledgeBase,
         is_own: Callable[[str], bool],
@@ -113,7 +113,7 @@ class Monitor:
         self.watch()
         course, world = self._course, self._knowledge
         if _true(course.goal, world):
-            self._hear(Reached(author))
+            self._hear(GoalReached(author))
         elif len(course.at_work) > 1:  # nobody is interrupted for the sake of a shorter plan
             if not course.stands(world):
                 self._hear(self._broken(author, world.version))
@@ -179,7 +179,7 @@ class Monitor:
     def _goal_fired(self, _: Expression, firing: Firing) -> None:
         author = self._foreign(firing) if firing.truth else None
         if author is not None:
-            self._hear(Reached(author))
+            self._hear(GoalReached(author))
 
     def _came(self, _: Expression, firing: Firing) -> None:
         if firing.truth and self._foreign(firing) is not None:

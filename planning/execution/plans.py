@@ -10,7 +10,7 @@ from planning.execution.carried import Carried
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from planning.posing.derived import Settled
+    from planning.problem.derived import Settled
 
 MOST_UNWATCHED = 64
 """Plans that nobody watches are kept, since new ones may have to take their places; but of those that were left for

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from planning.generation.plot import laid_out, plot_of
-from planning.ordering.order import PartialOrder, deordered, in_sequence
+from planning.generation.plan_to_plot import laid_out, plot_of
+from planning.ordering.partial_order import PartialOrder, deordered, in_sequence
 from planning.ordering.timed_links import linked
 from planning.plan import Plan
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from knowledge_base.language.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from planning.execution.carried import Carried
-    from planning.posing.derived import Derivation
+    from planning.problem.derived import Derivation
 
 
 @dataclass(frozen=True, slots=True)

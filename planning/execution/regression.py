@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from knowledge_base.language.effect import Add, AllOf, Assign, Delete, Effect, ForEach, When
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.expression import (
     TRUE,
     And,
@@ -46,7 +46,7 @@ class Leaf:
 
     variables: tuple[TypedVariable, ...]
     condition: Expression
-    change: Add | Delete | Assign
+    change: Add | Delete | NumericEffect
 
 
 def leaves(effect: Effect) -> tuple[Leaf, ...]:
@@ -124,7 +124,7 @@ def _atom(atom: Atom, changes: Sequence[Leaf]) -> Expression:
     added: list[Expression] = []
     deleted: list[Expression] = []
     for leaf in changes:
-        if not isinstance(leaf.change, Assign) and leaf.change.atom.predicate == atom.predicate:
+        if not isinstance(leaf.change, NumericEffect) and leaf.change.atom.predicate == atom.predicate:
             hit = _hit(leaf, leaf.change.atom.args, atom.args)
             (added if isinstance(leaf.change, Add) else deleted).append(hit)
     if not added and not deleted:
@@ -169,7 +169,7 @@ def _values(term: Term, changes: Sequence[Leaf]) -> list[tuple[Expression, Term]
         case Call(function, args):
             cases: list[tuple[Expression, Term]] = [(TRUE, term)]
             for leaf in changes:
-                if isinstance(leaf.change, Assign) and leaf.change.call.function == function:
+                if isinstance(leaf.change, NumericEffect) and leaf.change.call.function == function:
                     cases = [new for case in cases for new in _assigned(case, leaf, leaf.change, args)]
             return cases
         case Arithmetic(_, args):
@@ -186,7 +186,7 @@ def _values(term: Term, changes: Sequence[Leaf]) -> list[tuple[Expression, Term]
 
 
 def _assigned(
-    case: tuple[Expression, Term], leaf: Leaf, change: Assign, args: tuple[Term, ...]
+    case: tuple[Expression, Term], leaf: Leaf, change: NumericEffect, args: tuple[Term, ...]
 ) -> Iterator[tuple[Expression, Term]]:
     before, value = case
     if free_variables(change.value) & {v.name for v in leaf.variables}:

@@ -15,11 +15,11 @@ from typing import Any
 
 from knowledge_base.language.effect import effect_conditions
 from knowledge_base.language.expression import Expression
-from knowledge_base.language.memory import IdentityCache
+from knowledge_base.language.identity_cache import IdentityCache
 from knowledge_base.view import View
 from planning.domain import PlanningDomain
 from planning.plan import PlanStep
-from planning.posing.relevance import names_of, relevant
+from planning.problem.relevance import names_of, relevant
 from planning.strips import Problem
 
 MOST_RESUMED = 3
@@ -29,7 +29,7 @@ EXCLUDED_SECONDS = 120.0
 """Seconds of run time for which new plans do without a step that failed again and again."""
 
 
-class Rung(Enum):
+class EscalationStep(Enum):
     """What is tried, in this order."""
 
     RESUME = "the same plan goes on"
@@ -83,7 +83,7 @@ class Attempt:
         resumed = {PlanStep.from_json(step): often for step, often in form["resumed"]}
         return cls(form["replans"], Counter(failures), Counter(resumed))
 
-    def failed(self, failure: Failure, *, stands: bool, others: bool) -> Rung:
+    def failed(self, failure: Failure, *, stands: bool, others: bool) -> EscalationStep:
         """The answer to a failure, which is counted.
 
         Args:
@@ -93,15 +93,21 @@ class Attempt:
         """
         self.failures[failure] += 1
         if stands and self.resumed[failure.step] < MOST_RESUMED:
-            rungs = [Rung.RESUME, *([Rung.OTHER_CANDIDATE] if others else []), Rung.EXCLUDE]
+            rungs = [
+                EscalationStep.RESUME,
+                *([EscalationStep.OTHER_CANDIDATE] if others else []),
+                EscalationStep.EXCLUDE,
+            ]
         else:
-            rungs = [Rung.REPLAN, Rung.EXCLUDE]
+            rungs = [EscalationStep.REPLAN, EscalationStep.EXCLUDE]
         tried = self.failures[failure] - 1
-        return rungs[tried] if tried < len(rungs) else Rung.GIVE_UP
+        return rungs[tried] if tried < len(rungs) else EscalationStep.GIVE_UP
 
-    def interrupted(self, step: PlanStep | None) -> Rung:
+    def interrupted(self, step: PlanStep | None) -> EscalationStep:
         """The answer when the plan was stopped from outside; `step` is where it could go on."""
-        return Rung.RESUME if step is not None and self.resumed[step] < MOST_RESUMED else Rung.REPLAN
+        return (
+            EscalationStep.RESUME if step is not None and self.resumed[step] < MOST_RESUMED else EscalationStep.REPLAN
+        )
 
 
 def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:

@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import InputError
+from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.engines.registry import timing
-from planning.execution.asking import Answer, Asking
-from planning.execution.mending import mending
+from planning.execution.local_repair import mending
+from planning.execution.planner_call import Answer, Asking
 from planning.execution.repair import EXCLUDED_SECONDS, without
-from planning.ordering.order import deordered
-from planning.patience import OutOfPatienceError, Patience, aside
+from planning.ordering.partial_order import deordered
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
-from planning.posing.constructs import why_no_engine
-from planning.posing.problem import pose
-from planning.posing.unsolvable import why_unsolvable
+from planning.problem.construction import build_problem
+from planning.problem.constructs import why_no_engine
+from planning.problem.unsolvability import why_unsolvable
 from planning.validation import Validation, validate
 
 if TYPE_CHECKING:
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from knowledge_base.world.state import WorldState
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
-    from planning.execution.course import Course
     from planning.execution.foresight import Foresight
     from planning.execution.improvements import Improvements
-    from planning.execution.telling import Telling
-    from planning.ordering.order import PartialOrder
+    from planning.execution.plan_records import PlanRecords
+    from planning.execution.progress import PlanProgress
+    from planning.ordering.partial_order import PartialOrder
     from planning.strips import Problem
 
 MAX_ATTEMPTS = 3
@@ -99,7 +99,7 @@ class Search:
         knowledge: KnowledgeBase,
         planner: Planner,
         clock: LoopClock,
-        telling: Telling,
+        telling: PlanRecords,
         foresight: Foresight | None = None,
     ) -> None:
         self._domain = domain
@@ -124,7 +124,7 @@ class Search:
         self._excluded = {PlanStep.from_json(step): until for step, until in memory}
 
     async def plan(
-        self, goal: Expression, seconds: float, before: Course | None, sleep: Callable[[float], Awaitable[None]]
+        self, goal: Expression, seconds: float, before: PlanProgress | None, sleep: Callable[[float], Awaitable[None]]
     ) -> Found | NotFound:
         """A plan for the goal from the world as it is when it is found.
 
@@ -189,18 +189,18 @@ class Search:
         self,
         goal: Expression,
         seconds: float,
-        before: Course | None,
+        before: PlanProgress | None,
         rejected: dict[PlanStep, str],
         snapshot: WorldState,
     ) -> Found | NotFound:
         """One plan for the world as it was."""
-        budget = Patience(seconds)
+        budget = WorkLimit(seconds)
         mended = None if before is None else await self._mended(goal, seconds / 2, before, snapshot)
         if isinstance(mended, Found):
             return mended
         try:
-            problem = await self._posed(goal, snapshot, Patience(budget.left))
-        except OutOfPatienceError as error:
+            problem = await self._posed(goal, snapshot, WorkLimit(budget.left))
+        except WorkLimitError as error:
             return NotFound("timed_out", f"no plan within {seconds:g} s (while {error.doing})")
         answer, better = await self._answer(problem, budget.left, rejected)
         if isinstance(answer, PlanFound):
@@ -211,25 +211,25 @@ class Search:
         if rejected:
             reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
-        missing = await self._why_not(goal, snapshot, Patience(budget.left))
+        missing = await self._why_not(goal, snapshot, WorkLimit(budget.left))
         return NotFound("unsolvable", "; ".join(missing) or answer.reason)
 
-    async def _posed(self, goal: Expression, snapshot: WorldState, patience: Patience) -> Problem:
+    async def _posed(self, goal: Expression, snapshot: WorldState, patience: WorkLimit) -> Problem:
         durations = not self._clock.simulated and bool(timing())
         with self._clock.hold():  # grounding takes its time as well: in a thread, so that a stop is obeyed
             return await aside(
-                lambda: pose(self._domain, snapshot, goal, durations=durations, patience=patience), patience
+                lambda: build_problem(self._domain, snapshot, goal, durations=durations, patience=patience), patience
             )
 
-    async def _why_not(self, goal: Expression, snapshot: WorldState, patience: Patience) -> tuple[str, ...]:
+    async def _why_not(self, goal: Expression, snapshot: WorldState, patience: WorkLimit) -> tuple[str, ...]:
         """What is missing for the goal; nothing if that takes too long to find out."""
-        with self._clock.hold(), contextlib.suppress(OutOfPatienceError):
+        with self._clock.hold(), contextlib.suppress(WorkLimitError):
             return await aside(lambda: why_unsolvable(self._domain, snapshot, goal, patience), patience)
         return ()
 
     async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> Answer:
         """The planner's answer, without the excluded steps if there is a plan without them."""
-        excluded, patience = self._excluded_now(), Patience(seconds)
+        excluded, patience = self._excluded_now(), WorkLimit(seconds)
         answer, better = await self._asking.solve(without(problem, {*excluded, *rejected}), seconds)
         if isinstance(answer, ProvenUnsolvable) and excluded and not problem.unreachable:
             self._excluded.clear()
@@ -238,14 +238,14 @@ class Search:
         return answer, better
 
     async def _mended(
-        self, goal: Expression, seconds: float, before: Course, snapshot: WorldState
+        self, goal: Expression, seconds: float, before: PlanProgress, snapshot: WorldState
     ) -> Found | TimedOut | None:
         """What was left of the plan before, mended; `TimedOut` if a limit of real time cut in."""
-        excluded, patience = self._excluded_now(), Patience(seconds)
+        excluded, patience = self._excluded_now(), WorkLimit(seconds)
         try:
             with self._clock.hold():
                 how = await aside(lambda: mending(before, excluded, self._domain, snapshot, goal, patience), patience)
-        except OutOfPatienceError:
+        except WorkLimitError:
             return TimedOut("mending", seconds)
         if how is None:
             return None

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from planning.execution.monitor import Broken, News, Reached, Shorter, news_form, news_from
+from planning.execution.monitor import Broken, GoalReached, News, Shorter, news_form, news_from
 from planning.execution.search import Found, NotFound
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Watched:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; plans that were found are looked for again."""
-        heard = [_form(one) for one in self.heard if isinstance(one, Broken | Shorter | Reached | StepEnded)]
+        heard = [_form(one) for one in self.heard if isinstance(one, Broken | Shorter | GoalReached | StepEnded)]
         return {"heard": heard, "said_broken": self.said_broken, "searching_since": self.searching_since}
 
     @classmethod

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dsc.calls import Outcome
-from dsc.sequencer.taking_up import PastClock
+from dsc.sequencer.resumed_skills import PastClock
 from knowledge_base.errors import described
 from knowledge_base.language.printer import to_text
 from knowledge_base.world.overlay import Overlay
-from planning.execution.course import Course, cost_of, shortest_end
-from planning.execution.monitor import Broken, Monitor, News, Reached, Shorter
+from planning.execution.monitor import Broken, GoalReached, Monitor, News, Shorter
+from planning.execution.progress import PlanProgress, cost_of, shortest_end
 from planning.execution.search import Found, NotFound, Search
 from planning.execution.watched import Better, Heard, StepEnded, Watched
 from planning.plan import PlanFound
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
     from planning.execution.carried import Carried
     from planning.execution.improvements import Improvements
-    from planning.execution.telling import Telling
+    from planning.execution.plan_records import PlanRecords
     from planning.plan import Plan, PlanStep
-    from planning.posing.derived import Derivation, Settled
+    from planning.problem.derived import Derivation, Settled
 
 
 @dataclass(slots=True)
@@ -47,7 +47,7 @@ class Watching:
     derivation: Derivation
     knowledge: KnowledgeBase
     search: Search
-    telling: Telling
+    telling: PlanRecords
     clock: LoopClock
     new_name: Callable[[], str]
     is_own: Callable[[str], bool]
@@ -131,7 +131,7 @@ class _Watch:
         if isinstance(news, Found | NotFound):
             self._state.searching_since = None
         match news:
-            case Reached():
+            case GoalReached():
                 self._about.telling.skipped(carried.name, carried.course.left_steps, "the goal holds")
                 outcome = Outcome("goal_holds")
             case Shorter(steps):
@@ -255,7 +255,7 @@ class _Watch:
         carried.following = steps
         if carried.course.steps_of(carried.course.at_work) != steps[:1]:
             return False
-        carried.course = Course(steps, carried.course.domain, carried.course.goal)
+        carried.course = PlanProgress(steps, carried.course.domain, carried.course.goal)
         carried.course.begin(1)
         carried.superseded.set()
         self._state.said_broken = False

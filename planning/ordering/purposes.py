@@ -8,7 +8,7 @@ from knowledge_base.language.evaluation import World
 from knowledge_base.language.expression import Expression
 from knowledge_base.language.printer import to_text
 from planning.domain import PlanningDomain
-from planning.ordering.order import CausalLink, PartialOrder, deordered
+from planning.ordering.partial_order import CausalLink, PartialOrder, deordered
 from planning.ordering.timed_links import linked
 from planning.plan import Plan, PlanStep
 

@@ -18,11 +18,11 @@ from knowledge_base.language.expression import And, Expression, substitute
 from knowledge_base.language.printer import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.ordering.dependencies import Changes, Ground, Support, changes, conjuncts, favours, support
-from planning.ordering.order import PRESENT, CausalLink, PartialOrder, scheduled
+from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, scheduled
+from planning.ordering.step_dependencies import Changes, Ground, Support, changes, conjuncts, favours, support
 from planning.plan import Plan, PlanStep, Timing
-from planning.posing.conditions import Literal
-from planning.posing.derived import derivation
+from planning.problem.conditions import Literal
+from planning.problem.derived import derivation
 from planning.timeline import moment
 
 _NOTHING: Expression = And(())

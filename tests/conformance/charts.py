@@ -18,16 +18,16 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Revoke, SendLater, Step
+from dsc.errors import NotExpressibleError
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.model.states import State
-from dsc.text.scxml.errors import NotExpressibleError
-from dsc.text.scxml.reader import parse_scxml
-from dsc.text.scxml.writer import to_scxml
+from dsc.scxml.reader import parse_scxml
+from dsc.scxml.writer import to_scxml
 from dsc.validation import raise_findings, validate_plot
 from knowledge_base.errors import InputError
 from knowledge_base.store import KnowledgeBase
@@ -44,7 +44,9 @@ AGAINST_THE_STANDARD = {
 W3C = "w3c-ecma"
 LONGEST = 60.0
 """Seconds after which nothing comes any more: the longest delay of the W3C's charts is shorter."""
-OTHERWISE = "expects that a child of `parallel` can be left alone; SCXML's LCCA is never a `parallel` (appendix D, 3.13)"
+OTHERWISE = (
+    "expects that a child of `parallel` can be left alone; SCXML's LCCA is never a `parallel` (appendix D, 3.13)"
+)
 SCRIPT_AGAINST_THE_STANDARD = {"more-parallel/test10": OTHERWISE, "more-parallel/test10b": OTHERWISE}
 """Charts whose script contradicts the standard; their `legacySemantics` script, which does not, has to pass."""
 
@@ -55,7 +57,7 @@ class Result:
 
     Attributes:
         verdict: `passed`, `excluded` (because of the element, or of a mistake) or `failed`.
-        crosses: whether transitions cross borders, which profile `dsc` has to refuse.
+        crosses: whether transitions cross borders, which dialect `dsc` has to refuse.
     """
 
     name: str
@@ -181,7 +183,7 @@ def run(file: Path) -> Result:
         crosses = _crosses(plot)
         refused = any(one.rule == "no border crossing" for one in validate_plot(_strict(plot), player.library))
         if crosses != refused:
-            return Result(name, "failed", "", f"crosses borders: {crosses}; refused by profile dsc: {refused}")
+            return Result(name, "failed", "", f"crosses borders: {crosses}; refused by dialect dsc: {refused}")
         problem = play(player, plot.name, _script(file, standard=name not in SCRIPT_AGAINST_THE_STANDARD))
     except NotExpressibleError as error:
         return Result(name, "excluded", error.element, error.message.removeprefix(f"{error.element}: "))
@@ -207,7 +209,7 @@ def _crosses(plot: ActionPlot) -> bool:
 
 
 def _strict(plot: ActionPlot) -> ActionPlot:
-    return plot.model_copy(update={"profile": "dsc"})
+    return plot.model_copy(update={"dialect": "dsc"})
 
 
 def _script(file: Path, *, standard: bool) -> dict[str, Any]:
@@ -234,7 +236,7 @@ def play(player: Player, plot: str, script: dict[str, Any]) -> str:
 def table(results: list[Result]) -> str:
     """The published list of SCION's charts."""
     crossing = sum(one.crosses for one in results)
-    told = f"{crossing} of those that pass cross borders of composites, and profile dsc refuses each of them"
+    told = f"{crossing} of those that pass cross borders of composites, and dialect dsc refuses each of them"
     return f"Score: {score(results)}; {told}.\n\n{_rows(results)}"
 
 

@@ -33,7 +33,6 @@ from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.engines import registry
 from planning.engines.race import PlannerRace
-from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import (
     EngineFailed,
     NobodyCan,
@@ -44,8 +43,9 @@ from planning.plan import (
     ProvenUnsolvable,
     TimedOut,
 )
-from planning.posing.constructs import why_no_engine
-from planning.posing.problem import pose
+from planning.problem.construction import build_problem
+from planning.problem.constructs import why_no_engine
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 
 PAGE = Path(__file__).parents[2] / "docs" / "pddl.md"
 TEST_FOLDER = Path(unified_planning.test.__path__[0])
@@ -144,7 +144,9 @@ def tried(pair: Pair, seconds: float) -> Result:
     """What becomes of one pair of files."""
     try:
         domain, problem = read(pair)
-        posed = pose(domain, world_of(domain, problem), problem.goal, problem.metric, durations=bool(registry.timing()))
+        posed = build_problem(
+            domain, world_of(domain, problem), problem.goal, problem.metric, durations=bool(registry.timing())
+        )
     except InputError as error:
         verdicts = [verdict for kind, verdict in REFUSED.items() if isinstance(error, kind)]
         said = str(error).replace(f"{pair.problem.parent}/", "")
@@ -238,7 +240,9 @@ def table(results: list[Result]) -> str:
 def score(results: list[Result]) -> str:
     """How many of each outcome."""
     found = Counter(one.verdict for one in results)
-    return f"{len(results)} pairs of files: " + ", ".join(f"{count} {verdict}" for verdict, count in found.most_common())
+    return f"{len(results)} pairs of files: " + ", ".join(
+        f"{count} {verdict}" for verdict, count in found.most_common()
+    )
 
 
 def main() -> int:

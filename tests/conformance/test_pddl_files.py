@@ -63,23 +63,25 @@ def said(domain, problem):
     return {
         "things": {**domain.schema.constants, **problem.objects},
         "fluents": {**{n: a for n, a in predicates.items() if n not in derived}, **functions},
-        "actions": {
-            a.name: ([p.name for p in a.parameters], a.duration is not None) for a in domain.actions.values()
-        },
+        "actions": {a.name: ([p.name for p in a.parameters], a.duration is not None) for a in domain.actions.values()},
         "facts": {(f.predicate, f.args) for f in problem.init},
-        "numbers": {(f.predicate, f.args, float(number)) for f, number in problem.values.items() if f.predicate != COST},
+        "numbers": {
+            (f.predicate, f.args, float(number)) for f, number in problem.values.items() if f.predicate != COST
+        },
     }
 
 
 def said_by_peer(problem):
     values = problem.explicit_initial_values
-    atoms = [(f.fluent().name, tuple(str(a) for a in f.args), value) for f, value in values.items() if f.fluent().name != COST]
+    atoms = [
+        (f.fluent().name, tuple(str(a) for a in f.args), value)
+        for f, value in values.items()
+        if f.fluent().name != COST
+    ]
     return {
         "things": {o.name: o.type.name for o in problem.all_objects},
         "fluents": {fluent.name: fluent.arity for fluent in problem.fluents if fluent.name != COST},
-        "actions": {
-            a.name: ([p.name for p in a.parameters], hasattr(a, "duration")) for a in problem.actions
-        },
+        "actions": {a.name: ([p.name for p in a.parameters], hasattr(a, "duration")) for a in problem.actions},
         "facts": {(name, args) for name, args, value in atoms if value.is_true()},
         "numbers": {
             (name, args, float(value.constant_value())) for name, args, value in atoms if not value.is_bool_constant()

@@ -7,25 +7,25 @@ from typing import TYPE_CHECKING
 import pytest
 
 from domains.clean_up_table.items import new_item
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-def make_world(seed: int, faults: float = 1.0) -> World:
+def make_world(seed: int, faults: float = 1.0) -> TableWorld:
     names = ["cup1", "cup2", "cup3", "can1", "can2"]
     items = [new_item(name[:3], name) for name in names]
-    return World([*items, new_item("crisp-can", "crisp_can1")], seed=seed, faults=faults)
+    return TableWorld([*items, new_item("crisp-can", "crisp_can1")], seed=seed, faults=faults)
 
 
-def at_table(seed: int, faults: float = 1.0) -> World:
+def at_table(seed: int, faults: float = 1.0) -> TableWorld:
     world = make_world(seed, faults)
     world.robot_at = "table"
     return world
 
 
-def with_fault(kind: str, *, permanent: bool, play: Callable[[World], object]) -> World:
+def with_fault(kind: str, *, permanent: bool, play: Callable[[TableWorld], object]) -> TableWorld:
     """The world of the first seed in which `play` makes such a fault fire."""
     for seed in range(3000):
         world = at_table(seed)
@@ -35,5 +35,5 @@ def with_fault(kind: str, *, permanent: bool, play: Callable[[World], object]) -
     pytest.fail(f"{kind} never fired")
 
 
-def put_in_hand(world: World, name: str) -> None:
+def put_in_hand(world: TableWorld, name: str) -> None:
     world.items.move(world.items[name], "hand")

@@ -10,7 +10,7 @@ from dsc.sequencer import run_writing
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.messages import SkillMessage
 from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_writing import Writing
+from dsc.sequencer.run_writing import RunWriter
 from dsc.sequencer.sequencer import Sequencer
 
 
@@ -78,7 +78,7 @@ def _forgetting(take_up, later):
 
 def no_fence(monkeypatch):
     """Whoever writes a run goes on writing it, whoever has taken it over."""
-    monkeypatch.setattr(Writing, "_require", lambda self, right: None)
+    monkeypatch.setattr(RunWriter, "_require", lambda self, right: None)
     monkeypatch.setattr(run_writing, "_STEP", run_writing._STEP.replace("FROM fence WHERE epoch = ?", "WHERE ? > 0"))
 
 

@@ -6,14 +6,14 @@ import asyncio
 import json
 from typing import TYPE_CHECKING
 
-from domains.clean_up_table.skills import Arm, Base, Camera, Voice, initial_knowledge
+from domains.clean_up_table.components import Arm, Base, Camera, Voice, initial_knowledge
 from dsc.calls import Outcome, SkillCall
 from knowledge_base.facts import Delta, Fact, fact
 
 if TYPE_CHECKING:
     from collections.abc import Coroutine
 
-    from domains.clean_up_table.world import World
+    from domains.clean_up_table.table_world import TableWorld
 
 
 class Clock:
@@ -32,7 +32,7 @@ class Clock:
 class Robot:
     """Components over a world, and the facts they reported; the belief is a plain set of facts."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: TableWorld) -> None:
         self.world = world
         self.clock = Clock()
         self.facts: set[Fact] = set()
@@ -64,7 +64,10 @@ class Robot:
         json.dumps(outcome.attributes)
         self.learn(outcome.observed)
         if outcome.event == "recognised":
-            self.miss(*set(self.lying(arguments["surface"])) - {f.args[0] for f in outcome.observed.added if f.predicate == "in-view"})
+            self.miss(
+                *set(self.lying(arguments["surface"]))
+                - {f.args[0] for f in outcome.observed.added if f.predicate == "in-view"}
+            )
         return outcome
 
     def miss(self, *items: str) -> None:

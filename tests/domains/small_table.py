@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from domains.clean_up_table.items import new_item
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
 
 NAMES = ("cup1", "cup2", "cup3", "can1", "can2", "crisp_can1", "crisp_can2")
 
 
-def make_world(faults: float = 0.0, seed: int = 0) -> World:
+def make_world(faults: float = 0.0, seed: int = 0) -> TableWorld:
     items = [
         new_item("cup", "cup1"),
         new_item("cup", "cup2"),
@@ -18,4 +18,4 @@ def make_world(faults: float = 0.0, seed: int = 0) -> World:
         new_item("crisp-can", "crisp_can1", size="small"),
         new_item("crisp-can", "crisp_can2", size="large"),
     ]
-    return World(items, faults=faults, seed=seed)
+    return TableWorld(items, faults=faults, seed=seed)

@@ -6,7 +6,7 @@ import json
 import pytest
 
 from domains.clean_up_table import Scenario, deploy
-from domains.clean_up_table.faults import GRASP_FAILED, ITEM_SLIPPED, Draw
+from domains.clean_up_table.world_faults import GRASP_FAILED, ITEM_SLIPPED, Draw
 from dsc import Event
 from dsc.trace import header, write_to
 from knowledge_base import Delta, fact
@@ -85,7 +85,18 @@ def test_the_same_seed_gives_the_same_trace_byte_for_byte(planner):
     assert seqs == list(range(1, len(seqs) + 1))
     assert all(record["cause"] is None or record["cause"] < record["seq"] for record in records[1:])
     kinds = {record["type"] for record in records[1:]}
-    assert {"plot", "event", "step", "decision", "knowledge", "action", "plan.asked", "plan.found", "scene", "end"} <= kinds
+    assert {
+        "plot",
+        "event",
+        "step",
+        "decision",
+        "knowledge",
+        "action",
+        "plan.asked",
+        "plan.found",
+        "scene",
+        "end",
+    } <= kinds
     ordered = {record["plot"]: record for record in records[1:] if record["type"] == "plan.ordered"}
     made = {record["plot"]["plot"]: record["plot"] for record in records[1:] if record["type"] == "plot"}
     assert ordered.keys() == {name for name, plot in made.items() if plot.get("generated")}

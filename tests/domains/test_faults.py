@@ -10,7 +10,7 @@ from faulty_world import at_table, put_in_hand, with_fault
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from domains.clean_up_table.faults import (
+from domains.clean_up_table.world_faults import (
     IN_A_ROW,
     ITEM_ADDED,
     ITEM_MOVED,
@@ -20,12 +20,12 @@ from domains.clean_up_table.faults import (
 )
 
 if TYPE_CHECKING:
-    from domains.clean_up_table.world import World
+    from domains.clean_up_table.table_world import TableWorld
 
 GRASP_OUTCOMES = {"grasp_failed", "no_ik"}
 
 
-def play_everything(world: World) -> None:
+def play_everything(world: TableWorld) -> None:
     """Verbs in which every kind of fault can happen."""
     world.recognise("look", "table")
     for n in range(6):
@@ -159,7 +159,7 @@ def test_slips_and_falls_stop_after_three_in_a_row(seed):
     assert falls <= IN_A_ROW
 
 
-def drive_until_moving(world: World, prefix: str, to: str):
+def drive_until_moving(world: TableWorld, prefix: str, to: str):
     world.robot_at = "table"
     for n in range(IN_A_ROW + 1):
         result = world.drive(f"{prefix}-{n}", to)
@@ -169,7 +169,7 @@ def drive_until_moving(world: World, prefix: str, to: str):
 
 
 def test_a_slipped_item_lies_on_the_floor_with_its_contents():
-    def play(world: World) -> None:
+    def play(world: TableWorld) -> None:
         world.items.move(world.items["cup2"], "cup1")
         put_in_hand(world, "cup1")
         world.drive("d", "shelf")
@@ -181,7 +181,7 @@ def test_a_slipped_item_lies_on_the_floor_with_its_contents():
 
 
 def test_a_fallen_stack_lies_apart():
-    def play(world: World) -> None:
+    def play(world: TableWorld) -> None:
         world.items.move(world.items["cup2"], "cup1")
         put_in_hand(world, "cup1")
         world.stack("s", "cup1", "cup3", "table")
@@ -194,7 +194,7 @@ def test_a_fallen_stack_lies_apart():
 
 
 def test_an_item_moved_before_the_grasp_is_gone():
-    def play(world: World) -> None:
+    def play(world: TableWorld) -> None:
         world.items["cup1"].seen = True
         world.pick_up("p", "cup1", "table")
 
@@ -206,7 +206,7 @@ def test_an_item_moved_before_the_grasp_is_gone():
 
 @pytest.mark.parametrize("kind", [ITEM_MOVED, ITEM_ADDED])
 def test_the_carrier_of_the_call_and_unseen_items_are_left_alone(kind):
-    def play(world: World) -> None:
+    def play(world: TableWorld) -> None:
         world.items["cup2"].seen = world.items["cup3"].seen = True
         put_in_hand(world, "cup1")
         world.stack("s", "cup1", "cup2", "table")

@@ -15,12 +15,12 @@ import pytest
 from kept_lives import SCENARIO, told
 
 from domains.clean_up_table.deployment import PROFILES, deploy, resumed
+from domains.clean_up_table.durable_world import KIND, DurableWorld
 from domains.clean_up_table.scenario import Scenario
-from domains.clean_up_table.world_file import KIND, LastingWorld
 from dsc.dynamic.library import Library
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_store import RunStore
-from dsc.text.profiles import find_profile
+from dsc.text.profile_files import find_profile
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.errors import InputError, StoreError
 
@@ -49,7 +49,7 @@ def whole(planner, tmp_path_factory):
         if len(boundaries) % EVERY == 0:
             copies.append(copied(alive, folder / f"copy{len(copies)}"))
 
-    class CopiedWorld(LastingWorld):
+    class CopiedWorld(DurableWorld):
         def executed(self, action_id, result):
             super().executed(action_id, result)
             boundary(action_id)
@@ -86,12 +86,12 @@ def test_the_replay_of_a_run_with_plans_and_faults_comes_to_the_same(whole):
 
 
 def test_a_world_in_a_file_is_the_world_with_all_it_has_done(tmp_path):
-    world = LastingWorld.from_state(Scenario.parse(SCENARIO).world(1, 0.5).state())
+    world = DurableWorld.from_state(Scenario.parse(SCENARIO).world(1, 0.5).state())
     world.create(tmp_path / "world")
     for action_id, to in (("a", "table"), ("b", "sink"), ("a", "nowhere")):
         world.drive(action_id, to)
     world.close()
-    again = LastingWorld.open(tmp_path / "world")
+    again = DurableWorld.open(tmp_path / "world")
     assert again.state() == world.state()
     assert again.drive("b", "sink") == world.done["b"]
     assert again.place_before("b") == "table"
@@ -100,12 +100,12 @@ def test_a_world_in_a_file_is_the_world_with_all_it_has_done(tmp_path):
 
 def test_a_world_that_is_not_there_or_none_is_said_so(tmp_path):
     with pytest.raises(StoreError, match="the world of the run is not there"):
-        LastingWorld.open(tmp_path / "none")
+        DurableWorld.open(tmp_path / "none")
     (tmp_path / "text").write_text("this is no database, and long enough to be seen as none" * 20)
     with pytest.raises(StoreError, match="cannot read the world"):
-        LastingWorld.open(tmp_path / "text")
+        DurableWorld.open(tmp_path / "text")
     with pytest.raises(StoreError, match="there is no folder"):
-        LastingWorld.from_state(Scenario.default().world().state()).create(tmp_path / "no" / "folder")
+        DurableWorld.from_state(Scenario.default().world().state()).create(tmp_path / "no" / "folder")
 
 
 def _database(path: Path, *statements: str) -> None:
@@ -134,8 +134,8 @@ def test_what_has_the_name_of_the_world_and_is_none_stays_as_it_is(tmp_path, pla
     before = [(path.name, path.lstat(), path.is_fifo() or path.read_bytes()) for path in sorted(tmp_path.iterdir())]
     for use in (
         lambda: deploy(None, 3, 0.2, planner, store=tmp_path / "run.kb"),
-        lambda: LastingWorld.from_state(Scenario.default().world().state()).create(tmp_path / "run.kb-world"),
-        lambda: LastingWorld.open(tmp_path / "run.kb-world"),
+        lambda: DurableWorld.from_state(Scenario.default().world().state()).create(tmp_path / "run.kb-world"),
+        lambda: DurableWorld.open(tmp_path / "run.kb-world"),
     ):
         with pytest.raises(StoreError, match=message if stranger != "log" else "run.kb-world"):
             use()
@@ -146,11 +146,11 @@ def test_what_has_the_name_of_the_world_and_is_none_stays_as_it_is(tmp_path, pla
 
 def test_the_world_of_a_store_that_was_deleted_makes_place_for_the_next(tmp_path):
     for seed in (1, 2):
-        world = LastingWorld.from_state(Scenario.parse(SCENARIO).world(seed, 0.5).state())
+        world = DurableWorld.from_state(Scenario.parse(SCENARIO).world(seed, 0.5).state())
         world.create(tmp_path / "run.kb-world")
         world.drive("a", "sink")
         world.close()
-        again = LastingWorld.open(tmp_path / "run.kb-world")
+        again = DurableWorld.open(tmp_path / "run.kb-world")
         assert (again.state(), list(again.done)) == (world.state(), ["a"])
         again.close()
     assert [path.name for path in tmp_path.iterdir()] == ["run.kb-world"]
@@ -193,7 +193,10 @@ def test_the_command_keeps_a_run_resumes_it_and_tells_what_happened(whole, tmp_p
     ("words", "message"),
     [
         (["run"], "a run needs a world, or a store to --resume; valid: clean-up-table"),
-        (["run", "--resume", "x.kb", "--seed", "1"], "a run is resumed as it was begun: --resume does not go with --seed"),
+        (
+            ["run", "--resume", "x.kb", "--seed", "1"],
+            "a run is resumed as it was begun: --resume does not go with --seed",
+        ),
         (["run", "--resume", "x.kb", "--real-time"], "does not go with --real-time"),
         (["run", "--resume", "x.kb"], "there is no store 'x.kb'"),
         (["runs", "list", "x.kb"], "there is no store 'x.kb'"),

@@ -14,8 +14,8 @@ import kept_lives
 import pytest
 
 from domains.clean_up_table.deployment import deploy
+from domains.clean_up_table.durable_world import DurableWorld, beside
 from domains.clean_up_table.scenario import Scenario
-from domains.clean_up_table.world_file import LastingWorld, beside
 
 KILLS = int(os.environ.get("KILLS", "4"))
 SEED, FAULTS = 3, 0.2
@@ -61,7 +61,7 @@ def test_a_run_that_is_killed_again_and_again_ends_like_one_that_never_was(proce
         while not lived(processes, killed, seed, random.randrange(1, A_LIFE) if kills < KILLS else A_LIFE * 100):
             kills += 1
         assert kept_lives.told(killed) == kept_lives.told(whole)
-        reopened = LastingWorld.open(beside(killed))
+        reopened = DurableWorld.open(beside(killed))
         assert reopened.state() == world
         reopened.close()
         seed += 1

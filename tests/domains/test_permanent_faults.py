@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from faulty_world import at_table, make_world, put_in_hand, with_fault
 
-from domains.clean_up_table.faults import GRASP_FAILED, NO_INVERSE_KINEMATICS, NO_PATH, NOTHING_FOUND
 from domains.clean_up_table.items import new_item
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
+from domains.clean_up_table.world_faults import GRASP_FAILED, NO_INVERSE_KINEMATICS, NO_PATH, NOTHING_FOUND
 
 
 @pytest.mark.parametrize("kind", [GRASP_FAILED, NO_INVERSE_KINEMATICS])
@@ -30,7 +30,7 @@ def test_a_touched_item_that_goes_with_its_carrier_is_touched_no_more():
     assert world.touched() == set()
 
 
-def take_out_of_a_carrier(world: World) -> None:
+def take_out_of_a_carrier(world: TableWorld) -> None:
     world.items.move(world.items["cup1"], "cup2")
     world.take_out("t", "cup1", "cup2", "table")
 
@@ -75,7 +75,7 @@ def test_surfaces_and_the_operator_stay_reachable():
 
 def test_what_hides_behind_a_touched_item_is_touched_too():
     back, rear = new_item("cup", "back", behind="front"), new_item("cup", "rear", behind="back")
-    world = World([new_item("can", "front"), back, rear])
+    world = TableWorld([new_item("can", "front"), back, rear])
     world.faults.ungraspable["front"] = GRASP_FAILED
     assert world.touched() == {"front", "back", "rear"}
     reasons = [left.reason for left in world.left()]

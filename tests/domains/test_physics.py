@@ -10,7 +10,7 @@ from small_table import NAMES, make_world
 
 from domains.clean_up_table.items import HAND
 from domains.clean_up_table.places import DESTINATIONS, PLACES, SURFACES
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
 
 items = st.sampled_from([*NAMES, "cup4", "can3", "ghost"])
 surfaces = st.sampled_from(SURFACES)
@@ -29,7 +29,7 @@ scripts = st.lists(verbs, max_size=30)
 worlds = st.builds(make_world, st.sampled_from([0.0, 0.3, 1.0]), st.integers(0, 1000))
 
 
-def sensible(world: World, call: tuple[str, ...]) -> list[tuple[str, ...]]:
+def sensible(world: TableWorld, call: tuple[str, ...]) -> list[tuple[str, ...]]:
     """The call, with what makes it likely to be possible before it."""
     verb, *args = call
     held = world.items.held
@@ -40,7 +40,7 @@ def sensible(world: World, call: tuple[str, ...]) -> list[tuple[str, ...]]:
     return [("drive", args[-1]), (verb, *args)]
 
 
-def check_physics(world: World) -> None:
+def check_physics(world: TableWorld) -> None:
     held = [item for item in world.items if item.where == HAND]
     assert len(held) <= 1
     assert world.robot_at in PLACES
@@ -71,7 +71,7 @@ def test_physics_holds_after_every_call(world, script):
 def test_the_state_goes_to_json_and_back_and_the_same_run_goes_on(world, script):
     half = len(script) // 2
     run(world, script[:half], "a")
-    twin = World.from_state(json.loads(json.dumps(world.state())))
+    twin = TableWorld.from_state(json.loads(json.dumps(world.state())))
     assert twin.state() == world.state()
     assert run(world, script[half:], "b") == run(twin, script[half:], "b")
     assert twin.state() == world.state()
@@ -86,5 +86,5 @@ def test_an_action_id_is_executed_once(world, script):
     assert world.state() == before
 
 
-def run(world: World, script: list[tuple[str, ...]], prefix: str) -> list:
+def run(world: TableWorld, script: list[tuple[str, ...]], prefix: str) -> list:
     return [getattr(world, verb)(f"{prefix}{n}", *args) for n, (verb, *args) in enumerate(script)]

@@ -18,7 +18,10 @@ def step(entered=(), taken=()):
     return {"microsteps": [{"event": None, "taken": list(taken), "exited": [], "entered": list(entered)}]}
 
 
-PLOT = {"plot": "main", "states": {"group": {"states": {"look": {"use": "search"}, "decide": {}}}, "end": {"final": True}}}
+PLOT = {
+    "plot": "main",
+    "states": {"group": {"states": {"look": {"use": "search"}, "decide": {}}}, "end": {"final": True}},
+}
 PLAN = {
     "plot": "plan_1", "generated": True,
     "states": {"step_1": {"about": "(pick cup)", "dynamic": ["pick"]}, "step_1_slipped_0_retry": {"about": "rule", "use": "x"}},

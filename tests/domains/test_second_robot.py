@@ -11,7 +11,7 @@ from domains.clean_up_table import deploy
 from domains.clean_up_table.deployment import PROFILES, ROBOTS, plots
 from domains.clean_up_table.scenario import Scenario
 from domains.cli import app
-from dsc.text.profiles import load_profile, parse_profile
+from dsc.text.profile_files import load_profile, parse_profile
 from knowledge_base import InputError
 
 SHIPPED = {file.stem: load_profile(file) for file in sorted(PROFILES.glob("*.yaml"))}
@@ -30,7 +30,9 @@ def test_every_robot_has_a_profile_and_every_profile_a_robot():
 @pytest.mark.parametrize("seed", range(4))
 def test_each_robot_clears_the_table_with_the_same_plots(planner, name, seed):
     table, report = run(planner, name, seed, 0.15)
-    assert {plot.name: plot for plot in table.executive.library if plot.name != "achieve"} == {p.name: p for p in plots()}
+    assert {plot.name: plot for plot in table.executive.library if plot.name != "achieve"} == {
+        p.name: p for p in plots()
+    }
     assert report.problem is None
     assert report.goal_reached == (not report.left) == table.world.goal_reached
     assert {one.item for one in report.left} == table.world.touched()
@@ -40,7 +42,9 @@ def test_each_robot_clears_the_table_with_the_same_plots(planner, name, seed):
 
 def test_the_robots_are_different_ones(planner):
     scenario = Scenario.parse("table: {cups: 2}")
-    (usual, first), (other, second), (_, third) = (run(planner, n, scenario=scenario) for n in ("on_wheels", "on_tracks", "hurried"))
+    (usual, first), (other, second), (_, third) = (
+        run(planner, n, scenario=scenario) for n in ("on_wheels", "on_tracks", "hurried")
+    )
     assert first.goal_reached and second.goal_reached and third.goal_reached  # noqa: PT018
     assert third.simulated_s < first.simulated_s < second.simulated_s
     kinds = [{type(component).__name__ for component in table.executive.components} for table in (usual, other)]
@@ -69,7 +73,10 @@ def test_the_second_arm_tries_again_itself(planner):
     [
         ("robot: on_trakcs", "there is no robot 'on_trakcs'; did you mean 'on_tracks'?"),
         ("robot: on_tracks", "'arm.vacuum' has no value"),
-        ("robot: on_tracks\ncomponents: {arm: {vacuum: 30, lifts: 1}}", "needs (<= ?lifts (* 0.025 ?vacuum)), but lifts is 1, vacuum is 30"),
+        (
+            "robot: on_tracks\ncomponents: {arm: {vacuum: 30, lifts: 1}}",
+            "needs (<= ?lifts (* 0.025 ?vacuum)), but lifts is 1, vacuum is 30",
+        ),
         ("components: {base: {speed: 3}}", "'base.speed' is from 0.05 to 1.5; found 3"),
     ],
 )
@@ -86,7 +93,9 @@ def test_the_command_takes_a_name_or_a_file(tmp_path):
     scenario.write_text("table: {cups: 1}\n")
     took = []
     for profile in ("hurried", str(slow)):
-        shown = CliRunner().invoke(app, ["run", "clean-up-table", "--scenario", str(scenario), "--json", "--profile", profile])
+        shown = CliRunner().invoke(
+            app, ["run", "clean-up-table", "--scenario", str(scenario), "--json", "--profile", profile]
+        )
         assert shown.exit_code == 0
         took.append(json.loads(shown.output)["simulated_s"])
     assert took[0] < took[1]

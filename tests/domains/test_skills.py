@@ -14,7 +14,7 @@ from reporting_robot import Robot, believes_the_truth
 import domains.clean_up_table
 from domains.clean_up_table.items import new_item
 from domains.clean_up_table.scenario import Scenario
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
 from dsc.calls import SkillCall
 from knowledge_base.facts import Fact, fact
 from knowledge_base.language.effect import Add, AllOf, Delete
@@ -90,7 +90,7 @@ def arguments(robot: Robot, action: ActionText, bindings: dict[str, str]) -> dic
     return {name: bindings[name] for name in component.skills()[skill].parameters}
 
 
-def looked_round(world: World) -> Robot:
+def looked_round(world: TableWorld) -> Robot:
     robot = Robot(world)
     robot.do("drive", to="table")
     robot.do("recognise", surface="table")
@@ -121,7 +121,7 @@ def check_step(robot: Robot, action: ActionText, bindings: dict[str, str]) -> No
 
 
 def test_the_first_knowledge_is_of_the_places_and_of_how_room_is_counted():
-    robot = Robot(World(robot_at="shelf"))
+    robot = Robot(TableWorld(robot_at="shelf"))
     assert fact("robot-at", "shelf") in robot.facts
     assert robot.all("passable") == sorted(("table", "shelf", "floor", "sink", "bin", "operator"))
     assert {fact("one-less", "two", "one"), fact("one-less", "one", "none"), fact("hand-free")} <= robot.facts
@@ -131,7 +131,7 @@ def test_the_first_knowledge_is_of_the_places_and_of_how_room_is_counted():
 
 
 def test_a_look_reports_what_is_there_once_as_graspable():
-    robot = looked_round(World([new_item("cup", "cup1"), new_item("can", "can1")]))
+    robot = looked_round(TableWorld([new_item("cup", "cup1"), new_item("can", "can1")]))
     assert robot.all("goes-to", "sink") == ["cup1"]
     assert robot.all("goes-to", "bin") == ["can1"]
     assert robot.all("free-room", "one") == ["cup1"]
@@ -144,7 +144,7 @@ def test_a_look_reports_what_is_there_once_as_graspable():
 
 
 def test_a_look_misses_what_it_does_not_see_and_finds_it_elsewhere():
-    robot = looked_round(World([new_item("cup", "cup1"), new_item("cup", "cup2")]))
+    robot = looked_round(TableWorld([new_item("cup", "cup1"), new_item("cup", "cup2")]))
     robot.world.move_item("cup1", "shelf")
     robot.do("recognise", surface="table")
     assert (robot.all("missing"), robot.lying("table")) == (["cup1"], ["cup2"])
@@ -154,7 +154,7 @@ def test_a_look_misses_what_it_does_not_see_and_finds_it_elsewhere():
 
 
 def test_a_moved_item_found_before_it_was_missed_lies_in_one_place():
-    robot = looked_round(World([new_item("cup", "cup1")]))
+    robot = looked_round(TableWorld([new_item("cup", "cup1")]))
     robot.world.move_item("cup1", "shelf")
     robot.do("drive", to="shelf")
     robot.do("recognise", surface="shelf")
@@ -162,12 +162,12 @@ def test_a_moved_item_found_before_it_was_missed_lies_in_one_place():
 
 
 def test_an_empty_surface_is_recognised_as_empty():
-    robot = looked_round(World())
+    robot = looked_round(TableWorld())
     assert robot.do("recognise", surface="table").attributes["count"] == 0
 
 
 def test_a_grasp_for_nothing_misses_the_item():
-    robot = looked_round(World([new_item("cup", "cup1")]))
+    robot = looked_round(TableWorld([new_item("cup", "cup1")]))
     robot.world.move_item("cup1", "shelf")
     assert robot.do("pick_up", item="cup1", surface="table").event == "gone"
     assert (robot.all("missing"), robot.lying("table")) == (["cup1"], [])
@@ -175,7 +175,7 @@ def test_a_grasp_for_nothing_misses_the_item():
 
 def with_a_missing_item_in_a_cup() -> Robot:
     """cup1 is in cup2, which the robot did not find, and has been told of since; of cup1 nobody said anything."""
-    robot = looked_round(World([new_item("cup", "cup1"), new_item("cup", "cup2")]))
+    robot = looked_round(TableWorld([new_item("cup", "cup1"), new_item("cup", "cup2")]))
     robot.do("pick_up", item="cup1", surface="table")
     robot.do("stack", item="cup1", carrier="cup2", surface="table")
     robot.facts.add(fact("missing", "cup1"))
@@ -198,7 +198,7 @@ def test_what_was_missing_and_is_in_the_hand_is_not_missing():
 
 
 def test_failures_in_a_row_are_counted_and_forgotten_on_success():
-    robot = looked_round(World([new_item("can", "can1")]))
+    robot = looked_round(TableWorld([new_item("can", "can1")]))
     robot.world.faults.ungraspable["can1"] = "grasp_failed"
     counted = []
     for _ in range(4):
@@ -211,7 +211,7 @@ def test_failures_in_a_row_are_counted_and_forgotten_on_success():
 
 
 def test_detours_in_a_row_are_counted_and_forgotten_on_arrival():
-    robot = looked_round(World())
+    robot = looked_round(TableWorld())
     robot.world.faults.unreachable.append("sink")
     outcomes = [robot.do("drive", to="sink") for _ in range(2)]
     assert [outcome.event for outcome in outcomes] == ["no_path"] * 2
@@ -222,7 +222,7 @@ def test_detours_in_a_row_are_counted_and_forgotten_on_arrival():
 
 
 def test_a_fall_leaves_the_belief_as_things_lie():
-    robot = looked_round(World([new_item("cup", f"cup{n}") for n in (1, 2, 3)], faults=0.0))
+    robot = looked_round(TableWorld([new_item("cup", f"cup{n}") for n in (1, 2, 3)], faults=0.0))
     robot.do("pick_up", item="cup1", surface="table")
     robot.do("stack", item="cup1", carrier="cup2", surface="table")
     robot.do("pick_up", item="cup2", surface="table")
@@ -237,7 +237,7 @@ def test_a_fall_leaves_the_belief_as_things_lie():
 
 @pytest.mark.parametrize("skill", ["pick_up", "drive"])
 def test_a_call_cancelled_on_the_way_changes_nothing(skill):
-    robot = looked_round(World([new_item("cup", "cup1")]))
+    robot = looked_round(TableWorld([new_item("cup", "cup1")]))
     before = robot.world.state()
     component = {"pick_up": robot.components[1], "drive": robot.components[0]}[skill]
     given_arguments = {"pick_up": {"item": "cup1", "surface": "table"}, "drive": {"to": "sink"}}[skill]
@@ -255,7 +255,7 @@ def test_a_call_cancelled_on_the_way_changes_nothing(skill):
 
 
 def test_driving_takes_as_long_as_the_way_is():
-    robot = Robot(World())
+    robot = Robot(TableWorld())
     times = []
     for place in ("table", "sink", "bin"):
         start = robot.clock.time
@@ -266,6 +266,6 @@ def test_driving_takes_as_long_as_the_way_is():
 
 
 def test_the_voice_speaks():
-    robot = Robot(World())
+    robot = Robot(TableWorld())
     assert robot.do("say", text="done").attributes == {"text": "done"}
     assert robot.world.said == ["done"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from small_table import make_world
 
+from domains.clean_up_table.components import Arm, Base, Camera, Voice
 from domains.clean_up_table.deployment import HOME, plots
-from domains.clean_up_table.skills import Arm, Base, Camera, Voice
 from dsc import Event, Library
 from dsc.testing import (
     Answer,
@@ -81,7 +81,10 @@ def test_what_is_not_in_view_is_missing_from_the_outermost_carrier_inwards():
 
 def test_what_somebody_said_while_the_camera_looked_is_not_forgotten():
     """The item was on the table when the look began; by its end it is known to be elsewhere."""
-    run = looked("(and (in-view cup1) (in-view cup2) (not (lies-at cup3 table)) (lies-at cup3 floor))", FACTS + " (lies-at cup3 table)")
+    run = looked(
+        "(and (in-view cup1) (in-view cup2) (not (lies-at cup3 table)) (lies-at cup3 floor))",
+        FACTS + " (lies-at cup3 table)",
+    )
     assert not run.knowledge.ask("(missing cup3)")
 
 
@@ -105,8 +108,25 @@ def test_an_item_that_slips_on_the_way_does_not_keep_the_robot_from_looking():
 
 def test_every_state_transition_and_rule_of_a_search_is_reached():
     coverage = Coverage(LIBRARY, only=["search", "recognise"])
-    runs = [([ARRIVED], [NOTHING] * 4), ([BLOCKED] * 5, []), ([STUCK], []), ([ARRIVED], [STUCK]), ([SLIPPED, ARRIVED], [SEEN])]
-    runs.append(([ARRIVED], [Answer("recognised", {"surface": "table", "count": 1}, observed="(and (in-view cup1) (not (lies-at cup2 table)))")]))
+    runs = [
+        ([ARRIVED], [NOTHING] * 4),
+        ([BLOCKED] * 5, []),
+        ([STUCK], []),
+        ([ARRIVED], [STUCK]),
+        ([SLIPPED, ARRIVED], [SEEN]),
+    ]
+    runs.append(
+        (
+            [ARRIVED],
+            [
+                Answer(
+                    "recognised",
+                    {"surface": "table", "count": 1},
+                    observed="(and (in-view cup1) (not (lies-at cup2 table)))",
+                )
+            ],
+        )
+    )
     for drives, looks in runs:
         coverage.add(*search(drives, looks).steps)
     assert [str(item) for item in coverage.missing()] == [

@@ -9,14 +9,14 @@ from small_table import NAMES, make_world
 
 from domains.clean_up_table.items import HAND, new_item
 from domains.clean_up_table.places import OPERATOR, PLACES
-from domains.clean_up_table.world import World
+from domains.clean_up_table.table_world import TableWorld
 from knowledge_base.errors import InputError
 
 
 class Robot:
     """Calls verbs with action ids of its own: a1, a2, …"""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: TableWorld) -> None:
         self.world = world
         self.count = 0
 
@@ -29,12 +29,12 @@ class Robot:
 
 
 @pytest.fixture
-def world() -> World:
+def world() -> TableWorld:
     return make_world()
 
 
 @pytest.fixture
-def robot(world: World) -> Robot:
+def robot(world: TableWorld) -> Robot:
     robot = Robot(world)
     robot.drive("table")
     return robot
@@ -208,7 +208,7 @@ def test_contents_are_seen_through_their_carriers(robot):
 
 
 def test_the_goal_counts_what_ever_stood_on_the_table(world):
-    world = World([new_item("cup", "cup1", surface="shelf")])
+    world = TableWorld([new_item("cup", "cup1", surface="shelf")])
     assert world.goal_reached
     world.move_item("cup1", "table")
     assert not world.goal_reached
@@ -217,7 +217,7 @@ def test_the_goal_counts_what_ever_stood_on_the_table(world):
 
 
 def test_what_comes_to_the_table_inside_another_counts_too():
-    world = World([new_item("cup", "cup1", surface="shelf"), new_item("cup", "cup2", surface="shelf")])
+    world = TableWorld([new_item("cup", "cup1", surface="shelf"), new_item("cup", "cup2", surface="shelf")])
     world.items.move(world.items["cup1"], "cup2")
     world.move_item("cup2", "table")
     assert [left.item for left in world.left()] == ["cup1", "cup2"]
@@ -249,13 +249,13 @@ def test_somebody_adds_items_under_free_names(world):
         (lambda w: w.add_item("can", "Cola can"), "cola_can"),
         (lambda w: w.move_item("cup11", "shelf"), "cup1"),
         (lambda w: w.move_item("cup1", "shelv"), "shelf"),
-        (lambda w: World(robot_at="tabel"), "table"),
-        (lambda w: World(faults=1.5), None),
-        (lambda w: World(faults=float("nan")), None),
-        (lambda w: World([new_item("cup", "a"), new_item("cup", "a")]), None),
-        (lambda w: World([new_item("cup", "a", behind="b"), new_item("cup", "b", behind="a")]), None),
-        (lambda w: World.from_state({}), None),
-        (lambda w: World.from_state({**w.state(), "done": {"a": {}}}), None),
+        (lambda w: TableWorld(robot_at="tabel"), "table"),
+        (lambda w: TableWorld(faults=1.5), None),
+        (lambda w: TableWorld(faults=float("nan")), None),
+        (lambda w: TableWorld([new_item("cup", "a"), new_item("cup", "a")]), None),
+        (lambda w: TableWorld([new_item("cup", "a", behind="b"), new_item("cup", "b", behind="a")]), None),
+        (lambda w: TableWorld.from_state({}), None),
+        (lambda w: TableWorld.from_state({**w.state(), "done": {"a": {}}}), None),
     ],
 )
 def test_a_mistake_is_an_input_error_and_changes_nothing(world, attempt, nearest):
@@ -274,8 +274,8 @@ def test_only_an_item_on_a_surface_is_moved_by_somebody(world, robot):
 
 def test_two_worlds_of_one_list_do_not_share_items():
     items = [new_item("cup", "cup1")]
-    World(items).move_item("cup1", "shelf")
-    assert World(items).items["cup1"].where == "table"
+    TableWorld(items).move_item("cup1", "shelf")
+    assert TableWorld(items).items["cup1"].where == "table"
 
 
 def test_the_scene_has_every_place_the_robot_and_every_item_inside_its_holder(world, robot):

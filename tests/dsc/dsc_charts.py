@@ -13,7 +13,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.situation import Decision
 from dsc.engine.steps import SwitchMode
 from dsc.events import Event
-from dsc.text.plots import parse_plot
+from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.language import effect as eff
@@ -159,4 +159,7 @@ def modes(step):
 
 def marked(*names):
     """Keys of a state that shows when it is entered and left: `+name`, `-name`."""
-    return {name: {"entry": {"switch": "log", "to": f"+{name}"}, "exit": {"switch": "log", "to": f"-{name}"}} for name in names}
+    return {
+        name: {"entry": {"switch": "log", "to": f"+{name}"}, "exit": {"switch": "log", "to": f"-{name}"}}
+        for name in names
+    }

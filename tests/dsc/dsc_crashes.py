@@ -70,7 +70,13 @@ class Robot(Component):
     @skill(outcomes={"planned": {"plot": "plot"}}, after_crash="repeat")
     async def plan(self, call):
         await call.clock.sleep(1)
-        form = {"plot": "made", "states": {"m": {"entry": [{"trigger": "robot.work", "with": {"seconds": 3}}], "on": {"did": "n"}}, "n": {"final": True}}}
+        form = {
+            "plot": "made",
+            "states": {
+                "m": {"entry": [{"trigger": "robot.work", "with": {"seconds": 3}}], "on": {"did": "n"}},
+                "n": {"final": True},
+            },
+        }
         return Outcome("planned", {"plot": form}, Delta(nodes={"cup": "item"}, added=(fact("seen", "cup"),)))
 
 
@@ -78,7 +84,16 @@ class Run:
     """One life of a run, kept in `folder`; at each boundary `crash` is called with a word for it."""
 
     def __init__(
-        self, folder: Path, plots, *, robot=None, done=(), prepare=None, arguments=None, crash=lambda _: None, resume=False
+        self,
+        folder: Path,
+        plots,
+        *,
+        robot=None,
+        done=(),
+        prepare=None,
+        arguments=None,
+        crash=lambda _: None,
+        resume=False,
     ):
         self.path = folder / "run.kb"
         self.robot = robot or Robot(done, crash=lambda: crash("done"))

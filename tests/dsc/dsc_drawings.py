@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from dsc.text.diagram.layout import Area, Box, BoxKind, Edge, Point
+from dsc.drawing.layout import Area, Box, BoxKind, DrawnEdge, Point
 
 
 def boxes(root: Box) -> list[Box]:
     return [root, *(one for inner in root.boxes for one in boxes(inner))]
 
 
-def edges(root: Box) -> list[Edge]:
+def edges(root: Box) -> list[DrawnEdge]:
     return [edge for box in boxes(root) for edge in box.edges]
 
 

@@ -82,7 +82,7 @@ CHARTS = {
     """,
     "events that the chart sends itself later": """
         plot: p
-        profile: scxml
+        dialect: scxml
         states:
           a:
             entry: [{emit: late, delay: 5, id: one}, {emit: late, delay: 5, id: two}, {emit: later, delay: 7}, {trigger: robot.work}]

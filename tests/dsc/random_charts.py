@@ -2,7 +2,7 @@
 
 Everything is made by one function, `pick(options)`, which a property draws with hypothesis and a hunt for bugs with
 `random.Random(seed).choice`. Charts come to rest: `done`, `always` and outcomes lead forward, internal events fire only
-later ones. In profile `scxml`, where borders are crossed, some go round all the same.
+later ones. In dialect `scxml`, where borders are crossed, some go round all the same.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Inside:
         variables = {} if self.grower.bare else {"v": {"type": "number", "initial": 0}}
         form = {"plot": self.plot, "states": states, "variables": variables, **more}
         if self.grower.scxml:
-            form["profile"] = "scxml"
+            form["dialect"] = "scxml"
             Borders(self).cross()
         for transition in self.transitions():
             if "use" in self.states.get(transition.get("to"), ()) and self.chance(3):
@@ -133,7 +133,9 @@ class Inside:
 
     def _inner_action(self):
         emit = {"emit": "k"} if self.grower.private else {"tell": "(p)"}
-        failing = [{"assign": {"v": "?event.n"}}, {"emit": "k", "with": {"n": "?event.n"}}] if self.grower.private else []
+        failing = (
+            [{"assign": {"v": "?event.n"}}, {"emit": "k", "with": {"n": "?event.n"}}] if self.grower.private else []
+        )
         count = {"assign": {"v": "(+ ?v 1)"}}
         return self.pick((count, {"tell": self.pick(TELLS)}, emit, self._branch(), *failing))
 
@@ -159,7 +161,11 @@ class Inside:
 
     def _select(self, name, depth, anywhere, later):
         cases = {"1": self._effect({"to": self.pick(later)}), "2": {"to": self.pick(later), "when": self._guard()}}
-        return {"select": self.pick(("?v", "?v", "?event.n") if self.grower.private else ("?v",)), "cases": cases, "else": self.pick(later)}
+        return {
+            "select": self.pick(("?v", "?v", "?event.n") if self.grower.private else ("?v",)),
+            "cases": cases,
+            "else": self.pick(later),
+        }
 
     def _composite(self, name, depth, anywhere, later):
         form = self._remember(name, {})
@@ -261,7 +267,7 @@ class Inside:
 
 @dataclass
 class Borders:
-    """What only profile `scxml` has, put into a plot whose states are there."""
+    """What only dialect `scxml` has, put into a plot whose states are there."""
 
     inside: Inside
 
@@ -331,7 +337,9 @@ def in_place(plots):
     """
     forms = {plot.name: plot.to_form() for plot in plots}
     outermost = forms[plots[0].name]
-    return ActionPlot.model_validate({**outermost, "states": _written_out(outermost["states"], forms, outermost["variables"])})
+    return ActionPlot.model_validate(
+        {**outermost, "states": _written_out(outermost["states"], forms, outermost["variables"])}
+    )
 
 
 def _written_out(form, forms, variables):

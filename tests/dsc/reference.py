@@ -13,11 +13,11 @@ Where the page is silent, this is assumed:
   state does not listen to does not come.
 - Histories are forgotten between leaving and entering. A transition that forgets the very history that it leads to
   goes where that history leads at first, and its domain is worked out for that.
-- `error` for a guard is fired once in a macrostep for each transition of a running plot; in profile `scxml`, where it
+- `error` for a guard is fired once in a macrostep for each transition of a running plot; in dialect `scxml`, where it
   has a trigger, once for each event that is no error.
 - A parallel whose children are all in final states is in a final state (SCXML 3.4), so that the parallel around it may
   be complete with it. (`enterStates` of appendix D, to the letter, looks no further than the grandparent.)
-- An error that a plot in profile `scxml` does not take is dropped, like other events.
+- An error that a plot in dialect `scxml` does not take is dropped, like other events.
 - Nothing outside a transition's domain is entered, also if its history belongs to a state around that domain: such
   a state is active. (Appendix D, to the letter, would enter it once more.)
 - A connector is a state that is entered and left; history can remember it when something else was faster.

@@ -36,7 +36,7 @@ class Instance:
 
     @property
     def scxml(self):
-        return self.plot.profile == "scxml"
+        return self.plot.dialect == "scxml"
 
 
 @dataclass(eq=False)
@@ -94,7 +94,7 @@ class Node:
     def scope(self):
         """Whether transitions can be at home here (findLCCA).
 
-        A region that was made only to hold one state, which it is named after, is none in profile `scxml`.
+        A region that was made only to hold one state, which it is named after, is none in dialect `scxml`.
         """
         alone = self.kind == "region" and self.instance.scxml and [*self.model.states] == [self.name]
         return self.compound and not alone

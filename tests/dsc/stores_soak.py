@@ -30,9 +30,9 @@ from typer.testing import CliRunner
 from dsc.sequencer.cli import app
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_tables import archive, has_run
-from dsc.viewer.opening import records_of
+from dsc.viewer.record_sources import records_of
 from knowledge_base.errors import DamagedStoreError, InputError
-from knowledge_base.exchange.forms import schema_form, world_form
+from knowledge_base.exchange.json_forms import schema_form, world_form
 from knowledge_base.facts import Delta, fact
 from knowledge_base.journal import journal
 from knowledge_base.store import KnowledgeBase
@@ -82,7 +82,9 @@ def knowledge(path: Path) -> dict[str, Any]:
 def _world(snapshot: Any) -> str:
     form = world_form(snapshot)
     form["nodes"].pop("zed", None)  # a constant of the longer schema, which is in every world that is read with it
-    return json.dumps({part: sorted(map(str, said.items() if isinstance(said, dict) else said)) for part, said in form.items()})
+    return json.dumps(
+        {part: sorted(map(str, said.items() if isinstance(said, dict) else said)) for part, said in form.items()}
+    )
 
 
 def runs(path: Path) -> list[tuple[Any, tuple[Any, ...]]]:
@@ -94,7 +96,7 @@ def runs(path: Path) -> list[tuple[Any, tuple[Any, ...]]]:
             kept.last(row.number)
             for digest in row.plots.values():
                 kept.form(digest)
-        kept.standing()
+        kept.latest_snapshot()
         return found
 
 
@@ -169,7 +171,11 @@ class Original:
 
 def originals(folder: Path, *, table: bool = False) -> list[Original]:
     """All of them; those of the clean-up table take seconds to make."""
-    made = [*_knowledge_stores(folder / "knowledge", 60 if table else 12), *_small_runs(folder / "small", 1), *_small_runs(folder / "other", 2)]
+    made = [
+        *_knowledge_stores(folder / "knowledge", 60 if table else 12),
+        *_small_runs(folder / "small", 1),
+        *_small_runs(folder / "other", 2),
+    ]
     if table:
         made += _table_runs(folder / "table")
     return [one.learn(folder / f"learn{number}") for number, one in enumerate(made)]
@@ -186,7 +192,11 @@ def _knowledge_stores(folder: Path, changes: int) -> list[Original]:
             clock = iter(range(10**6))
             with KnowledgeBase.open(ITEMS, home / NAME, clock=lambda clock=clock: float(next(clock))) as kb:
                 for n in range(changes):
-                    kb.apply(Delta(nodes={f"i{number}-{n}": "item"}, added=(fact("seen", f"i{number}-{n}"),)), "a", key=f"k{n}" if n % 7 == 0 else None)
+                    kb.apply(
+                        Delta(nodes={f"i{number}-{n}": "item"}, added=(fact("seen", f"i{number}-{n}"),)),
+                        "a",
+                        key=f"k{n}" if n % 7 == 0 else None,
+                    )
                     if n in (changes // 3, changes // 2):
                         earlier.append(copied(home, folder / f"earlier{number}-{n}"))
                 kb.apply(Delta(), "a", key="empty")
@@ -198,7 +208,9 @@ def _knowledge_stores(folder: Path, changes: int) -> list[Original]:
                 if number == 1:
                     kb.compact(keep_since=changes + 2)
                     kb.apply(Delta(added=(fact("p"),)), "c", key="after")
-                    made.append(Original("knowledge 1, compacted, not closed", copied(home, folder / "compacted"), closed=False))
+                    made.append(
+                        Original("knowledge 1, compacted, not closed", copied(home, folder / "compacted"), closed=False)
+                    )
             made.append(Original(f"knowledge {number}, closed", home, closed=True, earlier=earlier[-2:]))
     finally:
         journal.SNAPSHOT_AFTER = was
@@ -280,7 +292,11 @@ def truncated(path: Path, one: Original, others: list[Original], random: Random)
 
 def truncated_log(path: Path, one: Original, others: list[Original], random: Random) -> str:
     log = path.with_name(NAME + "-wal")
-    return truncated(log, one, others, random) if log.exists() and log.stat().st_size else truncated(path, one, others, random)
+    return (
+        truncated(log, one, others, random)
+        if log.exists() and log.stat().st_size
+        else truncated(path, one, others, random)
+    )
 
 
 def no_log(path: Path, one: Original, others: list[Original], random: Random) -> str:
@@ -397,7 +413,9 @@ def _other(value: Any, random: Random) -> Any:
     """Another value, most often of the same kind."""
     wild = random.random()
     if wild < 0.15:
-        return random.choice([None, b"\xff\xfe", "\udcff".encode("utf-8", "surrogateescape"), 2**62, "", "{", "[]", 1.5])
+        return random.choice(
+            [None, b"\xff\xfe", "\udcff".encode("utf-8", "surrogateescape"), 2**62, "", "{", "[]", 1.5]
+        )
     if isinstance(value, str) and value:
         at = random.randrange(len(value))
         return value[:at] + random.choice('0123456789az"{}') + value[at + 1 :]
@@ -446,7 +464,10 @@ def _of_another(connection, table, one, others, random):
     return f"{table} of {source.name}"
 
 
-_EDITS = {name.__name__: name for name in (_deleted, _tail_deleted, _changed, _changed, _exchanged, _doubled, _dropped, _emptied, _of_another)}
+_EDITS = {
+    name.__name__: name
+    for name in (_deleted, _tail_deleted, _changed, _changed, _exchanged, _doubled, _dropped, _emptied, _of_another)
+}
 DAMAGES: list[Damage] = [
     truncated, truncated_log, truncated_log, no_log, flipped, flipped, flipped, flipped, zeroed, swapped, page_of_another,
     log_of_another, file_of_earlier, edited, edited, edited, edited,

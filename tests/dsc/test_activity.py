@@ -10,7 +10,7 @@ from dsc_runs import ran
 
 from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
-from dsc.components.life import Life
+from dsc.components.life_cycle import Life
 from dsc.components.remote import Host, RemoteComponent
 from dsc.components.transport import LocalTransport
 from dsc.dynamic.library import Library
@@ -67,7 +67,9 @@ LOOK = """
 
 def test_a_component_is_on_while_a_state_uses_it_and_so_is_what_it_needs():
     log = []
-    end, _ = ran(LOOK, Device("camera", log, needs=("power",)), Device("power", log, needs=("net",)), Device("net", log))
+    end, _ = ran(
+        LOOK, Device("camera", log, needs=("power",)), Device("power", log, needs=("net",)), Device("net", log)
+    )
     assert end.finished
     first, second = [0.0, 5.0, 10.0], [70.0, 75.0]
     assert log == [
@@ -101,7 +103,11 @@ def test_what_two_need_is_off_when_neither_does():
     """
     power = Device("power", log)
     ran(text, Device("camera", log, needs=("power",)), Device("laser", log, needs=("power",)), power)
-    assert [one for one in log if one[1].startswith("power")] == [(0, "power starts"), (0, "power on"), (8, "power off")]
+    assert [one for one in log if one[1].startswith("power")] == [
+        (0, "power starts"),
+        (0, "power on"),
+        (8, "power off"),
+    ]
 
 
 MAP = """
@@ -307,7 +313,10 @@ def test_components_elsewhere_are_switched_on_and_off_by_the_run_itself(transpor
 
     async def main():
         carrier, clock = transport(), LoopClock()
-        hosts = [Host(Device("camera", log, needs=("power",)), carrier, clock), Host(Device("power", log), carrier, clock)]
+        hosts = [
+            Host(Device("camera", log, needs=("power",)), carrier, clock),
+            Host(Device("power", log), carrier, clock),
+        ]
         camera = await RemoteComponent.connect("camera", carrier)
         end = await Sequencer(Library([plot(LOOK)]), KnowledgeBase(Schema()), [camera], clock).run("p")
         await asyncio.sleep(5)
@@ -330,7 +339,9 @@ def test_one_component_in_two_runs_is_off_when_neither_needs_it():
 
     async def main():
         camera, kb = Device("camera", log), KnowledgeBase(Schema())
-        short = plot("{plot: q, states: {a: {entry: {trigger: camera.look, with: {seconds: 2}}, on: {looked: e}}, e: {final: true}}}")
+        short = plot(
+            "{plot: q, states: {a: {entry: {trigger: camera.look, with: {seconds: 2}}, on: {looked: e}}, e: {final: true}}}"
+        )
         runs = [Sequencer(Library([one]), kb, [camera], LoopClock()).run(one.name) for one in (plot(LOOK), short)]
         await asyncio.gather(*runs)
 

@@ -16,7 +16,7 @@ from dsc_runs import Arm, Ran
 from dsc import blocking
 from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
-from dsc.components.functions import component_of
+from dsc.components.factories import component_of
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.skills import skill
 from knowledge_base.errors import InputError
@@ -142,7 +142,9 @@ def test_a_blocking_skill_runs_in_a_thread_and_reports(run):
 
 
 def test_what_a_thread_has_observed_is_known_even_if_it_breaks():
-    ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.sees_and_breaks}, on: {ok: e}}, e: {final: true}}}", arm=Worker())
+    ran = Ran(
+        "{plot: p, states: {a: {entry: {trigger: arm.sees_and_breaks}, on: {ok: e}}, e: {final: true}}}", arm=Worker()
+    )
     assert "the bus is stuck" in ran.end.problem
     assert ran.kb.ask("(p)")
 
@@ -193,7 +195,15 @@ def test_a_blocking_skill_runs_in_a_process_and_reports():
     assert reports == [Outcome("begun", {"n": 3})]
 
 
-@pytest.mark.parametrize(("name", "why"), [("raises", "RuntimeError: the bus is stuck"), ("dies", "exit code 7"), ("exits", "SystemExit: no driver"), ("stops", "BrokenText")])
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("raises", "RuntimeError: the bus is stuck"),
+        ("dies", "exit code 7"),
+        ("exits", "SystemExit: no driver"),
+        ("stops", "BrokenText"),
+    ],
+)
 def test_what_goes_wrong_in_a_process_is_told(name, why):
     with pytest.raises(RuntimeError, match=why):
         execute(Far(), name)
@@ -288,7 +298,7 @@ def test_a_skill_that_swallows_its_deadline_is_timed_out_for_the_chart():
 def test_a_skill_that_swallows_its_cancellation_does_not_keep_the_process():
     program = """
 import asyncio
-from dsc.components.stopping import give_up
+from dsc.components.abandonment import give_up
 
 async def swallows():
     while True:

@@ -16,7 +16,7 @@ import pytest
 from dsc_bombs import BOMBS, FINAL, HEAD
 
 from domains.cli import main
-from dsc.text.files import MAX_BYTES
+from dsc.text.text_files import MAX_BYTES
 from dsc.validation.library import MAX_FINDINGS
 
 BROKEN = Path(__file__).parent / "broken"
@@ -43,7 +43,9 @@ BYTES = {
 }
 EXPECTED = re.compile(r"(?:# |<!-- )(\d+): (.+?)(?: -->)?")
 EXCEPTIONS = re.compile(
-    r"\b(Traceback|" + "|".join(n for n, c in vars(builtins).items() if isinstance(c, type) and issubclass(c, BaseException)) + r")\b"
+    r"\b(Traceback|"
+    + "|".join(n for n, c in vars(builtins).items() if isinstance(c, type) and issubclass(c, BaseException))
+    + r")\b"
 )
 LONGEST = 700
 """Characters of a line of output besides the name of the file."""
@@ -78,7 +80,9 @@ def complaints(dsc):
 
 
 def kept():
-    return [file for file in sorted(BROKEN.rglob("*")) if file.suffix in {".yaml", ".scxml"} and file.name not in HELPERS]
+    return [
+        file for file in sorted(BROKEN.rglob("*")) if file.suffix in {".yaml", ".scxml"} and file.name not in HELPERS
+    ]
 
 
 def expected(file):
@@ -128,7 +132,9 @@ def test_all_files_at_once_are_all_complained_about(dsc):
     assert all(str(file) in output for file in files)
 
 
-@pytest.mark.parametrize("name", ["yaml/target_unknown.yaml", "bytes/latin_1.yaml", "bytes/empty.yaml", "scxml/doctype.scxml"])
+@pytest.mark.parametrize(
+    "name", ["yaml/target_unknown.yaml", "bytes/latin_1.yaml", "bytes/empty.yaml", "scxml/doctype.scxml"]
+)
 def test_the_installed_command_says_the_same(complaints, name):
     file = BROKEN / name
     words = ["plot", "import" if file.suffix == ".scxml" else "check", str(file)]
@@ -139,6 +145,7 @@ def test_the_installed_command_says_the_same(complaints, name):
 
 
 # -- too many, too deep, too long ----------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_bombs_are_refused_where_they_go_too_far(complaints, tmp_path, name):
@@ -152,7 +159,13 @@ def test_bombs_are_refused_where_they_go_too_far(complaints, tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    ("name", "size"), [("scalar.yaml", 100_000_000), ("line.yaml", 10_000_000), ("chart.scxml", 10_000_000), ("bit_more.yaml", MAX_BYTES + 1)]
+    ("name", "size"),
+    [
+        ("scalar.yaml", 100_000_000),
+        ("line.yaml", 10_000_000),
+        ("chart.scxml", 10_000_000),
+        ("bit_more.yaml", MAX_BYTES + 1),
+    ],
 )
 def test_huge_files_are_refused_by_their_size(complaints, tmp_path, name, size):
     file = tmp_path / name
@@ -171,13 +184,18 @@ def test_many_states_are_refused_by_their_size(complaints, tmp_path):
 
 
 def test_a_file_that_never_ends_is_left_at_the_limit(complaints):
-    assert complaints(Path("/dev/zero")) == [f"/dev/zero: the text has {MAX_BYTES + 1} bytes; at most {MAX_BYTES} are read"]
+    assert complaints(Path("/dev/zero")) == [
+        f"/dev/zero: the text has {MAX_BYTES + 1} bytes; at most {MAX_BYTES} are read"
+    ]
 
 
 def test_what_is_no_file_is_said(dsc, tmp_path):
     assert dsc("plot", "check", tmp_path) == (2, f"{tmp_path}: cannot read the file: Is a directory\n")
     assert dsc("plot", "check", tmp_path / "no.yaml")[0] == 2
-    assert dsc("plot", "check", tmp_path / ("a" * 300)) == (2, f"{tmp_path / ('a' * 300)}: cannot read the file: File name too long\n")
+    assert dsc("plot", "check", tmp_path / ("a" * 300)) == (
+        2,
+        f"{tmp_path / ('a' * 300)}: cannot read the file: File name too long\n",
+    )
 
 
 def test_neighbours_that_are_too_large_do_not_matter(dsc, tmp_path):
@@ -189,6 +207,9 @@ def test_neighbours_that_are_too_large_do_not_matter(dsc, tmp_path):
 
 
 def test_a_plot_of_a_thousand_states_is_not_too_large(dsc, tmp_path):
-    states = (f"  s{n}: {{entry: {{trigger: arm.move, with: {{to: table}}}}, on: {{moved: s{(n + 1) % 1000}, failed: over}}}}\n" for n in range(1000))
+    states = (
+        f"  s{n}: {{entry: {{trigger: arm.move, with: {{to: table}}}}, on: {{moved: s{(n + 1) % 1000}, failed: over}}}}\n"
+        for n in range(1000)
+    )
     (tmp_path / "p.yaml").write_text(HEAD + "".join(states) + FINAL)
     assert dsc("plot", "check", tmp_path / "p.yaml")[0] == 0

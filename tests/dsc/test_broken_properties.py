@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dsc.dynamic.library import Library
+from dsc.errors import NotExpressibleError
 from dsc.model.plot import ActionPlot
-from dsc.text.plots import load_plot, parse_plot, plot_to_yaml
-from dsc.text.scxml.errors import NotExpressibleError
-from dsc.text.scxml.reader import parse_scxml
-from dsc.text.scxml.writer import to_scxml
+from dsc.scxml.reader import parse_scxml
+from dsc.scxml.writer import to_scxml
+from dsc.text.plot_files import load_plot, parse_plot, plot_to_yaml
 from dsc.text.yaml import dump, load_document
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
@@ -42,7 +42,21 @@ CHART = """<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" name="c"
   </parallel>
   <final id="end"/>
 </scxml>"""
-SIGNS = st.sampled_from([*"{}[]()<>:,?!&*#|>'\"%@`~-= \n\t\\/.0a", "- ", ": ", "? ", "true", "null", "<<: ", "é", "\x00", "\ufeff", "\ud800"])
+SIGNS = st.sampled_from(
+    [
+        *"{}[]()<>:,?!&*#|>'\"%@`~-= \n\t\\/.0a",
+        "- ",
+        ": ",
+        "? ",
+        "true",
+        "null",
+        "<<: ",
+        "é",
+        "\x00",
+        "\ufeff",
+        "\ud800",
+    ]
+)
 
 
 @st.composite
@@ -78,7 +92,12 @@ def exchanged_values(draw):
     places = list(_places(data))
     holder, key = draw(st.sampled_from(places))
     other, other_key = draw(st.sampled_from(places))
-    value = draw(st.one_of(st.just(deepcopy(other[other_key])), st.sampled_from([None, True, 0, -1, 2.5, "", "?x", "(", [], {}, [[]], {"a": {}}])))
+    value = draw(
+        st.one_of(
+            st.just(deepcopy(other[other_key])),
+            st.sampled_from([None, True, 0, -1, 2.5, "", "?x", "(", [], {}, [[]], {"a": {}}]),
+        )
+    )
     if isinstance(holder, dict) and draw(st.booleans()):
         holder[str(other_key)] = holder.pop(key)
     else:
@@ -145,7 +164,9 @@ def test_any_text_is_no_plot_or_chart_and_has_an_error_with_a_place(text):
 # -- what is written is read ---------------------------------------------------------------------------------
 
 NAMES = st.text("abcxyz_0", min_size=1, max_size=3).filter(lambda name: not name[0].isdigit())
-WORDS = st.text(max_size=12) | st.sampled_from(["yes", "null", "1_000", "0x1f", "1e3", ".5e5", "~", "- a", "a: b", "2024-01-01", "#", "?x y"])
+WORDS = st.text(max_size=12) | st.sampled_from(
+    ["yes", "null", "1_000", "0x1f", "1e3", ".5e5", "~", "- a", "a: b", "2024-01-01", "#", "?x y"]
+)
 NUMBERS = st.integers(-(10**20), 10**20) | st.floats(allow_nan=False, allow_infinity=False)
 DATA = st.recursive(
     st.none() | st.booleans() | NUMBERS | WORDS,
@@ -174,7 +195,7 @@ ACTIONS = st.one_of(
 
 @st.composite
 def charts(draw):
-    """Random charts of profile scxml: nested and orthogonal states, guards, actions."""
+    """Random charts of dialect scxml: nested and orthogonal states, guards, actions."""
     names = iter(range(10_000))
     states: list[str] = []
 
@@ -184,7 +205,9 @@ def charts(draw):
     def state(depth):
         name = f"s{next(names)}"
         states.append(name)
-        kind = draw(st.sampled_from(["simple", "simple", "final", "composite", "orthogonal"] if depth else ["simple", "final"]))
+        kind = draw(
+            st.sampled_from(["simple", "simple", "final", "composite", "orthogonal"] if depth else ["simple", "final"])
+        )
         if kind == "final":
             return name, {"final": True}
         form = {key: draw(st.lists(ACTIONS, max_size=2)) for key in ("entry", "exit")}
@@ -198,7 +221,12 @@ def charts(draw):
                 form["regions"][inner] = {"states": {inner: content}}
         return name, form
 
-    form = {"plot": "c", "profile": "scxml", "variables": {"n": {"type": "number", "initial": draw(NUMBERS)}}, **scope(2)}
+    form = {
+        "plot": "c",
+        "dialect": "scxml",
+        "variables": {"n": {"type": "number", "initial": draw(NUMBERS)}},
+        **scope(2),
+    }
 
     _wire(draw, form, states)
     return ActionPlot.model_validate(form)
@@ -213,7 +241,7 @@ def _wire(draw, around, states):
             made = {"do": draw(st.lists(ACTIONS, max_size=1)), "internal": draw(st.booleans())}
             made |= draw(st.fixed_dictionaries({}, optional={"to": st.sampled_from(states), "when": GUARDS}))
             inside.setdefault("on", {})[event] = [made]
-        for scope in ([inside] if "states" in inside else inside.get("regions", {}).values()):
+        for scope in [inside] if "states" in inside else inside.get("regions", {}).values():
             _wire(draw, scope, states)
 
 

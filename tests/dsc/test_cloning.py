@@ -7,9 +7,8 @@ from typer.testing import CliRunner
 
 from dsc import Library, load_plot, parse_plot
 from dsc.cli import app
-from dsc.dynamic.cloning import cloned, cloned_profile
-from dsc.text.cloning import clone_files
-from dsc.text.profiles import load_profile, parse_profile, profile_to_yaml
+from dsc.text.cloning import clone_files, cloned, cloned_profile
+from dsc.text.profile_files import load_profile, parse_profile, profile_to_yaml
 from knowledge_base import InputError
 from knowledge_base.errors import SchemaError, UnknownNameError
 
@@ -76,7 +75,9 @@ def test_a_clone_that_was_made_before_is_used_as_it_is():
 def test_a_clone_that_does_not_fit_any_more_is_named_with_the_reason():
     plots = library()
     adapted = parse_plot("plot: b_look\nstates: {e: {final: true}}", "b_look.yaml")
-    with pytest.raises(SchemaError, match=r"b_look\.yaml:1:1: 'b_look' cannot stand in for 'look': it lacks its parameter 'thing'"):
+    with pytest.raises(
+        SchemaError, match=r"b_look\.yaml:1:1: 'b_look' cannot stand in for 'look': it lacks its parameter 'thing'"
+    ):
         cloned(plots.plot("place"), plots, "b_", made=Library([adapted]))
 
 

@@ -9,7 +9,7 @@ from dsc_charts import plot
 from dsc_runs import SCHEMA, Arm, Ran
 
 from dsc.calls import Outcome
-from dsc.components.trees import action, condition, fallback, repeat, retry, sequence, tree_skill
+from dsc.components.behaviour_trees import action, condition, fallback, repeat, retry, sequence, tree_skill
 from dsc.dynamic.library import Library
 from dsc.sequencer.plot_skill import PlotComponent
 from dsc.validation import validate_plot
@@ -56,7 +56,9 @@ class Butler(Arm):
     @tree_skill("served", "not_served", ENDS)
     def falls_back(self, call):
         return sequence(
-            fallback(condition("open", lambda: self.open), action("open", lambda: self.try_it(call, "door"), {"grasped"})),
+            fallback(
+                condition("open", lambda: self.open), action("open", lambda: self.try_it(call, "door"), {"grasped"})
+            ),
             action("take", lambda: self.try_it(call, "cup"), {"grasped"}),
         )
 
@@ -184,7 +186,9 @@ def test_an_action_of_a_tree_that_ends_with_no_outcome_is_a_skill_error():
     assert reason == "arm.says_nothing: InputError: the action 'mute' ended with None, which is no outcome"
 
 
-@pytest.mark.parametrize(("how", "reason"), [("raise", "the gripper is stuck"), ("exit", "SystemExit: the driver says no")])
+@pytest.mark.parametrize(
+    ("how", "reason"), [("raise", "the gripper is stuck"), ("exit", "SystemExit: the driver says no")]
+)
 def test_what_an_action_of_a_tree_raises_is_a_skill_error(how, reason):
     ran = serve(f"raises, with: {{how: {how}}}", Butler())
     assert any(reason in event["attributes"].get("reason", "") for event in ran.of_type("event"))
@@ -267,7 +271,10 @@ def test_a_plot_that_is_a_skill_is_left_when_it_is_cancelled():
 
 def test_a_plot_that_is_a_skill_and_gets_stuck_is_a_skill_error():
     stuck = "{plot: stuck, states: {a: {on: {never: e}}, e: {final: true}}}"
-    ran = Ran("{plot: p, states: {a: {entry: {trigger: helper.stuck}, on: {completed: e}}, e: {final: true}}}", arm=helper(Arm(), stuck))
+    ran = Ran(
+        "{plot: p, states: {a: {entry: {trigger: helper.stuck}, on: {completed: e}}, e: {final: true}}}",
+        arm=helper(Arm(), stuck),
+    )
     assert "nothing can happen" in ran.end.problem
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from dsc_charts import plot
 
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.events import Event
 from dsc.validation import validate_library

@@ -2,8 +2,8 @@
 
 import json
 
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.testing.worlds import world
 from knowledge_base.language.parser import parse_effect, parse_term
 
@@ -17,6 +17,8 @@ def test_a_chart_reads_and_tells_content():
     pose = situation.value(parse_term("(pose ?t map)"), {"t": "cup"})
     assert pose == [0.4, 0.1] == json.loads(json.dumps(pose))
     assert situation.value(parse_term("(label ?t)"), {"t": "cup"}) == "red"
-    situation.tell(parse_effect("(and (assign (pose cup map) (geometry 1 2)) (assign (label cup) ?found))"), {"found": "blue"})
+    situation.tell(
+        parse_effect("(and (assign (pose cup map) (geometry 1 2)) (assign (label cup) ?found))"), {"found": "blue"}
+    )
     assert situation.value(parse_term("(pose cup map)"), {}) == [1, 2]
     assert situation.value(parse_term("(label cup)"), {}) == "blue"

@@ -57,7 +57,10 @@ def edited(folder, to, statement):
         ("UPDATE runs SET header = '[' WHERE run = 2", "run 2 is not what was written"),
         ("UPDATE runs SET ended = '{\"finished\":false}' WHERE run = 2", "the end of run 2 is not what was written"),
         ("UPDATE steps SET records = '{' WHERE run = 2 AND number = 3", "macrostep 3 of run 2 is not what was written"),
-        ("UPDATE steps SET message = x'ff' WHERE run = 2 AND number = 3", "macrostep 3 of run 2 is not what was written"),
+        (
+            "UPDATE steps SET message = x'ff' WHERE run = 2 AND number = 3",
+            "macrostep 3 of run 2 is not what was written",
+        ),
         ("UPDATE steps SET time = 1 WHERE run = 2 AND number = 1", "macrostep 1 of run 2 is not what was written"),
         ("UPDATE forms SET form = form || ' '", "is missing, or not what was written"),
         ("UPDATE changes SET digest = x'00' WHERE version = 1", "the change to version 1 is not what was written"),
@@ -84,7 +87,9 @@ def test_a_run_whose_end_is_missing_is_not_replayed(finished, tmp_path):
 
 def test_a_whole_store_is_checked(finished):
     done = CliRunner().invoke(app, ["check", str(finished / "run.kb")])
-    assert done.output == "run 1: 5 steps as they were written, finished\nrun 2: 5 steps as they were written, finished\n"
+    assert (
+        done.output == "run 1: 5 steps as they were written, finished\nrun 2: 5 steps as they were written, finished\n"
+    )
 
 
 def test_an_interrupted_run_with_a_damaged_macrostep_is_not_resumed(tmp_path):

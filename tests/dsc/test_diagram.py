@@ -12,15 +12,15 @@ from dsc_drawings import apart, area, boxes, edges, inside, on_border
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dsc.drawing import draw, lay_out
+from dsc.drawing.layered.columns import fit
+from dsc.drawing.layered.tracks import Net, assign_tracks
+from dsc.drawing.layout import Box, BoxKind, TextStyle
+from dsc.drawing.measure import pack, shorten, text_width
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.states import State
-from dsc.text.diagram import draw, lay_out
-from dsc.text.diagram.layered.fitting import fit
-from dsc.text.diagram.layered.tracks import Net, assign_tracks
-from dsc.text.diagram.layout import Box, BoxKind, TextStyle
-from dsc.text.diagram.measure import pack, shorten, text_width
-from dsc.text.plots import load_library, parse_plot
+from dsc.text.plot_files import load_library, parse_plot
 from knowledge_base.errors import UnknownNameError
 
 SHIPPED = Path(__file__).parents[2] / "domains" / "clean_up_table" / "plots"
@@ -83,7 +83,11 @@ def _connectors(draw_: st.DrawFn, kind: str, others: list[str]) -> dict[str, obj
         *guarded, last = targets
         return {"choice": [{"when": f"(is a{number})", "to": one} for number, one in enumerate(guarded)] + [last]}
     cases = {f"case{number}": one for number, one in enumerate(targets)}
-    return {"select": draw_(st.sampled_from(["?n", "(+ ?event.a_rather_long_name ?n)"])), "cases": cases, "else": others[0]}
+    return {
+        "select": draw_(st.sampled_from(["?n", "(+ ?event.a_rather_long_name ?n)"])),
+        "cases": cases,
+        "else": others[0],
+    }
 
 
 plots = scopes().map(lambda states: ActionPlot.model_validate({"plot": "random", "states": states}))

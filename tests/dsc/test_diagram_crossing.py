@@ -10,12 +10,12 @@ from dsc_drawings import apart, area, boxes, edges, inside, on_border
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dsc.drawing import draw, lay_out
+from dsc.drawing.layout import Box, BoxKind, DrawnEdge
+from dsc.drawing.maze import Maze
 from dsc.model.plot import ActionPlot
 from dsc.model.states import HistoryState
-from dsc.model.transitions import Source
-from dsc.text.diagram import draw, lay_out
-from dsc.text.diagram.layout import Box, BoxKind, Edge
-from dsc.text.diagram.maze import Maze
+from dsc.model.transitions import TransitionSource
 from knowledge_base.errors import UnknownNameError
 
 # -- random charts -----------------------------------------------------------------------------------------
@@ -29,7 +29,7 @@ def charts(draw_: st.DrawFn) -> ActionPlot:
     for name, state in _sources(states):
         state["on"] = draw_(st.dictionaries(st.sampled_from("uvw"), _transitions(names), max_size=2))
         state["about"] = name
-    form = {"plot": "random", "profile": "scxml", "states": states}
+    form = {"plot": "random", "dialect": "scxml", "states": states}
     return ActionPlot.model_validate(form)
 
 
@@ -67,9 +67,7 @@ def _histories(draw_: st.DrawFn, names: list[str], first: int) -> dict[str, dict
 
 def _transitions(names: list[str]) -> st.SearchStrategy[dict[str, object]]:
     somewhere = st.sampled_from(names)
-    return st.fixed_dictionaries(
-        {"to": somewhere, "also": st.lists(somewhere, max_size=1), "internal": st.booleans()}
-    )
+    return st.fixed_dictionaries({"to": somewhere, "also": st.lists(somewhere, max_size=1), "internal": st.booleans()})
 
 
 def _sources(states: dict[str, dict[str, object]]) -> list[tuple[str, dict[str, object]]]:
@@ -126,7 +124,7 @@ def test_every_transition_is_drawn_to_all_its_targets_and_every_caption_is_there
     for name, state, _ in chart.walk():
         if isinstance(state, HistoryState):
             assert (name, state.target) in {(edge.source, edge.target) for edge in drawn}
-        for event, transition in state.transitions() if isinstance(state, Source) else ():
+        for event, transition in state.transitions() if isinstance(state, TransitionSource) else ():
             for target in transition.targets:
                 assert any((edge.source, edge.target) == (name, target) for edge in drawn)
             said = [words(edge) for edge in drawn if (edge.source, edge.target) == (name, transition.target)]
@@ -134,19 +132,19 @@ def test_every_transition_is_drawn_to_all_its_targets_and_every_caption_is_there
             assert any(event in text and mark in text for text in said)
 
 
-def words(edge: Edge) -> str:
+def words(edge: DrawnEdge) -> str:
     return " ".join(text.text for text in edge.label)
 
 
 # -- single charts -----------------------------------------------------------------------------------------
 
 
-def drawn(text: str, direction: str = "down") -> tuple[Box, dict[tuple[str, str], Edge]]:
-    root = lay_out(plot("plot: p\nprofile: scxml\nstates:\n" + text), direction=direction)  # type: ignore[arg-type]
+def drawn(text: str, direction: str = "down") -> tuple[Box, dict[tuple[str, str], DrawnEdge]]:
+    root = lay_out(plot("plot: p\ndialect: scxml\nstates:\n" + text), direction=direction)  # type: ignore[arg-type]
     return root, {(edge.source, edge.target): edge for edge in edges(root)}
 
 
-def crosses(edge: Edge, box: Box) -> bool:
+def crosses(edge: DrawnEdge, box: Box) -> bool:
     """Whether it passes the border of a box somewhere between its ends."""
     held = [inside((*point, 0, 0), area(box), slack=-0.5) for point in edge.points]
     return len(set(held)) > 1
@@ -234,7 +232,7 @@ def test_histories_are_circles_with_their_default(direction: str) -> None:
 
 
 def test_what_leads_into_a_state_is_drawn_over_it() -> None:
-    svg = draw(plot("plot: p\nprofile: scxml\nstates:\n  a: {on: {x: b}}\n  c: {states: {b: }}"))
+    svg = draw(plot("plot: p\ndialect: scxml\nstates:\n  a: {on: {x: b}}\n  c: {states: {b: }}"))
     assert svg.index('class="label mid"') > svg.index(">b</text>")
 
 

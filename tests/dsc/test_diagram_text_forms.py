@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from dsc_charts import plot
 
-from dsc.text.state_diagram import to_mermaid, to_plantuml
+from dsc.text.text_diagrams import to_mermaid, to_plantuml
 
 CHART = plot("""
     plot: p
-    profile: scxml
+    dialect: scxml
     states:
       a: {on: {go: {to: b, also: [c]}}}
       o:

@@ -7,10 +7,10 @@ from dsc_charts import FakeSituation, plot
 
 from dsc.calls import Outcome
 from dsc.components.component import Component
+from dsc.dynamic.candidate_selection import ACHIEVE
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import MOST_BOUND, Library
-from dsc.dynamic.outcomes import outcomes_of
-from dsc.dynamic.selection import ACHIEVE
-from dsc.dynamic.situation import KnowledgeSituation
+from dsc.dynamic.plot_outcomes import outcomes_of
 from dsc.engine.machine import Machine
 from dsc.engine.situation import Decision
 from dsc.events import Event
@@ -251,7 +251,10 @@ def test_a_plot_may_be_added_twice_but_not_two_of_one_name():
 
 
 def test_plots_that_implement_an_action_come_in_the_order_of_the_library():
-    one, two = plot("{plot: one, implements: pick, states: {s: }}"), plot("{plot: two, implements: pick, states: {s: }}")
+    one, two = (
+        plot("{plot: one, implements: pick, states: {s: }}"),
+        plot("{plot: two, implements: pick, states: {s: }}"),
+    )
     assert Library([two, one, plot(ABOVE)]).implementing("pick") == (two, one)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dsc_charts import Run, marked, modes, plot
 
-from dsc.engine.state import MachineState
+from dsc.engine.machine_state import MachineState
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 
@@ -83,7 +83,9 @@ def test_a_transition_to_itself_leaves_and_enters_anew():
 
 
 def test_a_transition_without_target_leaves_nothing():
-    run = Run(of(shown("a", on={"count": {"assign": {"n": "(+ ?n 1)"}}}), variables={"n": {"type": "number", "initial": 0}}))
+    run = Run(
+        of(shown("a", on={"count": {"assign": {"n": "(+ ?n 1)"}}}), variables={"n": {"type": "number", "initial": 0}})
+    )
     run.start()
     for _ in range(2):
         step_ = run.send("count")
@@ -117,21 +119,24 @@ def test_a_composite_is_done_when_its_final_state_is_reached():
 
 
 def test_completion_is_seen_by_the_completed_state_alone():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         states:
           outer:
             on: {done: wrong}
             states: {a: {on: {done: b}, states: {c: {on: {e: d}}, d: {final: true}}}, b: {}}
           wrong:
-    """))
+    """)
+    )
     run.start()
     run.send("e")
     assert run.active == ["outer", "b"]
 
 
 def test_regions_are_done_when_each_has_reached_its_final_state():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         states:
           o:
@@ -140,7 +145,8 @@ def test_regions_are_done_when_each_has_reached_its_final_state():
               r1: {states: {x: {on: {e: x2}}, x2: {final: true}}}
               r2: {states: {y: {on: {f: y2}}, y2: {final: true}}}
           b:
-    """))
+    """)
+    )
     run.start()
     run.send("e")
     assert run.active == ["o", "x2", "y"]
@@ -149,7 +155,8 @@ def test_regions_are_done_when_each_has_reached_its_final_state():
 
 
 def test_regions_done_in_one_step_complete_once():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         variables: {n: {type: number, initial: 0}}
         states:
@@ -158,19 +165,22 @@ def test_regions_done_in_one_step_complete_once():
             regions:
               r1: {states: {x: {on: {e: x2}}, x2: {final: true}}}
               r2: {states: {y: {on: {e: y2}}, y2: {final: true}}}
-    """))
+    """)
+    )
     run.start()
     run.send("e")
     assert run.variables()["n"] == 1
 
 
 def test_regions_that_begin_in_their_final_states_are_done_once_all_are_entered():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         states:
           o: {on: {done: b}, regions: {r1: {states: {x: {final: true}}}, r2: {states: {y: {final: true}}}}}
           b:
-    """))
+    """)
+    )
     step_ = run.start()
     assert run.active == ["b"]
     assert [micro.entered for micro in step_.microsteps] == [("o", "x", "y"), ("b",)]
@@ -187,6 +197,8 @@ def test_the_end_of_the_outermost_plot_leaves_everything():
 
 
 def test_the_outcome_of_the_outermost_plot_leaves_the_machine():
-    run = Run(plot("{plot: p, emits: {r: {n: number}}, states: {a: {on: {e: b}}, b: {final: true, emit: r, with: {n: 3}}}}"))
+    run = Run(
+        plot("{plot: p, emits: {r: {n: number}}, states: {a: {on: {e: b}}, b: {final: true, emit: r, with: {n: 3}}}}")
+    )
     run.start()
     assert run.send("e").emitted == (Event("r", {"n": 3}),)

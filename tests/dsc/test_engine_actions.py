@@ -15,7 +15,8 @@ from knowledge_base.facts import Delta, Fact, fact
 
 
 def test_external_actions_become_output_in_order_with_arguments_worked_out():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         parameters: {item: item}
         states:
@@ -27,7 +28,8 @@ def test_external_actions_become_output_in_order_with_arguments_worked_out():
             exit: {switch: arm, to: neutral}
             on: {e: b}
           b:
-    """))
+    """)
+    )
     output = run.start(item="cup1").output
     serial = run.serial("a")
     assert output == (
@@ -45,13 +47,15 @@ def test_every_execution_has_an_id_of_its_own():
 
 
 def test_actions_of_a_transition_are_done_between_leaving_and_entering_in_order():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         variables: {n: {type: number, initial: 1}}
         states:
           a: {exit: {set: c.x, to: ?n}, on: {e: {to: b, assign: {n: (+ ?n 1)}, tell: (seen ?n), emit: local, with: {n: ?n}}}}
           b: {entry: {set: c.x, to: ?n}, on: {local: {assign: {n: (+ ?n ?event.n)}}}}
-    """))
+    """)
+    )
     run.start()
     step_ = run.send("e")
     assert [o.value for o in step_.output] == [1, 2]
@@ -81,18 +85,22 @@ def test_what_is_told_and_taken_back_in_one_macrostep_is_one_change():
 
 
 def test_assignments_of_one_action_do_not_see_each_other():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         variables: {x: {type: number, initial: 1}, y: {type: number, initial: 2}}
         states: {a: {on: {swap: {assign: {x: ?y, y: ?x}}}}}
-    """))
+    """)
+    )
     run.start()
     run.send("swap")
     assert run.variables() == {"x": 2, "y": 1}
 
 
 def test_local_events_come_before_the_next_and_in_order():
-    run = Run(plot("""
+    run = Run(
+        plot(
+            """
         plot: p
         variables: {log: {type: number, initial: 0}}
         states:
@@ -102,16 +110,20 @@ def test_local_events_come_before_the_next_and_in_order():
               one: {assign: {log: (+ (* ?log 10) 1)}, emit: three}
               two: {assign: {log: (+ (* ?log 10) 2)}}
               three: {assign: {log: (+ (* ?log 10) 3)}}
-    """.replace("(* ?log 10)", "?log")))
+    """.replace("(* ?log 10)", "?log")
+        )
+    )
     run.start()
     assert [m.event.name for m in run.send("e").microsteps] == ["e", "one", "two", "three"]
 
 
 def test_always_is_looked_at_before_local_events():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         states: {a: {on: {e: {to: b, emit: x}}}, b: {on: {x: wrong}, always: c}, c: {on: {x: d}}, d: , wrong: }
-    """))
+    """)
+    )
     run.start()
     run.send("e")
     assert run.active == ["d"]
@@ -130,11 +142,13 @@ def test_always_follows_a_change_of_the_world():
 
 
 def test_timeouts_start_on_entry_and_are_cancelled_on_exit():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         parameters: {t: number}
         states: {a: {after: [{seconds: 5, to: b}, {seconds: (+ ?t 1), to: c}], on: {e: a}}, b: , c: }
-    """))
+    """)
+    )
     first = run.start(t=1)
     old = run.serial("a")
     assert first.output == (StartTimer(old, 0, 5.0), StartTimer(old, 1, 2.0))
@@ -156,11 +170,13 @@ def test_a_timeout_may_have_a_guard_and_stay():
 
 @pytest.mark.parametrize("seconds", ["soon", -1, None, True, float("nan")])
 def test_a_delay_that_is_none_is_an_error_not_a_timeout_that_never_comes(seconds):
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         variables: {t: number}
         states: {a: {on: {go: {to: b, assign: {t: ?event.t}}}}, b: {after: {seconds: ?t, to: c}}, c: }
-    """))
+    """)
+    )
     run.start()
     step_ = run.send("go", t=seconds)
     assert step_.output == ()
@@ -182,14 +198,16 @@ def test_a_broken_guard_does_not_hold_and_is_reported_once():
 
 
 def test_a_broken_guard_without_trigger_is_reported_once_in_a_macrostep():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         states:
           a:
             always: {to: b, when: (p ?nope)}
             states: {x: {on: {e: y}}, y: {always: z}, z: }
           b:
-    """))
+    """)
+    )
     assert len(run.start().errors) == 1
     step_ = run.send("e")
     assert run.active == ["a", "z"]
@@ -197,11 +215,13 @@ def test_a_broken_guard_without_trigger_is_reported_once_in_a_macrostep():
 
 
 def test_an_error_can_be_handled_in_the_plot_it_happened_in():
-    run = Run(plot("""
+    run = Run(
+        plot("""
         plot: p
         variables: {why: text}
         states: {a: {on: {e: {to: b, tell: (p ?nope)}}}, b: {on: {error: {to: c, assign: {why: ?event.reason}}}}, c: }
-    """))
+    """)
+    )
     run.start()
     step_ = run.send("e")
     assert step_.errors == ()

@@ -13,7 +13,7 @@ from random_charts import EVENTS, SENT_IN_SCXML, libraries
 
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
-from dsc.engine.state import MachineState
+from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Cancel, Start, StartTimer
 from dsc.errors import RunawayError
 from dsc.events import AFTER, AT_LEAST, EVERY
@@ -145,7 +145,9 @@ class Books(RuleBasedStateMachine):
     def _shown(self):
         """The active states that show themselves; final states and connectors do not."""
         for frame in self._frames():
-            yield from (name for name in frame.configuration.names if getattr(frame.compiled.plot.state(name), "exit", ()))
+            yield from (
+                name for name in frame.configuration.names if getattr(frame.compiled.plot.state(name), "exit", ())
+            )
 
     def _timed(self):
         """All timers that the active states have according to the plots."""

@@ -110,9 +110,7 @@ def test_a_plot_held_in_a_variable_is_bound_as_content():
 def test_the_order_of_a_bound_plots_states_counts():
     host = plot("{plot: p, parameters: {one: plot, two: plot}, states: {h: {use: ?one, on: {go: g}}, g: {use: ?two}}}")
     run = Run(host)
-    run.start(
-        one={"plot": "made", "states": {"a": {}, "b": {}}}, two={"plot": "made", "states": {"b": {}, "a": {}}}
-    )
+    run.start(one={"plot": "made", "states": {"a": {}, "b": {}}}, two={"plot": "made", "states": {"b": {}, "a": {}}})
     assert run.active == ["h", "h/a"]
     run.send("go")
     assert run.active == ["g", "g/b"]
@@ -131,7 +129,9 @@ def test_the_order_of_a_bound_plots_states_counts():
     ],
 )
 def test_what_is_no_plot_cannot_be_bound_and_is_an_error_of_the_chart(value):
-    host = plot("{plot: p, variables: {what: plot}, states: {a: {on: {go: {to: h, assign: {what: ?event.what}}}}, h: {use: ?what}}}")
+    host = plot(
+        "{plot: p, variables: {what: plot}, states: {a: {on: {go: {to: h, assign: {what: ?event.what}}}}, h: {use: ?what}}}"
+    )
     run = Run(host)
     run.start()
     step_ = run.send("go", what=value)
@@ -200,7 +200,9 @@ def test_the_situation_is_asked_with_the_variables_and_the_event():
 def test_an_outcome_for_a_state_that_is_left_in_the_same_microstep_reaches_nobody():
     run = Run(
         plot("{plot: p, states: {h: {use: q, on: {e: away, out: wrong}}, away: {on: {out: wrong}}, wrong: }}"),
-        plot("{plot: q, emits: {out: }, states: {o: {regions: {r: {states: {a: {on: {e: {emit: out}}}}}, s: {states: {b: }}}}}}"),
+        plot(
+            "{plot: q, emits: {out: }, states: {o: {regions: {r: {states: {a: {on: {e: {emit: out}}}}}, s: {states: {b: }}}}}}"
+        ),
     )
     run.start()
     assert len(run.send("e").microsteps) == 1

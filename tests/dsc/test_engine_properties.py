@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from legality import check_legal, check_serials
 from random_charts import Grower, happenings, in_place, libraries
 
-from dsc.engine import choice, configuration, macrostep, reaction
-from dsc.engine.state import MachineState
+from dsc.engine import configuration, macrostep, reaction, reaction_choice
+from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import StartTimer
 from dsc.errors import RunawayError
 from dsc.events import Event
@@ -21,9 +21,7 @@ from knowledge_base.facts import Fact
 
 SMALL = {"depth": 2}
 EVERY_KIND = st.one_of(libraries(**SMALL), libraries(scxml=True, **SMALL))
-PUBLIC = st.one_of(
-    libraries(private=False, **SMALL), libraries(private=False, scxml=True, **SMALL)
-)
+PUBLIC = st.one_of(libraries(private=False, **SMALL), libraries(private=False, scxml=True, **SMALL))
 """Without what depends on the plot that it is in, and without transitions that read the last event without it."""
 SOME = settings(PROPERTY, max_examples=25)
 
@@ -119,7 +117,9 @@ def test_a_plot_acts_alike_bound_as_content_and_written_in_place(plots, happened
         assert modes(a) == modes(b)
         assert a.handled == b.handled
         assert a.knowledge == b.knowledge
-        assert [[_name(path) for path in micro.entered] for micro in a.microsteps] == [[*map(_name, m.entered)] for m in b.microsteps]
+        assert [[_name(path) for path in micro.entered] for micro in a.microsteps] == [
+            [*map(_name, m.entered)] for m in b.microsteps
+        ]
         assert [_name(path) for path in one.active] == [_name(path) for path in other.active]
 
 
@@ -203,7 +203,7 @@ def test_a_step_does_not_depend_on_how_much_is_kept(plots, happened, most):
     plain = [*Played(*plots).steps(happened)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(configuration, "MOST_CONFIGURATIONS", most)
-        patch.setattr(choice, "MOST_TRIGGERS", most)
-        patch.setattr(choice, "MOST_QUESTIONS", most)
+        patch.setattr(reaction_choice, "MOST_TRIGGERS", most)
+        patch.setattr(reaction_choice, "MOST_QUESTIONS", most)
         patch.setattr(reaction, "MOST_REPORTS", most)
         assert [*Played(*plots).steps(happened)] == plain

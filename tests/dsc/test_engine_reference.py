@@ -57,9 +57,7 @@ class Pair:
             listening = [path for path, serial in activations(root) if serial] if root else []
             self._for_one_of(listening, which, lambda path: self._send_to(path, attributes))
         else:
-            self._both(
-                lambda: self.engine.send(what, **attributes), lambda: self.reference.send(what, attributes)
-            )
+            self._both(lambda: self.engine.send(what, **attributes), lambda: self.reference.send(what, attributes))
 
     def _for_one_of(self, options, which, act):
         if options:
@@ -190,7 +188,7 @@ def test_large_charts_run_as_the_semantics_are_written(first, scxml):
         pytest.param(
             """
             plot: p
-            profile: scxml
+            dialect: scxml
             states:
               o:
                 on: {done.state.o: away}
@@ -205,7 +203,7 @@ def test_large_charts_run_as_the_semantics_are_written(first, scxml):
         pytest.param(
             """
             plot: p
-            profile: scxml
+            dialect: scxml
             states:
               c:
                 initial: a
@@ -222,7 +220,7 @@ def test_large_charts_run_as_the_semantics_are_written(first, scxml):
         pytest.param(
             """
             plot: p
-            profile: scxml
+            dialect: scxml
             states:
               o:
                 states:

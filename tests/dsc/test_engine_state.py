@@ -10,8 +10,8 @@ from dsc_charts import FakeSituation, Run, plot
 
 from dsc.dynamic.library import Library
 from dsc.engine.machine import step
+from dsc.engine.machine_state import MachineState
 from dsc.engine.situation import Decision
-from dsc.engine.state import MachineState
 from dsc.events import Event
 from knowledge_base.errors import InputError, UnknownNameError
 

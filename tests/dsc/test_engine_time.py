@@ -8,7 +8,7 @@ import pytest
 from dsc_charts import Run, modes, plot
 from dsc_runs import Ran
 
-from dsc.engine.state import MachineState
+from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Cancel, StartTimer
 from knowledge_base.facts import Fact
 
@@ -106,7 +106,9 @@ def test_a_run_reacts_at_every_period_until_it_ends():
 
 
 def test_a_run_in_which_only_periods_pass_in_vain_ends_with_a_problem():
-    ran = Ran("{plot: p, states: {a: {every: [{seconds: 1, when: (p), to: b}, {seconds: 3, emit: x}]}, b: {final: true}}}")
+    ran = Ran(
+        "{plot: p, states: {a: {every: [{seconds: 1, when: (p), to: b}, {seconds: 3, emit: x}]}, b: {final: true}}}"
+    )
     assert not ran.end.finished
     assert "nothing can happen any more" in ran.end.problem
     assert ran.at == 3.0
@@ -124,7 +126,9 @@ def test_a_period_may_see_what_a_skill_has_observed_meanwhile():
           b: {final: true}
     """)
     assert ran.end.finished
-    entered = [(r.t, state) for r in ran.records if r.type == "step" for m in r.data["microsteps"] for state in m["entered"]]
+    entered = [
+        (r.t, state) for r in ran.records if r.type == "step" for m in r.data["microsteps"] for state in m["entered"]
+    ]
     assert (2.0, "t2") in entered
 
 

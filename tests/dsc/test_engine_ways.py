@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from dsc_charts import Run, modes, plot
 
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.events import Event
 from knowledge_base.facts import Fact
@@ -36,7 +36,7 @@ def test_a_state_left_by_another_transition_is_interrupted():
     run = started(f"""
         plot: p
         states:
-          o: {{{breakable('o')}, on: {{stop: out}}, states: {{a: {{{breakable('a')}, on: {{go: b}}}}, b: {{exit: {{switch: log, to: -b}}}}}}}}
+          o: {{{breakable("o")}, on: {{stop: out}}, states: {{a: {{{breakable("a")}, on: {{go: b}}}}, b: {{exit: {{switch: log, to: -b}}}}}}}}
           out:
     """)
     assert modes(run.send("stop")) == ["!a", "-o"]
@@ -63,8 +63,8 @@ def test_another_region_interrupts_only_what_its_transition_leaves():
         states:
           o:
             regions:
-              r1: {{states: {{x: {{{breakable('x')}, on: {{go: x2}}}}, x2: }}}}
-              r2: {{states: {{y: {{{breakable('y')}, on: {{go: y2}}}}, y2: }}}}
+              r1: {{states: {{x: {{{breakable("x")}, on: {{go: x2}}}}, x2: }}}}
+              r2: {{states: {{y: {{{breakable("y")}, on: {{go: y2}}}}, y2: }}}}
     """)
     assert modes(run.send("go")) == ["-y", "-x"]
 
@@ -127,7 +127,8 @@ def test_a_connector_may_be_the_way_into_a_composite_a_region_or_a_plot():
 
 
 def test_connectors_may_follow_each_other():
-    run = started("""
+    run = started(
+        """
         plot: p
         states:
           one: {choice: [{when: (p), to: two}, none]}
@@ -135,7 +136,9 @@ def test_connectors_may_follow_each_other():
           none:
           both:
           one_only:
-    """, facts=[Fact("p"), Fact("q")])
+    """,
+        facts=[Fact("p"), Fact("q")],
+    )
     assert run.active == ["both"]
 
 
@@ -172,8 +175,10 @@ def test_without_anything_passed_the_states_own_arguments_count():
 
 
 def test_an_output_has_its_initial_value_until_it_is_assigned():
-    run = started("{plot: p, variables: {w: symbol}, states: {h: {use: q, on: {done: {to: e, assign: {w: ?event.o}}}}, e: }}",
-                  "{plot: q, outputs: {o: {type: symbol, initial: none}}, states: {a: {final: true}}}")
+    run = started(
+        "{plot: p, variables: {w: symbol}, states: {h: {use: q, on: {done: {to: e, assign: {w: ?event.o}}}}, e: }}",
+        "{plot: q, outputs: {o: {type: symbol, initial: none}}, states: {a: {final: true}}}",
+    )
     assert run.variables()["w"] == "none"
 
 
@@ -187,10 +192,15 @@ def test_what_is_passed_is_for_the_target_alone():
 
 
 def test_what_is_passed_reaches_the_candidates_of_a_dynamic_state():
-    library = Library(map(plot, (
-        "{plot: p, states: {a: {on: {go: {to: d, pass: {n: ?event.n}}}}, d: {dynamic: [q], with: {n: 0}, on: {no_candidate: none}}, none: }}",
-        "{plot: q, parameters: {n: number}, when: (> ?n 3), states: {s: }}",
-    )))
+    library = Library(
+        map(
+            plot,
+            (
+                "{plot: p, states: {a: {on: {go: {to: d, pass: {n: ?event.n}}}}, d: {dynamic: [q], with: {n: 0}, on: {no_candidate: none}}, none: }}",
+                "{plot: q, parameters: {n: number}, when: (> ?n 3), states: {s: }}",
+            ),
+        )
+    )
     knowledge = KnowledgeBase(Schema.parse("(define (domain d))"))
     for n, active in ((7, ("d", "d/s")), (2, ("none",))):
         machine = Machine(library)
@@ -201,8 +211,10 @@ def test_what_is_passed_reaches_the_candidates_of_a_dynamic_state():
 
 
 def test_what_cannot_be_passed_is_an_error_of_the_plot():
-    run = started("{plot: p, states: {a: {on: {go: {to: h, pass: {x: ?event.nothing}}}}, h: {use: q, on: {error: e}}, e: }}",
-                  "{plot: q, parameters: {x: {type: number, default: 5}}, states: {s: }}")
+    run = started(
+        "{plot: p, states: {a: {on: {go: {to: h, pass: {x: ?event.nothing}}}}, h: {use: q, on: {error: e}}, e: }}",
+        "{plot: q, parameters: {x: {type: number, default: 5}}, states: {s: }}",
+    )
     run.send("go")
     assert run.active == ["e"]
 
@@ -211,7 +223,7 @@ def test_what_cannot_be_passed_is_an_error_of_the_plot():
 
 PLAYER = """
     plot: p
-    profile: scxml
+    dialect: scxml
     states:
       off: {on: {on: h, fresh: {to: h, clear: player}, all: {to: h, clear: "player*"}}}
       player:
@@ -257,7 +269,7 @@ def test_a_star_clears_all_levels_below():
 def test_an_orthogonal_state_is_cleared_with_the_histories_of_its_regions():
     run = started("""
         plot: p
-        profile: scxml
+        dialect: scxml
         states:
           out: {on: {in: {to: h, also: [h2], clear: o}}}
           o:

@@ -6,12 +6,12 @@ import pytest
 from dsc_charts import Run, plot
 
 from dsc import Component, Outcome, Sequencer, event, skill, validate_plot
+from dsc.drawing import draw
 from dsc.dynamic.library import Library
 from dsc.engine.steps import SetParameter
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.testing.coverage import Coverage
-from dsc.text.diagram import draw
-from dsc.text.plots import parse_plot, plot_to_yaml
+from dsc.text.plot_files import parse_plot, plot_to_yaml
 from knowledge_base import KnowledgeBase
 from knowledge_base.facts import Fact
 from knowledge_base.world.schema import Schema
@@ -258,7 +258,10 @@ def test_a_right_handler_has_no_findings(handler):
         ("{on: low, do: {use: say, with: {txt: a}}}", "has no parameter 'txt'"),
         ("{on: low, do: {use: say, with: {text: ?event.lvel}}}", "no variable '?event.lvel'"),
         ("{on: low, when: (< ?event.lvel 3), do: {use: say}}", "event.lvel"),
-        ("{on: low, do: {use: say, with: {text: ?event.level}}}", "'text' is of type text, and ?event.level is of type number"),
+        (
+            "{on: low, do: {use: say, with: {text: ?event.level}}}",
+            "'text' is of type text, and ?event.level is of type number",
+        ),
         ("{on: low, do: {use: say, with: {text: a, loud: 3}}}", "'loud' is of type boolean, and 3 is of type number"),
         ("{on: poor, do: {use: say}}", "nothing here fires the event 'poor'"),
         ("{on: low, interrupt: true, do: {tell: (p)}}", "interrupts nothing"),

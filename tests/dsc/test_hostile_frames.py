@@ -17,7 +17,7 @@ from dsc.components import endpoint as endpoints
 from dsc.components import hosted, reports
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
-from dsc.components.pushing import Subscription
+from dsc.components.publication import Subscription
 from dsc.components.remote import CONDITION, Host, RemoteComponent
 from dsc.components.streams import Push, Stream
 from dsc.components.transport import EVERYBODY, LocalTransport
@@ -86,7 +86,18 @@ FRAMES = (
     st.binary(max_size=30)
     | PLAIN.map(lambda value: json.dumps(value).encode())
     | SAID.map(lambda said: json.dumps(said).encode())
-    | st.sampled_from([b"[" * 100_000, b'{"n":' * 50_000, b"1" * 5_000, b'{"what": "call"', b"\xff\xfe", b"\x00", b'"\\ud800"', b"NaN"])
+    | st.sampled_from(
+        [
+            b"[" * 100_000,
+            b'{"n":' * 50_000,
+            b"1" * 5_000,
+            b'{"what": "call"',
+            b"\xff\xfe",
+            b"\x00",
+            b'"\\ud800"',
+            b"NaN",
+        ]
+    )
 )
 
 
@@ -227,7 +238,10 @@ def test_unclaimed_actions_are_bounded_and_those_going_on_too(monkeypatch):
     run_simulated(main())
 
 
-@pytest.mark.parametrize(("name", "why"), [("exits", "SystemExit: the driver"), ("closes", "GeneratorExit"), ("cancels", "its task was cancelled")])
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("exits", "SystemExit: the driver"), ("closes", "GeneratorExit"), ("cancels", "its task was cancelled")],
+)
 def test_a_skill_that_exits_does_not_end_its_host(name, why):
     async def main():
         transport, clock = LocalTransport(), LoopClock()
@@ -263,7 +277,9 @@ class Flooding(Component):
         self.times = times
 
     def step(self, n):
-        return Outcome("step", {"n": n}, Delta(nodes={f"cup{n}": "item"}, added=(fact("seen", f"cup{n}"),) if n % 10 else ()))
+        return Outcome(
+            "step", {"n": n}, Delta(nodes={f"cup{n}": "item"}, added=(fact("seen", f"cup{n}"),) if n % 10 else ())
+        )
 
     @skill(outcomes={"ok": {}, "step": {"n": "number"}})
     async def floods(self, call):
@@ -308,7 +324,12 @@ def test_conflated_observations_come_to_the_same_knowledge(monkeypatch):
     monkeypatch.setattr(reports, "MOST_WAITING", 2)
     posted = []
     aside = reports.Reports(lambda outcome, conflated: posted.append((outcome, conflated)))
-    deltas = [Delta(added=(fact("p"),)), Delta(removed=(fact("p"),)), Delta(added=(fact("q"),)), Delta(removed=(fact("q"),), added=(fact("p"),))]
+    deltas = [
+        Delta(added=(fact("p"),)),
+        Delta(removed=(fact("p"),)),
+        Delta(added=(fact("q"),)),
+        Delta(removed=(fact("q"),), added=(fact("p"),)),
+    ]
     for n, delta in enumerate(deltas * 200):
         aside.put(Outcome("ab"[n % 2], {"n": n}, delta))
     aside.flush()

@@ -13,11 +13,11 @@ from dsc_runs import SCHEMA, Ran
 
 from dsc.blocking import StoppedError
 from dsc.calls import Outcome
+from dsc.components.behaviour_trees import action, condition, sequence, tree_skill
 from dsc.components.component import Component
 from dsc.components.ports import takes
-from dsc.components.trees import action, condition, sequence, tree_skill
 from dsc.dynamic.library import Library
-from dsc.sequencer import dispatcher, ends
+from dsc.sequencer import dispatcher, outcome_checks
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.plot_skill import PlotComponent
 from dsc.sequencer.sequencer import Sequencer
@@ -246,9 +246,12 @@ def test_the_time_limit_holds_even_if_the_handler_of_ends_fails(broken_part, mon
     def fails(*_):
         raise RuntimeError("a fault of our own")
 
-    for module in (dispatcher, ends):
+    for module in (dispatcher, outcome_checks):
         monkeypatch.setattr(module, broken_part, fails)
-    ran = Ran(ANSWERS.replace("SKILL", "awaited"), arm=Hostile(raising(NoTextError) if broken_part == "broken" else lambda: Outcome("ok")))
+    ran = Ran(
+        ANSWERS.replace("SKILL", "awaited"),
+        arm=Hostile(raising(NoTextError) if broken_part == "broken" else lambda: Outcome("ok")),
+    )
     (event,) = answers(ran)
     assert event["name"] == ("timed_out" if broken_part == "broken" else "skill_error")
     assert ran.at == (100 if broken_part == "broken" else 0)
@@ -383,7 +386,9 @@ def test_a_skill_that_blocked_the_loop_past_its_limit_has_timed_out_in_real_time
 
     async def main():
         clock = LoopClock()
-        sequencer = Sequencer(Library([plot(SHORT.replace("SKILL", "awaited"))]), KnowledgeBase(SCHEMA), [Hostile(blocks)], clock)
+        sequencer = Sequencer(
+            Library([plot(SHORT.replace("SKILL", "awaited"))]), KnowledgeBase(SCHEMA), [Hostile(blocks)], clock
+        )
         sequencer.listen(lambda step: heard.extend(micro.event.name for micro in step.microsteps if micro.event))
         await sequencer.run("p")
 

@@ -11,8 +11,8 @@ from dsc_runs import SCHEMA
 
 from dsc.blocking import BlockingCall
 from dsc.calls import Outcome
+from dsc.components.behaviour_trees import action, sequence, tree_skill
 from dsc.components.ports import event, query, takes
-from dsc.components.trees import action, sequence, tree_skill
 from dsc.dynamic.library import Library
 from dsc.events import Event
 from dsc.sequencer.plot_skill import PlotComponent
@@ -202,29 +202,37 @@ def test_an_event_is_activated_again_and_what_holds_then_is_told(tmp_path):
 
 
 def test_a_query_is_asked_again(tmp_path):
-    whole = crashes(tmp_path, """
+    whole = crashes(
+        tmp_path,
+        """
         plot: p
         states:
           a: {entry: [{trigger: robot.count}], on: {answered: [{to: b, when: (= ?event.n 7)}]}}
           b: {entry: [{trigger: robot.work}], on: {did: e}}
           e: {final: true}
-    """)
+    """,
+    )
     for what, run in whole.resumed():
         assert run.outcome() == whole.whole.outcome(), what
 
 
 @pytest.mark.parametrize("name", ["block", "climb"])
 def test_blocking_skills_and_behaviour_trees_are_done_again_if_they_say_so(tmp_path, name):
-    whole = crashes(tmp_path, f"""
+    whole = crashes(
+        tmp_path,
+        f"""
         plot: p
         states:
           a: {{entry: [{{trigger: robot.{name}}}], after: {{seconds: 1.5, do: [{{tell: (told)}}]}}, on: {{did: b}}}}
           b: {{entry: [{{trigger: robot.work}}], on: {{did: e}}}}
           e: {{final: true}}
-    """)
+    """,
+    )
     assert whole.whole.end.finished
     for what, run in whole.resumed():
-        assert (run.end, run.facts, run.robot.done) == (whole.whole.end, whole.whole.facts, whole.whole.robot.done), what
+        assert (run.end, run.facts, run.robot.done) == (whole.whole.end, whole.whole.facts, whole.whole.robot.done), (
+            what
+        )
 
 
 class Composed(PlotComponent):
@@ -248,14 +256,18 @@ class Composed(PlotComponent):
 
 
 def test_a_plot_that_is_a_skill_is_done_again_if_it_says_so(tmp_path):
-    whole = Crashes(tmp_path, """
+    whole = Crashes(
+        tmp_path,
+        """
         plot: p
         variables: {halves: {type: number, initial: 0}}
         states:
           a: {entry: {trigger: robot.twice}, on: {half: {assign: {halves: (+ ?halves 1)}}, completed: [{to: e, when: (= ?halves 1)}, wrong]}}
           wrong:
           e: {final: true}
-    """, make=Composed)
+    """,
+        make=Composed,
+    )
     assert whole.whole.end.finished
     assert list(whole.whole.robot.done.values()) == [1, 2]
     for what, run in whole.resumed():
@@ -263,14 +275,17 @@ def test_a_plot_that_is_a_skill_is_done_again_if_it_says_so(tmp_path):
 
 
 def test_a_skill_that_was_not_believed_is_stopped_even_if_the_crash_came_first(tmp_path):
-    whole = crashes(tmp_path, """
+    whole = crashes(
+        tmp_path,
+        """
         plot: p
         states:
           a: {entry: [{trigger: robot.sees_nonsense}], on: {skill_error: b, seen: wrong}}
           b: {entry: [{trigger: robot.work}], on: {did: e}}
           wrong:
           e: {final: true}
-    """)
+    """,
+    )
     assert whole.whole.end.finished
     abandoned = []
     for what, run in whole.resumed():

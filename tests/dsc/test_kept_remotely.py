@@ -158,7 +158,9 @@ def test_a_run_does_not_hear_of_what_another_program_has_left_there():
             mortal = Mortal(transport)
             remote = await RemoteComponent.connect("robot", mortal)
             chart = f"{{plot: p, states: {{a: {{entry: [{{trigger: robot.work, with: {{name: {name}}}}}], on: {{did: e}}}}, e: {{final: true}}}}}}"
-            running = asyncio.create_task(Sequencer(Library([plot(chart)]), KnowledgeBase(SCHEMA), [remote], clock).run("p"))
+            running = asyncio.create_task(
+                Sequencer(Library([plot(chart)]), KnowledgeBase(SCHEMA), [remote], clock).run("p")
+            )
             if dies:
                 await clock.sleep(1)
                 mortal.dead = True

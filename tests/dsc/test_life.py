@@ -11,7 +11,7 @@ from dsc_runs import ran
 
 from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
-from dsc.components.life import Life, LifeCycle
+from dsc.components.life_cycle import Life, LifeCycle
 from dsc.dynamic.library import Library
 from dsc.events import Event
 from dsc.sequencer.clock import LoopClock, run_simulated

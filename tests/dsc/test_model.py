@@ -24,7 +24,7 @@ from dsc.model.states import (
     SubmachineState,
 )
 from dsc.model.transitions import Transition
-from dsc.text.plots import parse_plot, plot_to_yaml
+from dsc.text.plot_files import parse_plot, plot_to_yaml
 from knowledge_base.errors import InputError
 from knowledge_base.language.effect import Add, When
 from knowledge_base.language.expression import TRUE, And, Arithmetic, Atom, Comparison, Constant, Not, Variable
@@ -269,13 +269,28 @@ def test_what_is_no_plot_is_refused(form):
     ("form", "said"),
     [
         ({"plot": "p", "stats": {}, "states": {"s": {}}}, "stats: unknown key 'stats'; did you mean 'states'?"),
-        ({"plot": "p", "states": {"s": {"on": {"e": [{"too": "s"}]}}}}, "states.s.on.e.0.too: unknown key 'too'; did you mean 'to'?"),
-        ({"plot": "p", "states": {"s": {"entry": ({"trigger": "a.b", "wihtin": 3},)}}}, "states.s.entry.0.wihtin: unknown key 'wihtin'; did you mean 'within'?"),
-        ({"plot": "p", "states": {"s": {"entry": {"triger": "a.b"}}}}, "states.s.entry: one of the keys trigger, set, switch,"),
+        (
+            {"plot": "p", "states": {"s": {"on": {"e": [{"too": "s"}]}}}},
+            "states.s.on.e.0.too: unknown key 'too'; did you mean 'to'?",
+        ),
+        (
+            {"plot": "p", "states": {"s": {"entry": ({"trigger": "a.b", "wihtin": 3},)}}},
+            "states.s.entry.0.wihtin: unknown key 'wihtin'; did you mean 'within'?",
+        ),
+        (
+            {"plot": "p", "states": {"s": {"entry": {"triger": "a.b"}}}},
+            "states.s.entry: one of the keys trigger, set, switch,",
+        ),
         ({"plot": "p", "when": "(and (p", "states": {"s": {}}}, "when: "),
-        ({"plot": "p", "when": 5, "states": {"s": {}}}, "when: a condition was expected, as text such as (on ?o table); found 5"),
+        (
+            {"plot": "p", "when": 5, "states": {"s": {}}},
+            "when: a condition was expected, as text such as (on ?o table); found 5",
+        ),
         ({"plot": "p"}, "the key 'states' is missing"),
-        ({"plot": "p", "states": {"s": {"states": {"s": {}}}}}, "states.s.states.s: two states are named 's'; names are unique in a plot"),
+        (
+            {"plot": "p", "states": {"s": {"states": {"s": {}}}}},
+            "states.s.states.s: two states are named 's'; names are unique in a plot",
+        ),
         ("plot: p", "a mapping was expected; found 'plot: p'"),
         (None, "a mapping was expected; found nothing"),
     ],
@@ -366,7 +381,15 @@ def test_the_branches_of_a_choice_are_transitions_in_order():
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("1.0", 1), ("-0.0", 0), ("1e16", 10**16), ("1.50", 1.5), ("9007199254740993", 2**53 + 1), ("1" * 30, int("1" * 30)), ('"-0"', 0)],
+    [
+        ("1.0", 1),
+        ("-0.0", 0),
+        ("1e16", 10**16),
+        ("1.50", 1.5),
+        ("9007199254740993", 2**53 + 1),
+        ("1" * 30, int("1" * 30)),
+        ('"-0"', 0),
+    ],
 )
 def test_a_number_as_a_case_is_that_number_after_writing_and_reading_too(key, value):
     made = parse_plot(f"plot: p\nstates:\n  s: {{select: 1, cases: {{{key}: t}}, else: t}}\n  t:\n")
@@ -379,7 +402,9 @@ def test_a_case_is_a_number_of_any_size_and_never_infinite():
     form = {"plot": "p", "states": {"s": {"select": "?x", "cases": {10**400: "s"}, "else": "s"}}}
     assert list(ActionPlot.model_validate(form).states["s"].cases) == [str(10**400)]
     with pytest.raises(InputError, match="a case is text, a number or a truth value"):
-        ActionPlot.model_validate({"plot": "p", "states": {"s": {"select": "?x", "cases": {"1e400": "s"}, "else": "s"}}})
+        ActionPlot.model_validate(
+            {"plot": "p", "states": {"s": {"select": "?x", "cases": {"1e400": "s"}, "else": "s"}}}
+        )
 
 
 def test_the_cases_of_a_select_are_guarded_by_their_values():

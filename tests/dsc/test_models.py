@@ -7,8 +7,8 @@ import pytest
 from domains.clean_up_table.deployment import deploy
 from domains.clean_up_table.deployment import plots as table_plots
 from dsc.dynamic.library import Library
-from dsc.models import MODELS, described
-from dsc.text.plots import parse_plot
+from dsc.reflection import MODELS, design_facts
+from dsc.text.plot_files import parse_plot
 from knowledge_base import KnowledgeBase
 
 
@@ -17,7 +17,7 @@ def kb() -> KnowledgeBase:
     with deploy().executive as robot:
         skills = [signature for component in robot.components for signature in component.skills().values()]
         kb = KnowledgeBase(robot.domain.schema.merged(MODELS))
-        kb.apply(described(robot.library, skills), author="design")
+        kb.apply(design_facts(robot.library, skills), author="design")
     return kb
 
 
@@ -31,10 +31,12 @@ def test_which_plots_carry_out_an_action(kb) -> None:
 
 
 def test_who_offers_what_may_fail_like_that_and_which_plot_answers(kb) -> None:
-    failing = "(and (emits ?s \"grasp_failed\") (skill ?s) (offers ?c ?s))"
+    failing = '(and (emits ?s "grasp_failed") (skill ?s) (offers ?c ?s))'
     assert named(kb, failing, "c") == {"component:arm"}
     assert "plot:clean_up_table" in named(kb, '(answers ?p "grasp_failed" ?how)', "p")
-    assert kb.ask('(forall (?s - skill) (imply (emits ?s "grasp_failed") (exists (?p - action-plot) (triggers ?p ?s))))')
+    assert kb.ask(
+        '(forall (?s - skill) (imply (emits ?s "grasp_failed") (exists (?p - action-plot) (triggers ?p ?s))))'
+    )
 
 
 def test_which_rule_answers_what_and_what_it_leads_to(kb) -> None:
@@ -47,7 +49,7 @@ def test_which_rule_answers_what_and_what_it_leads_to(kb) -> None:
 def test_insertions_and_handlers_are_known_too() -> None:
     plots = [parse_plot(text) for text in (PATROL, "{plot: wipe, states: {e: {final: true}}}")]
     kb = KnowledgeBase(MODELS)
-    kb.apply(described(Library(plots)), author="design")
+    kb.apply(design_facts(Library(plots)), author="design")
     assert named(kb, '(and (rule ?r) (concerns ?r "look") (runs ?r plot:wipe))', "r") == {"rule:patrol.1"}
     assert named(kb, '(and (handler ?h) (reacts-to ?h "low"))', "h") == {"handler:patrol.1"}
     assert kb.ask("(and (triggers plot:patrol skill:battery.low) (uses plot:patrol plot:wipe))")

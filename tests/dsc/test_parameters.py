@@ -13,7 +13,7 @@ from dsc.components.parameters import Parameter
 from dsc.profiles import configure
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import RunEnd
-from dsc.text.profiles import parse_profile
+from dsc.text.profile_files import parse_profile
 from knowledge_base import InputError, KnowledgeBase
 from knowledge_base.world.schema import Schema
 
@@ -126,7 +126,9 @@ def test_names_of_components_alone_say_nothing_about_their_parameters():
 
 
 def a_class(relations=(), **declares):
-    return type("Crane", (Component,), {"name": "crane", "declares": declares, "relations": relations, "__module__": __name__})
+    return type(
+        "Crane", (Component,), {"name": "crane", "declares": declares, "relations": relations, "__module__": __name__}
+    )
 
 
 @pytest.mark.parametrize(
@@ -134,11 +136,23 @@ def a_class(relations=(), **declares):
     [
         (Parameter("number", default=5, least=10), "the default of parameter 'crane.lift' is 5, but it is 10 or more"),
         (Parameter("number", default="fast"), "the default of parameter 'crane.lift' is fast, but it is a number"),
-        (Parameter("text", default="upp", among=("up", "down")), "is upp, but it is one of up, down; did you mean 'up'?"),
-        (Parameter("number", default=5, least=9, most=1), "parameter 'crane.lift': no number is 9 or more and 1 or less"),
+        (
+            Parameter("text", default="upp", among=("up", "down")),
+            "is upp, but it is one of up, down; did you mean 'up'?",
+        ),
+        (
+            Parameter("number", default=5, least=9, most=1),
+            "parameter 'crane.lift': no number is 9 or more and 1 or less",
+        ),
         (Parameter("text", least=1), "`least` and `most` are about numbers, and this is a text"),
-        (Parameter("nmber", default=5), "the type of parameter 'crane.lift' is 'nmber', which is none; did you mean 'number'?"),
-        (Parameter("number", default=5, changed_by="operater"), "'operater', which is nobody's role; did you mean 'operator'?"),
+        (
+            Parameter("nmber", default=5),
+            "the type of parameter 'crane.lift' is 'nmber', which is none; did you mean 'number'?",
+        ),
+        (
+            Parameter("number", default=5, changed_by="operater"),
+            "'operater', which is nobody's role; did you mean 'operator'?",
+        ),
     ],
 )
 def test_a_parameter_that_cannot_be_meant_is_refused_with_its_file(declared, said):
@@ -151,7 +165,10 @@ def test_a_parameter_that_cannot_be_meant_is_refused_with_its_file(declared, sai
 @pytest.mark.parametrize(
     ("relations", "said"),
     [
-        (("(< ?lft 3)",), "the relation (< ?lft 3) of component 'crane' reads '?lft', which it does not declare; did you mean 'lift'?"),
+        (
+            ("(< ?lft 3)",),
+            "the relation (< ?lft 3) of component 'crane' reads '?lft', which it does not declare; did you mean 'lift'?",
+        ),
         (("(< ?lift 3",), "the relation (< ?lift 3 of component 'crane' is no condition"),
         ("(< ?lift 3)", "`relations` of component 'crane' is a tuple of conditions, not one text"),
     ],
@@ -214,7 +231,9 @@ def test_what_follows_is_in_its_range_or_nothing_changes():
 
 def test_a_profile_binds_what_relies_on_each_other_at_once():
     made = axle()
-    with pytest.raises(InputError, match=r"'axle\.label' has no value: .* what is said of it is void when 'period' is said anew"):
+    with pytest.raises(
+        InputError, match=r"'axle\.label' has no value: .* what is said of it is void when 'period' is said anew"
+    ):
         configure([made])
     configure([made], parse_profile("profile: p\ncomponents: {axle: {label: x, worst: 9, processor: b}}"))
     assert made.parameters == {"period": 18, "processor": "b", "worst": 9, "label": "x"}
@@ -223,9 +242,15 @@ def test_a_profile_binds_what_relies_on_each_other_at_once():
 @pytest.mark.parametrize(
     ("declared", "said"),
     [
-        (Parameter("number", follows="(* 2 ?lft)"), "parameter 'crane.lift' relies on 'lft', which is not declared; did you mean 'lift'?"),
+        (
+            Parameter("number", follows="(* 2 ?lft)"),
+            "parameter 'crane.lift' relies on 'lft', which is not declared; did you mean 'lift'?",
+        ),
         (Parameter("number", default=1, depends_on=("lft",)), "relies on 'lft', which is not declared"),
-        (Parameter("number", follows="(* 2 ?lift)"), "parameters of component 'crane' rely on each other in a circle: 'lift', 'lift'"),
+        (
+            Parameter("number", follows="(* 2 ?lift)"),
+            "parameters of component 'crane' rely on each other in a circle: 'lift', 'lift'",
+        ),
         (Parameter("number", default=1, follows="2"), "has a default and follows from others"),
         (Parameter("number", follows="(* 2"), "is no term"),
         (Parameter("number", follows="2", most=1), "'crane.lift' is 1 or less; found 2"),

@@ -15,7 +15,7 @@ from dsc.components.parameters import Parameter
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.replay import replay
-from dsc.text.plots import plot_to_yaml
+from dsc.text.plot_files import plot_to_yaml
 from knowledge_base import InputError, KnowledgeBase
 from knowledge_base.world.schema import Schema
 
@@ -77,12 +77,23 @@ def test_rules_hand_what_is_left_to_them(who, allowed):
 
 
 def test_rules_pass_to_steps_of_plans_what_is_left_to_them():
-    drive = parse_plot("plot: drive\nimplements: go\nparameters: {speed: {type: number, default: 1, most: 2, changed_by: WHO}}\nemits: {blocked: }\nstates: {b: {on: {done: {to: f, emit: blocked}}}, f: {final: true}}".replace("WHO", "rules"))
+    drive = parse_plot(
+        "plot: drive\nimplements: go\nparameters: {speed: {type: number, default: 1, most: 2, changed_by: WHO}}\nemits: {blocked: }\nstates: {b: {on: {done: {to: f, emit: blocked}}}, f: {final: true}}".replace(
+            "WHO", "rules"
+        )
+    )
     text = "plot: p\nstates:\n  a: {goal: (x), on: {done: e, no_plan: e, gave_up: e}}\n  e: {final: true}\nrules:\n  - {on: blocked, do: {then: retry, pass: {speed: 1}}}\n"
     assert findings(parse_plot(text), drive) == []
     (finding,) = findings(parse_plot(text.replace("speed: 1", "speed: 3"), "p.yaml"), drive)
     assert "p.yaml:6:44: 'drive.speed' is 2 or less; found 3" in finding
-    (finding,) = findings(parse_plot(text), parse_plot(drive.text.replace('"changed_by":"rules"', '"changed_by":"operator"').replace('"changed_by": "rules"', '"changed_by": "operator"')))
+    (finding,) = findings(
+        parse_plot(text),
+        parse_plot(
+            drive.text.replace('"changed_by":"rules"', '"changed_by":"operator"').replace(
+                '"changed_by": "rules"', '"changed_by": "operator"'
+            )
+        ),
+    )
     assert "'drive.speed' is not changed by rules, but by operator" in finding
 
 
@@ -124,7 +135,9 @@ def test_another_default_is_another_text():
 
 
 def test_what_only_the_run_knows_is_checked_when_the_plot_is_entered():
-    holder = USING.replace("plot: p\n", "plot: p\nvariables: {n: {type: number, initial: 70}}\n").replace("WITH", "seconds: ?n")
+    holder = USING.replace("plot: p\n", "plot: p\nvariables: {n: {type: number, initial: 70}}\n").replace(
+        "WITH", "seconds: ?n"
+    )
     ran = Ran(holder, WAIT.replace("WHO", "plots"))
     assert not ran.end.finished
     assert "'wait.seconds' is from 1 to 60; found 70" in ran.end.problem

@@ -12,8 +12,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from dsc.cli import app
-from dsc.components.named import robot_of
-from dsc.text.plots import parse_plot
+from dsc.components.factories import robot_of
+from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
 
 ROOT = Path(__file__).parents[2]

@@ -6,7 +6,7 @@ from dsc_charts import plot
 from typer.testing import CliRunner
 
 from dsc.cli import app
-from dsc.text.difference import differences, draw_difference
+from dsc.text.plot_difference import differences, draw_difference
 
 OLD = """
 plot: p

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from dsc import Component, parse_plot
 from dsc.cli import app
 from dsc.profiles import adapted, configure
-from dsc.text.profiles import find_profile, parse_profile, profile_schema
+from dsc.text.profile_files import find_profile, parse_profile, profile_schema
 from dsc.text.yaml import load_document
 from knowledge_base import InputError
 
@@ -103,7 +103,10 @@ def test_values_for_plots_fit_too(plots, said):
         ("profile: p\nprofile: q\n", "sim.yaml:2:1: not readable as YAML: duplicate key"),
         ("profile: p\ncomponent: {}\n", "sim.yaml:2:1: unknown key 'component'; did you mean 'components'?"),
         ("components: {}\n", "the key 'profile' is missing"),
-        ("profile: p\ncomponents: {base: {speed: [1]}}\n", "sim.yaml:2:21: a number, a text or a truth value was expected"),
+        (
+            "profile: p\ncomponents: {base: {speed: [1]}}\n",
+            "sim.yaml:2:21: a number, a text or a truth value was expected",
+        ),
         ("profile: p\ncomponents: {base: {speed: .nan}}\n", "sim.yaml:2:21: a finite number was expected; found nan"),
         ("profile: p\nplots: {wait: {seconds: .inf}}\n", "sim.yaml:2:16: a finite number was expected; found inf"),
         ("profile: p\ncomponents: {base: fast}\n", "sim.yaml:2:14: a mapping of names was expected"),

@@ -68,7 +68,10 @@ def test_another_chart_diverges_where_it_does_something_else(tmp_path):
 def test_a_chart_that_tells_something_else_diverges(tmp_path):
     run = Run(tmp_path, [GUARDED])
     done = replay(run.path, library=Library([plot(GUARDED.replace("tell: (told)", "tell: (and (told) (q))"))]))
-    assert str(done.divergence) == 'step 2: what was told was: {"added":[["p"]]}; {"added":[["told"]]}; now: {"added":[["p"]]}; {"added":[["told"],["q"]]}'
+    assert (
+        str(done.divergence)
+        == 'step 2: what was told was: {"added":[["p"]]}; {"added":[["told"]]}; now: {"added":[["p"]]}; {"added":[["told"],["q"]]}'
+    )
 
 
 def test_a_chart_that_does_not_start_what_answered_diverges(tmp_path):

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from dsc.cli import app
 from dsc.dynamic.library import Library
-from dsc.text.neighbours import Neighbours
-from dsc.text.plots import load_plot, parse_plot
+from dsc.text.plot_files import load_plot, parse_plot
+from dsc.text.plot_folder import Neighbours
 from dsc.validation import review_plot, validate_plot
 
 ROOT = Path(__file__).parents[2]
@@ -108,7 +108,12 @@ def test_a_rule_for_what_every_state_answers_itself_can_never_answer():
     (warning,) = about_rules("{on: lost, do: {then: e}}", holder=holder)
     assert "every state that can end with 'lost' answers it itself" in warning
     guarded = HOLDER.replace("b: {use: step, on: {done: e", "b: {use: step, on: {done: e, lost: {to: e, when: (p)}")
-    assert about_rules("{on: lost, do: {then: e}}", holder=guarded.replace("a: {use: step, on: {", "a: {use: step, on: {lost: e, ")) == []
+    assert (
+        about_rules(
+            "{on: lost, do: {then: e}}", holder=guarded.replace("a: {use: step, on: {", "a: {use: step, on: {lost: e, ")
+        )
+        == []
+    )
 
 
 def test_a_rule_that_leads_to_a_state_comes_before_others_in_plans_too():
@@ -122,15 +127,23 @@ def test_a_rule_that_leads_to_a_state_comes_before_others_in_plans_too():
 
 @pytest.mark.parametrize(
     "ways",
-    ["[e, {to: f}]", "[{to: e, when: (p)}, {to: f, when: (and (p) (q))}]", "[{to: e, when: (p)}, {to: e, when: (not (p))}, f]"],
+    [
+        "[e, {to: f}]",
+        "[{to: e, when: (p)}, {to: f, when: (and (p) (q))}]",
+        "[{to: e, when: (p)}, {to: e, when: (not (p))}, f]",
+    ],
 )
 def test_a_transition_that_is_never_taken_is_found(ways):
-    (warning,) = warnings_of(f"plot: p\nstates:\n  a:\n    on: {{x: {ways}}}\n  e: {{final: true}}\n  f: {{final: true}}\n")
+    (warning,) = warnings_of(
+        f"plot: p\nstates:\n  a:\n    on: {{x: {ways}}}\n  e: {{final: true}}\n  f: {{final: true}}\n"
+    )
     assert "transition on 'x' out of 'a' is never taken" in warning
 
 
 def test_transitions_on_other_events_do_not_count():
-    assert warnings_of("plot: p\nstates:\n  a: {on: {x: e, y: e}, always: {to: e, when: (p)}}\n  e: {final: true}\n") == []
+    assert (
+        warnings_of("plot: p\nstates:\n  a: {on: {x: e, y: e}, always: {to: e, when: (p)}}\n  e: {final: true}\n") == []
+    )
 
 
 # -- candidates --------------------------------------------------------------------------------------------
@@ -199,15 +212,24 @@ def test_plots_for_the_steps_of_plans_that_leave_a_gap():
 
 def test_of_what_is_too_large_to_decide_nothing_is_said():
     ways = ", ".join(f"{{to: e, when: (= ?x {n})}}" for n in range(2_000))
-    assert warnings_of(f"plot: p\nvariables: {{x: number}}\nstates: {{a: {{on: {{x: [{ways}]}}}}, e: {{final: true}}}}\n") == []
+    assert (
+        warnings_of(f"plot: p\nvariables: {{x: number}}\nstates: {{a: {{on: {{x: [{ways}]}}}}, e: {{final: true}}}}\n")
+        == []
+    )
     many = " ".join(f"(p {n})" for n in range(10_000))
-    assert about_rules(f"{{on: lost, when: (and {many}), do: {{then: e}}}}", "{on: lost, when: (p 1), do: {then: e}}") == []
+    assert (
+        about_rules(f"{{on: lost, when: (and {many}), do: {{then: e}}}}", "{on: lost, when: (p 1), do: {then: e}}")
+        == []
+    )
     assert about_candidates(*(candidate(f"c{n}", f"(= (f) {n})") for n in range(500))) == []
 
 
 def test_rules_and_handlers_that_would_make_too_many_transitions_are_refused():
     states = "".join(f"  s{n}: {{on: {{go: s{n + 1}}}}}\n" for n in range(600)) + "  s600: {final: true}\n"
-    text = f"plot: p\nreceives: {{go: , x: }}\nstates:\n{states}handlers:\n" + "  - {on: x, interrupt: true, do: {use: step}}\n" * 2
+    text = (
+        f"plot: p\nreceives: {{go: , x: }}\nstates:\n{states}handlers:\n"
+        + "  - {on: x, interrupt: true, do: {use: step}}\n" * 2
+    )
     made = parse_plot(text, "p.yaml")
     (finding,) = validate_plot(made, Library([made, STEP]))
     assert "the handlers would make 1202 transitions; at most 1000" in str(finding)
@@ -224,7 +246,11 @@ def test_nothing_is_said_about_shipped_plots(file):
 
 def test_nothing_is_said_about_plots_in_the_docs():
     pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
-    blocks = [block for page in pages for block in re.findall(r"^```yaml\n(plot:.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)]
+    blocks = [
+        block
+        for page in pages
+        for block in re.findall(r"^```yaml\n(plot:.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+    ]
     made = [parse_plot(block) for block in blocks]
     assert len(made) > 5
     for each in made:
@@ -237,7 +263,9 @@ def test_nothing_is_said_about_plots_in_the_docs():
 
 
 def test_the_command_gives_warnings_which_count_only_if_asked_to(tmp_path):
-    (tmp_path / "p.yaml").write_text("plot: p\nstates:\n  a:\n    on: {done: [e, {to: f}, {to: e}]}\n  e: {final: true}\n  f: {final: true}\n")
+    (tmp_path / "p.yaml").write_text(
+        "plot: p\nstates:\n  a:\n    on: {done: [e, {to: f}, {to: e}]}\n  e: {final: true}\n  f: {final: true}\n"
+    )
     runner = CliRunner()
     shown = runner.invoke(app, ["check", str(tmp_path / "p.yaml")])
     assert shown.exit_code == 0
@@ -262,7 +290,10 @@ def about_handlers(*handlers, text=HANDLING):
     "handlers",
     [
         ["{on: low, do: {use: step}}", "{on: low, do: {tell: (p)}}"],
-        ["{on: low, when: (< ?event.level 20), do: {use: step}}", "{on: low, when: (< ?event.level 10), do: {tell: (p)}}"],
+        [
+            "{on: low, when: (< ?event.level 20), do: {use: step}}",
+            "{on: low, when: (< ?event.level 10), do: {tell: (p)}}",
+        ],
         ["{on: low, interrupt: true, do: {use: step}}", "{on: low, interrupt: true, do: {use: step}}"],
         ["{on: low, when: (and (p) (not (p))), do: {tell: (p)}}"],
     ],

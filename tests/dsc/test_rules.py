@@ -11,7 +11,7 @@ from dsc.engine.situation import Decision
 from dsc.engine.steps import SetParameter
 from dsc.model.actions import Tell
 from dsc.model.states import SubmachineState
-from dsc.text.plots import parse_plot, plot_to_yaml
+from dsc.text.plot_files import parse_plot, plot_to_yaml
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Fact, fact
@@ -92,25 +92,36 @@ def test_rules_that_read_variables_of_their_plot_pass_the_validator():
 
 
 def said_of(*rules):
-    holder = parse_plot(HOLDER.replace("fine:\n", "fine: {final: true}\n").replace("given_up:\n", "given_up: {final: true}\n").replace(
-        "      elsewhere:\n", ""
-    ) + "".join(f"      - {rule}\n" for rule in rules))
+    holder = parse_plot(
+        HOLDER.replace("fine:\n", "fine: {final: true}\n")
+        .replace("given_up:\n", "given_up: {final: true}\n")
+        .replace("      elsewhere:\n", "")
+        + "".join(f"      - {rule}\n" for rule in rules)
+    )
     return [str(one) for one in validate_plot(holder, Library([holder, parse_plot(STEP), parse_plot(RECOVER)]))]
 
 
-@pytest.mark.parametrize(("rule", "often"), [("then: retry", 3), ("then: retry, limit: 5", 5), ("then: fine, limit: 2", 2)])
+@pytest.mark.parametrize(
+    ("rule", "often"), [("then: retry", 3), ("then: retry, limit: 5", 5), ("then: fine, limit: 2", 2)]
+)
 def test_a_rule_that_answers_only_so_often_is_said_to(rule, often):
     others = "{on: broken, do: {then: continue}}"
     (said,) = said_of(f"{{on: failed, do: {{{rule}}}}}", others)
     then = rule.split(",")[0].removeprefix("then: ")
-    assert f"'do_it' may not handle its outcome 'failed': the rule that answers it with '{then}' does so {often} times" in said
+    assert (
+        f"'do_it' may not handle its outcome 'failed': the rule that answers it with '{then}' does so {often} times"
+        in said
+    )
     assert f"add a last rule that does not '{then}'" in said
 
 
 def test_a_step_that_a_rule_always_replaces_is_said_to_be():
     ends = ("{on: failed, do: {then: continue}}", "{on: broken, do: {then: continue}}")
     said, _ = said_of("{before: do_it, do: {use: recover, then: continue}}", *ends)
-    assert "the rule 'before do_it: recover, continue' always takes the place of step 'do_it', which is never entered" in said
+    assert (
+        "the rule 'before do_it: recover, continue' always takes the place of step 'do_it', which is never entered"
+        in said
+    )
 
 
 def test_a_rule_before_a_plot_is_told_how_steps_are_named():
@@ -118,7 +129,9 @@ def test_a_rule_before_a_plot_is_told_how_steps_are_named():
     (said,) = said_of("{before: step, do: {use: recover}}", *ends)
     assert "'step' is a plot; a rule names steps by their state or planning action, here state 'do_it'" in said
     (said,) = said_of("{after: recover, do: {use: recover}}", *ends)
-    assert "'recover' is a plot; a rule names steps by their state or planning action, and no state here holds it" in said
+    assert (
+        "'recover' is a plot; a rule names steps by their state or planning action, and no state here holds it" in said
+    )
 
 
 def generated(rules=(), on="done: finished"):
@@ -134,7 +147,7 @@ def generated(rules=(), on="done: finished"):
       replan: {{final: true, emit: replan, with: {{reason: ?reason}}}}
       gave_up: {{final: true, emit: gave_up, with: {{reason: ?reason}}}}
     rules:
-{indented or '      []'}
+{indented or "      []"}
     """)
     host = plot("""
         plot: p
@@ -214,7 +227,9 @@ def test_a_limit_is_counted_for_each_state():
 
 def test_a_limit_begins_anew_when_the_plot_is_entered_anew():
     outer = plot("{plot: o, states: {h: {use: p, on: {again: h}}}}")
-    inner = plot(HOLDER + "      - {on: failed, do: {then: retry, limit: 1}}\n      - {on: failed, do: {then: elsewhere}}\n")
+    inner = plot(
+        HOLDER + "      - {on: failed, do: {then: retry, limit: 1}}\n      - {on: failed, do: {then: elsewhere}}\n"
+    )
     run = Run(outer, inner, plot(STEP))
     run.start()
     run.send("bad")
@@ -370,7 +385,9 @@ def test_a_rule_answers_where_a_states_own_guards_do_not_hold():
 
 
 def test_a_rule_may_be_for_certain_states():
-    run = run_of(["{on: failed, of: [other], do: {then: elsewhere}}", "{on: failed, of: [do_it], do: {then: continue}}"])
+    run = run_of(
+        ["{on: failed, of: [other], do: {then: elsewhere}}", "{on: failed, of: [do_it], do: {then: continue}}"]
+    )
     run.send("bad")
     assert run.active == ["fine"]
 
@@ -490,7 +507,7 @@ def test_a_recovery_takes_no_name_that_is_there_already():
 def test_a_rule_keeps_all_that_the_transition_it_takes_says():
     text = """
         plot: p
-        profile: scxml
+        dialect: scxml
         states:
           do_it: {use: step, on: {done: {to: next, pass: {item: cup2}, clear: box, also: [other], emit: e}}}
           next: {use: step}
@@ -549,7 +566,9 @@ def test_rules_leave_connectors_alone_and_their_names():
 
 @pytest.mark.parametrize(("then", "lacks"), [("give_up", "gave_up"), ("continue", "done")])
 def test_a_response_that_the_state_does_not_wire_is_refused_with_its_place(then, lacks):
-    text = "plot: p\nstates:\n  do_it: {use: step, on: {e: do_it}}\nrules:\n  - on: failed\n    do: {then: " + then + "}\n"
+    text = (
+        "plot: p\nstates:\n  do_it: {use: step, on: {e: do_it}}\nrules:\n  - on: failed\n    do: {then: " + then + "}\n"
+    )
     holder = plot(text, "p.yaml")
     with pytest.raises(SchemaError, match=f"does not wire '{lacks}'") as caught:
         Library([holder, plot(STEP)]).expanded(holder)
@@ -567,8 +586,6 @@ def test_a_rule_to_an_unknown_state_is_refused():
         run_of(["{on: failed, do: {then: elsewere}}"])
 
 
-
-
 # -- what is handed over, by type ------------------------------------------------------------------------------
 
 KINDS = """
@@ -584,9 +601,18 @@ KINDS = """
 @pytest.mark.parametrize(
     ("rule", "said"),
     [
-        ("{on: failed, do: {use: count, with: {n: ?event.item}, then: fine}}", "'n' is of type number, and ?event.item is of type item"),
-        ("{on: failed, do: {use: count, with: {n: ?step.item}, then: fine}}", "there is no variable '?step.item'"),  # no step is named
-        ("{on: failed, of: do_it, do: {use: count, with: {n: ?step.item}, then: fine}}", "'n' is of type number, and ?step.item is of type item"),
+        (
+            "{on: failed, do: {use: count, with: {n: ?event.item}, then: fine}}",
+            "'n' is of type number, and ?event.item is of type item",
+        ),
+        (
+            "{on: failed, do: {use: count, with: {n: ?step.item}, then: fine}}",
+            "there is no variable '?step.item'",
+        ),  # no step is named
+        (
+            "{on: failed, of: do_it, do: {use: count, with: {n: ?step.item}, then: fine}}",
+            "'n' is of type number, and ?step.item is of type item",
+        ),
         ("{on: failed, do: {then: retry, pass: {item: 3}}}", "'item' is of type item, and 3 is of type number"),
         ("{on: failed, do: {then: retry, pass: {item: ?event.item}}}", ""),
         ("{before: do_it, do: {use: count, with: {n: ?step.item}}}", "'n' is of type number"),

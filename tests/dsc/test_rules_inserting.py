@@ -9,7 +9,7 @@ from dsc.dynamic.library import Library
 from dsc.engine.situation import Decision
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
 from dsc.model.connectors import ChoiceState
-from dsc.text.plots import parse_plot, plot_to_yaml
+from dsc.text.plot_files import parse_plot, plot_to_yaml
 from knowledge_base.errors import InputError, SchemaError
 from knowledge_base.facts import Fact, fact
 from knowledge_base.language.expression import Constant
@@ -90,7 +90,10 @@ def test_it_is_asked_once_whenever_the_step_is_entered():
 
 def test_a_retry_enters_the_step_by_way_of_what_is_inserted():
     text = HOLDER.replace(", blurred: other", "")
-    rules = ["{on: blurred, do: {tell: (dirty lens), then: retry}}", "{before: step, when: (dirty lens), do: {use: wipe}}"]
+    rules = [
+        "{on: blurred, do: {tell: (dirty lens), then: retry}}",
+        "{before: step, when: (dirty lens), do: {use: wipe}}",
+    ]
     run = run_of(rules, text)
     run.send("go")
     assert run.active == ["step", "step/work"]
@@ -101,7 +104,10 @@ def test_a_retry_enters_the_step_by_way_of_what_is_inserted():
 
 
 def test_several_insertions_stand_one_behind_the_other():
-    rules = ["{before: step, when: (p), do: {use: wipe, with: {item: a}}}", "{before: step, when: (q), do: {use: wipe, with: {item: b}}}"]
+    rules = [
+        "{before: step, when: (p), do: {use: wipe, with: {item: a}}}",
+        "{before: step, when: (q), do: {use: wipe, with: {item: b}}}",
+    ]
     run = run_of(rules, facts=[Fact("p"), Fact("q")])
     assert SetParameter("arm", "wipes", "a") in run.send("go").output
     assert SetParameter("arm", "wipes", "b") in run.send("ok").output
@@ -112,14 +118,18 @@ def test_several_insertions_stand_one_behind_the_other():
 
 
 def test_the_first_state_too_has_something_before_it():
-    text = HOLDER.replace("      start: {on: {go: step}}\n", "").replace("      other:", "      other: {on: {go: step}}")
+    text = HOLDER.replace("      start: {on: {go: step}}\n", "").replace(
+        "      other:", "      other: {on: {go: step}}"
+    )
     run = run_of(["{before: step, when: (p), do: {use: wipe}}"], text, facts=[Fact("p")])
     assert run.machine.state.is_active("wiping")
     run.send("ok")
     assert run.active == ["step", "step/work"]
 
 
-@pytest.mark.parametrize("around", ["c: {on: {stop: far}, states: {%s}}", "c: {on: {stop: far}, regions: {r: {states: {%s}}}}"])
+@pytest.mark.parametrize(
+    "around", ["c: {on: {stop: far}, states: {%s}}", "c: {on: {stop: far}, regions: {r: {states: {%s}}}}"]
+)
 def test_inside_a_composite_and_a_region_too(around):
     inner = "start: {on: {go: step}}, step: {use: look, with: {item: cup1}, on: {done: start, blurred: start}}"
     text = "    plot: p\n    states:\n      " + around % inner + "\n      far:\n    rules:\n"
@@ -149,7 +159,9 @@ def test_an_argument_that_a_quantifier_of_the_rule_hides_is_refused():
 
 def test_a_rule_leaves_a_step_out():
     text = HOLDER.replace("assign: {n: ?event.seen}", "assign: {n: 7}")
-    run = run_of(["{before: step, when: (known ?step.item), do: {then: continue}}"], text, facts=[fact("known", "cup1")])
+    run = run_of(
+        ["{before: step, when: (known ?step.item), do: {then: continue}}"], text, facts=[fact("known", "cup1")]
+    )
     run.send("go")
     assert run.active == ["fine"]
     assert run.variables()["n"] == 7
@@ -171,7 +183,10 @@ def test_a_rule_goes_elsewhere_instead_of_into_a_step():
 
 
 def test_what_is_passed_arrives_behind_an_insertion():
-    text = HOLDER.replace("start: {on: {go: step}}", "start: {on: {go: {to: step, assign: {mine: ?event.item}, pass: {item: ?mine, light: ?event.light}}}}")
+    text = HOLDER.replace(
+        "start: {on: {go: step}}",
+        "start: {on: {go: {to: step, assign: {mine: ?event.item}, pass: {item: ?mine, light: ?event.light}}}}",
+    )
     for facts in ([], [Fact("p")]):
         run = run_of(["{before: step, when: (p), do: {use: wipe}}"], text, facts=facts)
         run.send("go", item="cup9", light="green")
@@ -242,7 +257,11 @@ def test_a_rule_commands_components():
     run = run_of([f"{{on: blurred, do: {{command: {commands}, then: retry}}}}"], FAILING)
     run.send("go")
     output = run.send("bad").output
-    wanted = [SetParameter("camera", "gain", "bright"), SwitchMode("camera", "night"), SendMessage("voice", "say", {"text": "cup1"})]
+    wanted = [
+        SetParameter("camera", "gain", "bright"),
+        SwitchMode("camera", "night"),
+        SendMessage("voice", "say", {"text": "cup1"}),
+    ]
     assert [one for one in output if one in wanted] == wanted
     assert run.active == ["step", "step/work"]
 
@@ -260,7 +279,8 @@ def test_commands_come_before_the_recovery():
 
 
 def generated(*rules):
-    made = plot("""
+    made = plot(
+        """
     plot: plan
     generated: true
     variables: {reason: {type: text, initial: unknown}}
@@ -273,9 +293,17 @@ def generated(*rules):
       replan: {final: true, emit: replan, with: {reason: ?reason}}
       gave_up: {final: true, emit: gave_up, with: {reason: ?reason}}
     rules: [RULES]
-    """.replace("RULES", ", ".join(rules)))
+    """.replace("RULES", ", ".join(rules))
+    )
     host = plot("plot: p\nstates: {h: {use: plan, on: {done: fine, replan: again, gave_up: again}}, fine: , again: }")
-    run = Run(host, made, plot(LOOK), plot(WIPE), choices={"look": Decision("look", {"item": "cup1"})}, facts=[fact("known", "cup1")])
+    run = Run(
+        host,
+        made,
+        plot(LOOK),
+        plot(WIPE),
+        choices={"look": Decision("look", {"item": "cup1"})},
+        facts=[fact("known", "cup1")],
+    )
     run.start()
     return run
 
@@ -307,7 +335,9 @@ def test_insertions_are_connectors_and_states_like_all_others():
 
 
 def test_both_spellings_are_read_and_written():
-    text = plot_to_yaml(library_of(["{before: [step], when: (p), do: {command: [{set: a.b, to: 1}], pass: {light: x}}}"])[0])
+    text = plot_to_yaml(
+        library_of(["{before: [step], when: (p), do: {command: [{set: a.b, to: 1}], pass: {light: x}}}"])[0]
+    )
     assert "before: step" in text
     assert parse_plot(text).rules[0].do.passed == {"light": Constant("x")}
     assert plot_to_yaml(parse_plot(text)) == text

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from random_charts import happenings, libraries
 from test_engine_properties import Played
 
-from dsc.engine.state import MachineState
+from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Cancel, Revoke, SendLater, SetParameter, Start, StartTimer
 from dsc.events import Event
 from dsc.sequencer.messages import ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.run_forms import Outcome, Shortener, frame_form
-from dsc.sequencer.run_present import Present
-from dsc.sequencer.run_standing import Standing, standing
+from dsc.sequencer.run_present import RunState
+from dsc.sequencer.run_standing import RunSnapshot, latest_snapshot
 
 EVERY_KIND = st.one_of(libraries(depth=2), libraries(scxml=True, depth=2))
 
@@ -27,13 +27,15 @@ EVERY_KIND = st.one_of(libraries(depth=2), libraries(scxml=True, depth=2))
 @given(EVERY_KIND, happenings(), st.integers(min_value=2, max_value=5))
 def test_the_changes_are_enough_to_have_all_frames(plots, happened, whole_every):
     forms, played, changes = {}, Played(*plots), []
-    present = Present(Shortener(forms.__setitem__))
+    present = RunState(Shortener(forms.__setitem__))
     for number, _ in enumerate(played.steps(happened)):
         state = played.machine.state
         present.reached(reactor_of(played.machine))
         changes.append(present.change(whole=number % whole_every == 0))
-        found = standing(reversed(changes))
-        assert found.frames.keys() == {frame.serial for frame in state.root.frames()} if state.root else not found.frames
+        found = latest_snapshot(reversed(changes))
+        assert (
+            found.frames.keys() == {frame.serial for frame in state.root.frames()} if state.root else not found.frames
+        )
         root = None
         if state.root is not None:
             root = frame_form(found.reactor["root"], found.frames, lambda digest: json.loads(forms[digest]))
@@ -61,18 +63,18 @@ TIMEOUT = StartTimer(2, 0, 9.0)
         lambda present: (present.asked([Cancel(2)], 2, 1.0, NOBODY), present.left(())),
         lambda present: present.asked([Revoke(LATER.event.frame, "x")], 2, 1.0, NOBODY),
         lambda present: (present.left(()), present.asked([SetParameter("robot", "speed", 2)], 2, 1.0, NOBODY)),
-        lambda present: (present.asked([StartTimer(3, 0, 1.0), Cancel(3)], 2, 1.0, NOBODY)),
+        lambda present: present.asked([StartTimer(3, 0, 1.0), Cancel(3)], 2, 1.0, NOBODY),
     ],
     ids=["answer", "report", "timer", "event sent later", "cancelled", "left", "revoked", "overtaken", "come and gone"],
 )
 def test_what_is_pending_is_the_same_by_changes_and_as_a_whole(happens):
-    present, found = Present(Shortener(lambda *_: None)), Standing()
+    present, found = RunState(Shortener(lambda *_: None)), RunSnapshot()
     present.asked([WORK, TIMEOUT, LATER, SetParameter("robot", "speed", 1)], 1, 0.0, NOBODY)
     found.take(json.loads(present.change()))
     happens(present)
     change = present.change()
     found.take(json.loads(change))
-    assert found.pending == standing([present.change(whole=True)]).pending
+    assert found.pending == latest_snapshot([present.change(whole=True)]).pending
 
 
 NOBODY = SimpleNamespace(caused_by={})
@@ -80,8 +82,8 @@ NOBODY = SimpleNamespace(caused_by={})
 
 def test_another_kind_of_number_is_another_setting():
     """1 and 1.0 are equal, and not the same; nor are 1 and true."""
-    machine, found = SimpleNamespace(state=MachineState()), Standing()
-    present, reactor = Present(Shortener(lambda *_: None)), reactor_of(machine)
+    machine, found = SimpleNamespace(state=MachineState()), RunSnapshot()
+    present, reactor = RunState(Shortener(lambda *_: None)), reactor_of(machine)
     for value in (1, 1.0, True):
         reactor.settings["p", "n"] = ParameterMessage("p", "n", value, of_plot=True)
         present.reached(reactor)

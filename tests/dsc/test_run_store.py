@@ -163,10 +163,12 @@ def test_what_is_in_force_is_told_again_before_anything_goes_on(tmp_path):
 
 
 class Related(Robot):
-    declares = MappingProxyType({
-        "speed": Parameter("number", default=0.5, least=0.1, most=10.0),
-        "wheels": Parameter("number", default=4),
-    })
+    declares = MappingProxyType(
+        {
+            "speed": Parameter("number", default=0.5, least=0.1, most=10.0),
+            "wheels": Parameter("number", default=4),
+        }
+    )
     relations = ("(<= ?speed (/ ?wheels 4))",)
 
 
@@ -326,9 +328,7 @@ def test_a_store_holds_one_run_after_the_other_and_only_one_that_is_unfinished(t
     Run(folder, [TWICE])
     with archive(folder / "run.kb") as runs:
         assert [one.number for one in runs.runs()] == [1, 2]
-        one, other = (
-            [(s.time, s.configuration) for s in runs.steps(run.number)] for run in runs.runs()
-        )
+        one, other = ([(s.time, s.configuration) for s in runs.steps(run.number)] for run in runs.runs())
         assert one == other
 
 
@@ -349,7 +349,11 @@ def test_a_mistake_in_what_is_to_be_run_leaves_the_store_as_it_was(tmp_path):
 # -- changed charts ----------------------------------------------------------------------------------------
 
 CHANGES = {
-    "a state that was changed": (TWICE.replace("seconds: 1.5", "seconds: 2.5"), (), "the plot 'p' has changed: ~ state b"),
+    "a state that was changed": (
+        TWICE.replace("seconds: 1.5", "seconds: 2.5"),
+        (),
+        "the plot 'p' has changed: ~ state b",
+    ),
     "a plot that is new": (TWICE, ("{plot: q, states: {a: {final: true}}}",), "the plot 'q' is new"),
     "another plot": (TWICE.replace("plot: p", "plot: r"), (), "the plot 'p' is missing; the plot 'r' is new"),
 }
@@ -377,7 +381,7 @@ def test_runs_in_tables_of_another_format_are_refused_with_that_reason(tmp_path)
     for look in (has_run, records_of):
         with pytest.raises(StoreError, match="the runs in this store have format 1"):
             look(path)
-    with KnowledgeBase.open(SCHEMA, path) as kb, pytest.raises(StoreError, match="goes on with format 3"):
+    with KnowledgeBase.open(SCHEMA, path) as kb, pytest.raises(StoreError, match="goes on with format 4"):
         RunStore(kb, path)
     assert run_with(new(tmp_path), TWICE, Robot())[0].finished
 
@@ -395,7 +399,9 @@ def test_a_restart_reads_no_more_macrosteps_than_since_all_was_written(tmp_path,
 
 def test_a_changed_domain_is_refused_with_the_difference(tmp_path):
     with KnowledgeBase.open(SCHEMA, tmp_path / "run.kb") as kb:
-        store = RunStore(kb, tmp_path / "run.kb", domain={action("go"): "(go)", action("come"): "(come)", action("stay"): "(stay)"})
+        store = RunStore(
+            kb, tmp_path / "run.kb", domain={action("go"): "(go)", action("come"): "(come)", action("stay"): "(stay)"}
+        )
         with store.writing:
             store.begin("p", {}, Library())
         now = {action("go"): "(went)", action("come"): "(come)", action("eat"): "(eat)"}
@@ -441,8 +447,12 @@ def asked(tmp_path, after_crash, status):
 
     copies = []
     run_with(
-        new(tmp_path), ASKING, Fetcher(),
-        prepare=lambda sequencer: sequencer.listen(lambda step: copies.append(copied(tmp_path / "run0", tmp_path / f"c{len(copies)}"))),
+        new(tmp_path),
+        ASKING,
+        Fetcher(),
+        prepare=lambda sequencer: sequencer.listen(
+            lambda step: copies.append(copied(tmp_path / "run0", tmp_path / f"c{len(copies)}"))
+        ),
     )
     Fetcher.begun = 0
     run = run_with(copies[2], ASKING, Fetcher(), resume=True)
@@ -452,8 +462,12 @@ def asked(tmp_path, after_crash, status):
 @pytest.mark.parametrize(
     ("after_crash", "status", "begun"),
     [
-        ("sense", Status.RUNNING, 1), ("sense", Status.NOT_BEGUN, 1), ("repeat", Status.UNKNOWN, 1),
-        ("same_id", Status.UNKNOWN, 1), ("sense", Ended(Outcome("fetched")), 0), ("repeat", Ended(Outcome("fetched")), 0),
+        ("sense", Status.RUNNING, 1),
+        ("sense", Status.NOT_BEGUN, 1),
+        ("repeat", Status.UNKNOWN, 1),
+        ("same_id", Status.UNKNOWN, 1),
+        ("sense", Ended(Outcome("fetched")), 0),
+        ("repeat", Ended(Outcome("fetched")), 0),
     ],
 )
 def test_what_a_component_says_of_an_action_decides_what_becomes_of_it(tmp_path, after_crash, status, begun):
@@ -508,8 +522,12 @@ def cancelled(tmp_path):
     copies = []
     (tmp_path / "alive").mkdir()
     run_with(
-        tmp_path / "alive", CANCELLING, Stubborn(),
-        prepare=lambda run: run.listen(lambda _: copies.append(copied(tmp_path / "alive", tmp_path / f"c{len(copies)}"))),
+        tmp_path / "alive",
+        CANCELLING,
+        Stubborn(),
+        prepare=lambda run: run.listen(
+            lambda _: copies.append(copied(tmp_path / "alive", tmp_path / f"c{len(copies)}"))
+        ),
     )
     return copies[1:]
 

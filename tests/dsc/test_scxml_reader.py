@@ -8,22 +8,24 @@ import pytest
 from dsc_charts import Run
 
 from dsc.dynamic.library import Library
+from dsc.errors import NotExpressibleError
+from dsc.scxml.document import MAX_DEPTH
+from dsc.scxml.ecmascript import condition, term
+from dsc.scxml.reader import parse_scxml
+from dsc.scxml.tokens import tokens
+from dsc.scxml.writer import to_scxml
 from dsc.testing import DryRun
-from dsc.text.files import MAX_BYTES
-from dsc.text.plots import parse_plot, plot_to_yaml
-from dsc.text.scxml.document import MAX_DEPTH
-from dsc.text.scxml.ecmascript import condition, term
-from dsc.text.scxml.errors import NotExpressibleError
-from dsc.text.scxml.reader import parse_scxml
-from dsc.text.scxml.tokens import tokens
-from dsc.text.scxml.writer import to_scxml
+from dsc.text.plot_files import parse_plot, plot_to_yaml
+from dsc.text.text_files import MAX_BYTES
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
 from knowledge_base.language.printer import to_text
 
 
 def scxml(body, attributes=""):
-    return parse_scxml(f'<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" {attributes}>{body}</scxml>', "c.scxml")
+    return parse_scxml(
+        f'<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" {attributes}>{body}</scxml>', "c.scxml"
+    )
 
 
 FULL = """
@@ -80,7 +82,9 @@ def test_conditions_are_translated(text, read):
     assert to_text(condition(text, {"x": "x"})) == read
 
 
-@pytest.mark.parametrize("text", ["f(x)", "x ? 1 : 2", "{a: 1}", "[1]", "'a' + x", "x +", "x y", "(x", "_sessionid", "x.y", "(" * 200])
+@pytest.mark.parametrize(
+    "text", ["f(x)", "x ? 1 : 2", "{a: 1}", "[1]", "'a' + x", "x +", "x y", "(x", "_sessionid", "x.y", "(" * 200]
+)
 def test_what_terms_cannot_say_is_named(text):
     with pytest.raises(NotExpressibleError):
         term(text, {"x": "x"})
@@ -132,7 +136,10 @@ SENT = [
     ('<send event="e"><content>this  is\n text </content></send>', "_event.data == 'this is text'"),
     ('<send event="e"><content>"json"</content></send>', "_event.data == 'json'"),
     ('<send event="e"><content expr="1 + 1"/></send>', "_event.data == 2"),
-    ('<send event="e"><content>{"productName": "bar", "n": 1}</content></send>', "_event.data.productName == 'bar' && _event.data.n &lt; 2"),
+    (
+        '<send event="e"><content>{"productName": "bar", "n": 1}</content></send>',
+        "_event.data.productName == 'bar' && _event.data.n &lt; 2",
+    ),
     ('<send event="e"><param name="aB" expr="true"/></send>', "_event.data.aB"),
     ('<send event="e" namelist="X"/>', "_event.data.X == 7"),
 ]
@@ -170,12 +177,27 @@ REFUSED = [
     (cond("x === 'undefined'", "<data id='x'/>"), "stands for no value"),
     (cond("true", "<data id='x'>undefined</data>"), "'undefined'"),
     (sent("<send event='e'><content>[1]</content></send>", "_event.data === 1"), "an array"),
-    (sent("<send event='e'><content>{'a': {}}</content></send>".replace("'a'", '"a"'), "_event.data.a === 1"), "an array"),
-    (sent("<send event='e'><param name='aB' expr='1'/></send>", "_event.data.ab === 1"), "is undefined for the event 'e'"),
-    (sent("<send event='e'><param name='a' expr='1'/><param name='A' expr='2'/></send>", "_event.data.a === 1"), "two are named 'a'"),
+    (
+        sent("<send event='e'><content>{'a': {}}</content></send>".replace("'a'", '"a"'), "_event.data.a === 1"),
+        "an array",
+    ),
+    (
+        sent("<send event='e'><param name='aB' expr='1'/></send>", "_event.data.ab === 1"),
+        "is undefined for the event 'e'",
+    ),
+    (
+        sent("<send event='e'><param name='a' expr='1'/><param name='A' expr='2'/></send>", "_event.data.a === 1"),
+        "two are named 'a'",
+    ),
     (sent("<send event='e'><param name='a' expr='1'/></send>", "_event.data === 1"), "is undefined for the event 'e'"),
     (sent("<send event='e'/>", "_event.data === 1"), "is undefined for the event 'e'"),
-    (sent("<send event='e'><param name='a' expr='1'/></send><send event='e.f'><param name='a' expr=\"'1'\"/></send>", "_event.data.a == 1"), "may convert"),
+    (
+        sent(
+            "<send event='e'><param name='a' expr='1'/></send><send event='e.f'><param name='a' expr=\"'1'\"/></send>",
+            "_event.data.a == 1",
+        ),
+        "may convert",
+    ),
     (sent("<raise event='f'/>", "_event.data === 1"), "not sent with <content>"),
     (sent("<raise event='f'/>", "_event.data.a &lt; 1 &amp;&amp; _event.data.a == 'x'"), None),
     (sent("<raise event='f'/>", "_event.data.a === 1 &amp;&amp; _event.data.A === 1"), "spelt 'a' elsewhere"),
@@ -200,12 +222,18 @@ def test_attributes_of_events_from_outside_are_declared_with_the_types_that_the_
 
 
 def test_data_that_get_a_value_before_they_can_be_read_need_none_at_first():
-    entered = "<state id='s'><onentry><assign location='x' expr='1'/><assign location='x' expr='x + 1'/></onentry></state>"
+    entered = (
+        "<state id='s'><onentry><assign location='x' expr='1'/><assign location='x' expr='x + 1'/></onentry></state>"
+    )
     left = "<state id='s'><transition event='e' target='t'><assign location='x' expr='1'/></transition></state><state id='t'><transition cond='x &lt; 2'/></state>"
     data = "<datamodel><data id='x'/></datamodel>"
     assert scxml(data + entered).variables["x"].type == "number"
     assert scxml(data + left).variables["x"].type == "number"
-    for body in (entered.replace("'1'", "'x'"), left.replace("target", "cond='x &lt; 1' target"), left.replace("</transition>", "</transition><transition event='f' target='t'/>")):
+    for body in (
+        entered.replace("'1'", "'x'"),
+        left.replace("target", "cond='x &lt; 1' target"),
+        left.replace("</transition>", "</transition><transition event='f' target='t'/>"),
+    ):
         with pytest.raises(NotExpressibleError, match="undefined"):
             scxml(data + body)
 
@@ -223,7 +251,15 @@ def test_several_onentry_are_blocks_of_their_own():
 
 @pytest.mark.parametrize(
     ("expr", "shown"),
-    [("n + 1 + 'a'", "3a"), ("'a' + n + 1", "a21"), ("n / 2", "1"), ("n / 4", "0.5"), ("b", "true"), ("t + n", "t2"), ("u", "undefined")],
+    [
+        ("n + 1 + 'a'", "3a"),
+        ("'a' + n + 1", "a21"),
+        ("n / 2", "1"),
+        ("n / 4", "0.5"),
+        ("b", "true"),
+        ("t + n", "t2"),
+        ("u", "undefined"),
+    ],
 )
 def test_a_log_shows_what_ecmascript_shows(expr, shown):
     data = '<data id="n" expr="2"/><data id="b" expr="true"/><data id="t" expr="\'t\'"/><data id="u"/>'

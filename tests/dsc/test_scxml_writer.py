@@ -9,10 +9,10 @@ from dsc_charts import plot
 from typer.testing import CliRunner
 
 from dsc.cli import app
-from dsc.text.scxml.errors import NotExpressibleError
-from dsc.text.scxml.reader import parse_scxml
-from dsc.text.scxml.writer import to_scxml
-from dsc.text.state_diagram import to_mermaid, to_plantuml
+from dsc.errors import NotExpressibleError
+from dsc.scxml.reader import parse_scxml
+from dsc.scxml.writer import to_scxml
+from dsc.text.text_diagrams import to_mermaid, to_plantuml
 from knowledge_base.errors import InputError
 from knowledge_base.language.printer import to_text
 
@@ -91,7 +91,10 @@ def test_what_scxml_cannot_say_is_named(state):
         ("every", "states: {a: {every: {seconds: 1}, on: {go: b}}, b: {final: true}}"),
         ("at_least", "states: {a: {at_least: 1, on: {go: b}}, b: {final: true}}"),
         ("pass", "states: {a: {on: {go: {to: b, pass: {x: 1}}}}, b: {final: true}}"),
-        ("clear", "profile: scxml\nstates: {a: {on: {go: {to: b, clear: b}}}, b: {states: {h: {history: deep, to: c}, c: {}}}}"),
+        (
+            "clear",
+            "dialect: scxml\nstates: {a: {on: {go: {to: b, clear: b}}}, b: {states: {h: {history: deep, to: c}, c: {}}}}",
+        ),
     ],
 )
 def test_what_scxml_has_nothing_for_is_named_as_in_the_plot(element, keys):
@@ -123,7 +126,11 @@ def test_connectors_are_passed_through_as_states_that_wait_for_nothing():
 
 
 def test_text_diagrams_show_connectors_and_times():
-    made = plot(CONNECTORS.replace("a: {on:", "a: {at_least: 2, every: {seconds: 0.5, to: b}, on_break: {switch: arm, to: up}, on:"))
+    made = plot(
+        CONNECTORS.replace(
+            "a: {on:", "a: {at_least: 2, every: {seconds: 0.5, to: b}, on_break: {switch: arm, to: up}, on:"
+        )
+    )
     for text in (to_mermaid(made), to_plantuml(made)):
         assert "state s1 <<choice>>" in text
         assert "state s3 <<choice>>" in text

@@ -27,9 +27,7 @@ def test_the_inner_state_is_asked_first():
 
 
 def test_a_plot_inside_is_asked_before_the_state_that_holds_it():
-    run = run_of(
-        "{plot: p, states: {a: {use: q, on: {e: out}}, out: }}", "{plot: q, states: {b: {on: {e: c}}, c: }}"
-    )
+    run = run_of("{plot: p, states: {a: {use: q, on: {e: out}}, out: }}", "{plot: q, states: {b: {on: {e: c}}, c: }}")
     run.send("e")
     assert run.active == ["a", "a/c"]
     run.send("e")

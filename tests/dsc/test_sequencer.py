@@ -112,7 +112,9 @@ def test_an_outcome_nobody_handles_ends_the_run_with_a_problem():
 
 
 def test_an_outcome_whose_guards_do_not_hold_ends_the_run_with_a_problem():
-    ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {grasped: {to: e, when: (p)}}}, e: {final: true}}}")
+    ran = Ran(
+        "{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {grasped: {to: e, when: (p)}}}, e: {final: true}}}"
+    )
     assert "nobody handles 'grasped'" in ran.end.problem
 
 
@@ -123,13 +125,17 @@ def test_nothing_to_wait_for_ends_the_run_with_a_problem():
 
 
 def test_a_timeout_that_leads_nowhere_does_not_keep_the_run_alive():
-    ran = Ran("{plot: p, states: {a: {after: [{seconds: 0.1, to: e, when: (p)}, {seconds: 0.3, to: e, when: (p)}]}, e: {final: true}}}")
+    ran = Ran(
+        "{plot: p, states: {a: {after: [{seconds: 0.1, to: e, when: (p)}, {seconds: 0.3, to: e, when: (p)}]}, e: {final: true}}}"
+    )
     assert "nothing is going on" in ran.end.problem
     assert ran.at == pytest.approx(0.3)
 
 
 def test_an_error_of_the_chart_ends_the_run_with_a_problem():
-    ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {grasped: {to: e, tell: (nonsense)}}}, e: {final: true}}}")
+    ran = Ran(
+        "{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {grasped: {to: e, tell: (nonsense)}}}, e: {final: true}}}"
+    )
     assert "nonsense" in ran.end.problem
 
 
@@ -207,7 +213,10 @@ def test_a_change_of_knowledge_from_outside_is_seen_at_once():
         loop = asyncio.get_running_loop()
         loop.call_later(5, sequencer.change, Delta(added=(Fact("q"),)), "somebody")
 
-    ran = Ran("{plot: p, states: {a: {always: {to: e, when: (q)}, after: {seconds: 50, to: a}}, e: {final: true}}}", prepare=prepare)
+    ran = Ran(
+        "{plot: p, states: {a: {always: {to: e, when: (q)}, after: {seconds: 50, to: a}}, e: {final: true}}}",
+        prepare=prepare,
+    )
     assert ran.at == pytest.approx(5)
     (change,) = ran.of_type("knowledge")
     assert (change["author"], change["added"]) == ("somebody", [["q"]])
@@ -410,7 +419,10 @@ def test_whoever_listens_is_told_every_step_before_its_actions_leave():
 
 def test_a_run_that_ends_with_a_problem_tells_the_step_that_leaves_everything():
     heard = []
-    ran = Ran("{plot: p, states: {a: {on: {stop: e}}, e: {final: true}}}", prepare=lambda sequencer: sequencer.listen(heard.append))
+    ran = Ran(
+        "{plot: p, states: {a: {on: {stop: e}}, e: {final: true}}}",
+        prepare=lambda sequencer: sequencer.listen(heard.append),
+    )
     assert not ran.end.finished
     assert [step.exited("a") for step in heard] == [False, True]
 
@@ -461,13 +473,17 @@ def test_what_is_wrong_is_refused_at_once_however_late_it_would_come():
 
 def test_plots_that_share_knowledge_see_what_the_others_told_with_their_next_event():
     kb = KnowledgeBase(SCHEMA)
-    library = Library([plot("""
+    library = Library(
+        [
+            plot("""
         plot: p
         receives: {say: null, look: null}
         states:
           a: {on: {say: {to: a, tell: (p)}, look: [{to: e, when: (p)}, a]}}
           e: {final: true}
-    """)])
+    """)
+        ]
+    )
 
     async def main():
         clock = LoopClock()

@@ -105,7 +105,8 @@ def test_several_timeouts_of_a_state_each_come_in_time():
 
 
 def test_what_was_observed_is_known_even_if_the_state_was_left_meanwhile():
-    ran = Ran("""
+    ran = Ran(
+        """
         plot: p
         states:
           o:
@@ -115,7 +116,8 @@ def test_what_was_observed_is_known_even_if_the_state_was_left_meanwhile():
             on: {out: e}
             always: {to: e, when: (seen cup1)}
           e: {final: true}
-    """.replace("(seen cup1)", "(exists (?i - item) (seen ?i))"))
+    """.replace("(seen cup1)", "(exists (?i - item) (seen ?i))")
+    )
     # Both answers come at the same time; the first one leaves the state, the second is dropped.
     assert ran.end.finished
     assert ran.kb.ask("(exists (?i - item) (seen ?i))")
@@ -260,7 +262,11 @@ def test_attributes_that_do_not_fit_their_declaration_are_a_skill_error(wrong, r
 
 
 def test_an_attribute_that_is_missing_is_a_skill_error_that_names_it():
-    ran = Ran(SAYS.replace("SKILL", "says"), arm=Sayer({name: value for name, value in FITTING.items() if name != "item"}), things=["cup1", "cup2"])
+    ran = Ran(
+        SAYS.replace("SKILL", "says"),
+        arm=Sayer({name: value for name, value in FITTING.items() if name != "item"}),
+        things=["cup1", "cup2"],
+    )
     (event,) = ran.end.emitted
     assert event.attributes["why"] == "arm.says: the outcome 'said' needs its attribute 'item' of type item"
 
@@ -291,7 +297,11 @@ def test_a_skill_that_reports_what_is_no_outcome_of_its_own_is_stopped():
     assert ran.at == 0
 
 
-@pytest.mark.parametrize("what", [Outcome("hello"), Outcome("so_far", observed=Delta(added=(fact("nonsense", "x"),)))], ids=["undeclared", "untrue"])
+@pytest.mark.parametrize(
+    "what",
+    [Outcome("hello"), Outcome("so_far", observed=Delta(added=(fact("nonsense", "x"),)))],
+    ids=["undeclared", "untrue"],
+)
 @pytest.mark.parametrize("and_then", ["ends", "reports", "sleeps", "goes on"])
 def test_a_skill_that_has_failed_by_what_it_reported_answers_no_more(what, and_then):
     class Chatty(Component):
@@ -406,7 +416,9 @@ def test_a_skill_has_a_bound_even_if_nobody_says_so():
     assert "nobody handles 'timed_out': arm.grasp: no outcome within 300 s" in ran.end.problem
 
 
-@pytest.mark.parametrize("entry", ["{trigger: arm.grap}", "{trigger: arm.grasp, with: {itm: cup1}}", "{trigger: arm.grasp}"])
+@pytest.mark.parametrize(
+    "entry", ["{trigger: arm.grap}", "{trigger: arm.grasp, with: {itm: cup1}}", "{trigger: arm.grasp}"]
+)
 def test_a_wrong_call_of_a_skill_is_a_skill_error_that_says_so(entry):
     class Strict(Arm):
         @skill(outcomes={"grasped": {}})

@@ -12,11 +12,10 @@ from dsc_charts import plot
 from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
 from dsc.components.endpoint import NoAnswerError
-from dsc.components.life import Life
+from dsc.components.life_cycle import Life
 from dsc.components.remote import Host
-from dsc.components.streams import Push, Stream
+from dsc.components.streams import Push, Stream, Wiring
 from dsc.components.transport import LocalTransport
-from dsc.components.wiring import Wiring
 from dsc.dynamic.library import Library
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
@@ -188,7 +187,12 @@ def test_a_stream_has_a_port_that_fits(source, values, kind, said):
 
 
 def test_ports_are_declared_rightly():
-    for wrong in (lambda: Push(["metres"]), lambda: Push({"a b": None}), lambda: Push({}, period=0), lambda: Stream("laser", {})):
+    for wrong in (
+        lambda: Push(["metres"]),
+        lambda: Push({"a b": None}),
+        lambda: Push({}, period=0),
+        lambda: Stream("laser", {}),
+    ):
         with pytest.raises(InputError):
             wrong()
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from dsc.text.plots import parse_plot
-from dsc.text.scxml.writer import to_scxml
-from dsc.text.state_diagram import to_mermaid, to_plantuml
+from dsc.scxml.writer import to_scxml
+from dsc.text.plot_files import parse_plot
+from dsc.text.text_diagrams import to_mermaid, to_plantuml
 from knowledge_base.errors import UnknownNameError
 
 BROKEN = {
@@ -21,7 +21,7 @@ BROKEN = {
     ),
     "a choice": ("states:\n  a: {choice: [{when: (= 1 1), to: nowhere}, b]}\n  b: {final: true}\n", 3),
     "a history": (
-        "profile: scxml\nstates:\n  a:\n    states: {h: {history: deep, to: nowhere}, c: {}}\n  b: {final: true}\n", 5,
+        "dialect: scxml\nstates:\n  a:\n    states: {h: {history: deep, to: nowhere}, c: {}}\n  b: {final: true}\n", 5,
     ),
 }  # fmt: skip
 

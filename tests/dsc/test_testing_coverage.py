@@ -35,7 +35,11 @@ def test_one_run_reaches_what_it_went_through():
     coverage.add(*fetch().steps)
     assert coverage.count("pick", "state") == (2, 3)
     assert coverage.count("pick", "transition") == (1, 3)
-    assert missing(coverage, "pick") == ["'grasp' never took felt (stays)", "'grasp' never took slipped -> dropped", "state 'dropped' was never entered"]
+    assert missing(coverage, "pick") == [
+        "'grasp' never took felt (stays)",
+        "'grasp' never took slipped -> dropped",
+        "state 'dropped' was never entered",
+    ]
     assert missing(coverage, "fetch") == [
         "'work' never took stop -> ended",
         "state 'without' was never entered",
@@ -127,7 +131,9 @@ def test_states_of_one_name_in_different_plots_are_told_apart():
 
 def test_a_plot_that_stands_in_is_not_the_one_it_stands_in_for():
     coverage = Coverage(PLOTS)
-    stand_in = ends_with(PLOTS[2]).model_copy(update={"states": PLOTS[2].states, "about": "the same states, another plot"})
+    stand_in = ends_with(PLOTS[2]).model_copy(
+        update={"states": PLOTS[2].states, "about": "the same states, another plot"}
+    )
     coverage.add(*fetch(library=Library(PLOTS).substitute("pick", stand_in)).steps)
     assert coverage.count("pick", "state") == (0, 3)
     assert coverage.count("drive", "state") == (2, 3)
@@ -177,19 +183,25 @@ def test_a_rule_counts_where_it_was_written_when_a_plan_inherited_it():
     run = DryRun(plots, "holder", {"plan": plot(GENERATED).to_form()}, world(SCHEMA, "cup - item"))
     run.answer("arm.grasp", "slipped", {"item": "cup"})
     coverage.add(*run.steps)
-    assert missing(coverage, "holder") == ["'execute' never took done -> ended", "state 'ended' was never entered", "rule 'slipped: replan' never answered"]
+    assert missing(coverage, "holder") == [
+        "'execute' never took done -> ended",
+        "state 'ended' was never entered",
+        "rule 'slipped: replan' never answered",
+    ]
     assert "rule 'slipped: retry' never answered" in missing(coverage, "fetch")
 
 
 def test_rules_of_one_label_are_one():
-    twice = plot("{plot: p, states: {a: {final: true}}, rules: [{on: x, when: (open), do: {then: retry}}, {on: x, do: {then: retry}}]}")
+    twice = plot(
+        "{plot: p, states: {a: {final: true}}, rules: [{on: x, when: (open), do: {then: retry}}, {on: x, do: {then: retry}}]}"
+    )
     assert [item.path for item in Coverage([twice]).missing() if item.kind == "rule"] == [("rules", 0)]
 
 
 def test_history_is_never_entered_and_not_asked_for():
     remembering = plot("""
         plot: p
-        profile: scxml
+        dialect: scxml
         states:
           c: {states: {h: {history: deep, to: a}, a: {on: {go: b}}, b: }, on: {out: d}}
           d: {on: {back: h}}
@@ -229,7 +241,9 @@ def test_a_sequencer_tells_it_while_it_runs():
 def test_the_report_is_a_table_with_what_is_missing_under_each_plot():
     coverage = Coverage(PLOTS, only=["drive", "wait"])
     coverage.add(*fetch().steps)
-    assert coverage.report() == """\
+    assert (
+        coverage.report()
+        == """\
             states  transitions        rules
 drive       2 of 3       1 of 3            -
   drive.yaml:9:26: 'driving' never took no_path -> blocked
@@ -239,6 +253,7 @@ wait        0 of 2       0 of 1            -
   wait.yaml:1:23: state 'pause' was never entered
   wait.yaml:1:31: 'pause' never took after -> over
   wait.yaml:1:64: state 'over' was never entered"""
+    )
 
 
 def test_plain_data_says_the_same():
@@ -248,7 +263,13 @@ def test_plain_data_says_the_same():
     assert data["drive"]["states"] == {"reached": 2, "all": 3}
     assert data["drive"]["transitions"] == {"reached": 1, "all": 3}
     assert data["drive"]["rules"] == {"reached": 0, "all": 0}
-    assert {"kind": "state", "text": "state 'blocked' was never entered", "path": ["states", "blocked"], "file": "drive.yaml", "line": 12} in data["drive"]["missing"]
+    assert {
+        "kind": "state",
+        "text": "state 'blocked' was never entered",
+        "path": ["states", "blocked"],
+        "file": "drive.yaml",
+        "line": 12,
+    } in data["drive"]["missing"]
 
 
 def test_too_little_is_an_assertion_that_says_how_much_and_what():
@@ -269,10 +290,16 @@ def test_nothing_to_cover_is_complete():
 
 
 @PROPERTY
-@given(st.lists(st.sampled_from(["arrived", "no_path"]), max_size=3), st.lists(st.sampled_from(["grasped", "slipped"]), max_size=3))
+@given(
+    st.lists(st.sampled_from(["arrived", "no_path"]), max_size=3),
+    st.lists(st.sampled_from(["grasped", "slipped"]), max_size=3),
+)
 def test_coverage_only_grows_and_forgets_nothing(drives, grasps):
     coverage, before = Coverage(PLOTS), None
-    for run in (fetch([*drives, *["arrived"] * 4], [*(SLIPPED if g == "slipped" else g for g in grasps), *[SLIPPED] * 4]), fetch()):
+    for run in (
+        fetch([*drives, *["arrived"] * 4], [*(SLIPPED if g == "slipped" else g for g in grasps), *[SLIPPED] * 4]),
+        fetch(),
+    ):
         coverage.add(*run.steps)
         now = set(coverage.missing())
         assert before is None or now <= before

@@ -142,7 +142,7 @@ def test_a_change_of_the_world_is_looked_at():
 
 
 def test_delayed_events_come_later():
-    text = "{plot: p, profile: scxml, states: {a: {entry: {emit: go, delay: 4}, on: {go: e}}, e: {final: true}}}"
+    text = "{plot: p, dialect: scxml, states: {a: {entry: {emit: go, delay: 4}, on: {go: e}}, e: {final: true}}}"
     run = DryRun([plot(text)], "p")
     assert run.advance(3.9) == ()
     run.advance(0.1)

@@ -65,7 +65,10 @@ def test_a_run_is_looked_at_as_it_is(run):
         (executed_once(["x"]), "the action x was executed, and nothing is kept of its start"),
         (knows([fact("q")], ["p", "q"]), "it is known that (p), which is not so"),
         (knows([fact("p"), fact("q"), fact("told")], ["p", "q", "told"]), "it is not known that (told), which is so"),
-        (claims_nothing_false(lambda run: run.ended["finished"], reached=False), "the goal is claimed, and not reached"),
+        (
+            claims_nothing_false(lambda run: run.ended["finished"], reached=False),
+            "the goal is claimed, and not reached",
+        ),
     ],
 )
 def test_what_is_wrong_is_said(run, invariant, wrong):

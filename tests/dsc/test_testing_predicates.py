@@ -95,7 +95,9 @@ def test_knowledge(run):
     assert not told(run, "(and (holding cup) (assign (failures cup) 2))")  # both, but not in one step
 
 
-@pytest.mark.parametrize("what", ["(holding ?i)", "(increase (failures cup) 1)", "(forall (?i - item) (lost ?i))", "(holding"])
+@pytest.mark.parametrize(
+    "what", ["(holding ?i)", "(increase (failures cup) 1)", "(forall (?i - item) (lost ?i))", "(holding"]
+)
 def test_what_nobody_can_be_told_is_an_error(run, what):
     with pytest.raises(InputError):
         told(run, what)
@@ -127,7 +129,7 @@ def test_what_rules_added_can_be_asked_about(run):
 
 
 def test_events_that_match_by_prefix_are_not_known_beforehand():
-    charted = plot("{plot: p, profile: scxml, states: {a: {on: {go.*: e}}, e: {final: true}}}")
+    charted = plot("{plot: p, dialect: scxml, states: {a: {on: {go.*: e}}, e: {final: true}}}")
     going = DryRun([charted], "p")
     going.send("go.left")
     assert consumed(going, "go.left")

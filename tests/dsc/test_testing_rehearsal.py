@@ -99,7 +99,11 @@ def test_a_skill_may_report_on_its_way():
 
 
 def test_a_free_skill_may_say_one_thing_with_other_attributes_each_time():
-    reports = (Answer("felt", {"force": 2}), Answer("felt", {"force": 3, "where": "thumb"}), Answer("felt", {"force": 4}))
+    reports = (
+        Answer("felt", {"force": 2}),
+        Answer("felt", {"force": 3, "where": "thumb"}),
+        Answer("felt", {"force": 4}),
+    )
     run = rehearse([FEELING], "feel", skills={"arm.grasp": Answer("grasped", reports=reports)})
     assert run.emitted == (Event("end", {"felt": 9}),)
 
@@ -146,7 +150,10 @@ def test_no_rehearsal_goes_on_for_ever(monkeypatch):
     day = rehearse([turning], "p", skills={"arm.turn": Answer("turned", after=200)})
     assert day.problem == "it still runs after 86400 s"
     monkeypatch.setattr(rehearsal, "MOST_STEPS", 50)
-    assert rehearse([turning], "p", skills={"arm.turn": Answer("turned", after=0)}).problem == "it still runs after 50 steps"
+    assert (
+        rehearse([turning], "p", skills={"arm.turn": Answer("turned", after=0)}).problem
+        == "it still runs after 50 steps"
+    )
 
 
 # -- what comes from outside -------------------------------------------------------------------------------
@@ -159,7 +166,9 @@ def test_events_come_at_their_time():
 
 
 def test_a_run_waits_for_events_that_are_still_to_come():
-    waiting = plot("{plot: p, receives: {go: {n: number}}, states: {a: {on: {go: {to: e, when: (= ?event.n 2)}}}, e: {final: true}}}")
+    waiting = plot(
+        "{plot: p, receives: {go: {n: number}}, states: {a: {on: {go: {to: e, when: (= ?event.n 2)}}}, e: {final: true}}}"
+    )
     run = rehearse([waiting], "p", events=[(100, Event("go", {"n": 2})), (5, Event("go", {"n": 1}))])
     assert run.finished
     assert run.seconds == pytest.approx(100)
@@ -205,7 +214,10 @@ def test_what_cannot_be_handed_in_is_refused_before_anything_runs(coming, said):
         ({"base.drive": "arrived", "arm.grap": "grasped"}, "component 'arm' has no skill 'grap'; did you mean 'grasp'"),
         ({"arm.grasp": ["grasped", "graspd"]}, "skill 'arm.grasp' has no outcome 'graspd'; did you mean 'grasped'"),
         ({"arm.grasp": "slipped"}, "the outcome 'slipped' of 'arm.grasp' needs its attribute 'item'"),
-        ({"arm.grasp": Answer("grasped", {"item": "cup"})}, "the outcome 'grasped' of 'arm.grasp' has no attribute 'item'"),
+        (
+            {"arm.grasp": Answer("grasped", {"item": "cup"})},
+            "the outcome 'grasped' of 'arm.grasp' has no attribute 'item'",
+        ),
         ({"arm.grasp": Answer("grasped", reports=(Answer("flet"),))}, "no outcome 'flet'; did you mean 'felt'"),
     ],
 )
@@ -223,9 +235,15 @@ def test_a_script_names_components_and_skills(name):
 @pytest.mark.parametrize(
     ("skills", "said"),
     [
-        ({"base.drive": "arrived", "arm.grap": "grasped"}, "the script has no skill 'arm.grasp'; did you mean 'arm.grap'"),
+        (
+            {"base.drive": "arrived", "arm.grap": "grasped"},
+            "the script has no skill 'arm.grasp'; did you mean 'arm.grap'",
+        ),
         ({"base.drive": "arrived", "arm.grasp": [SLIPPED]}, "the script of 'arm.grasp' has no answer to call 2"),
-        ({"base.drive": "arrived", "arm.grasp": Answer("grasped", observed="(holdign ?item)")}, "did you mean 'holding'"),
+        (
+            {"base.drive": "arrived", "arm.grasp": Answer("grasped", observed="(holdign ?item)")},
+            "did you mean 'holding'",
+        ),
     ],
 )
 def test_where_the_script_and_the_run_do_not_fit_the_rehearsal_says_so(skills, said):
@@ -239,7 +257,9 @@ def test_an_answer_made_on_the_spot_is_held_against_the_skill_too():
 
 
 def test_a_failed_assertion_about_a_call_fails_the_test_whatever_the_plot_makes_of_it():
-    coping = plot("{plot: p, states: {a: {entry: {trigger: arm.grasp, with: {item: cup}}, on: {grasped: e, skill_error: e}}, e: {final: true}}}")
+    coping = plot(
+        "{plot: p, states: {a: {entry: {trigger: arm.grasp, with: {item: cup}}, on: {grasped: e, skill_error: e}}, e: {final: true}}}"
+    )
 
     def reply(call):
         assert call.arguments == {"item": "can"}, "the wrong item"
@@ -258,7 +278,9 @@ def test_what_is_no_answer_is_refused(replies):
 
 
 def test_a_call_that_the_real_skill_would_refuse_is_refused():
-    wrong = plot("{plot: p, states: {a: {entry: {trigger: arm.grasp, with: {itm: cup}}, on: {grasped: e, skill_error: e}}, e: {final: true}}}")
+    wrong = plot(
+        "{plot: p, states: {a: {entry: {trigger: arm.grasp, with: {itm: cup}}, on: {grasped: e, skill_error: e}}, e: {final: true}}}"
+    )
     with pytest.raises(UnknownNameError, match="has no parameter 'itm'; did you mean 'item'"):
         rehearse([wrong], "p", skills={"arm.grasp": "grasped"}, like=[Arm()])
 
@@ -271,7 +293,8 @@ def test_a_wrong_start_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("said", "objects", "facts"), [("no type 'itme'", "cup - itme", ""), ("'opne'", "", "(opne)"), ("'cup'", "", "(holding cup)")]
+    ("said", "objects", "facts"),
+    [("no type 'itme'", "cup - itme", ""), ("'opne'", "", "(opne)"), ("'cup'", "", "(holding cup)")],
 )
 def test_a_world_with_a_mistake_is_refused(said, objects, facts):
     with pytest.raises(InputError, match=said):

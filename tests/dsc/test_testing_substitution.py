@@ -14,9 +14,13 @@ LIBRARY = Library(PLOTS)
 
 
 def test_the_whole_branch_is_replaced_and_the_old_library_stays_as_it_is():
-    stub = plot("{plot: nothing, parameters: {item: item, force: {type: number, default: 1}}, states: {nap: {after: {seconds: 7, to: e}}, e: {final: true}}}")
+    stub = plot(
+        "{plot: nothing, parameters: {item: item, force: {type: number, default: 1}}, states: {nap: {after: {seconds: 7, to: e}}, e: {final: true}}}"
+    )
     made = LIBRARY.substitute("pick", stub)
-    run = rehearse(made, "fetch", {"item": "cup"}, skills={"base.drive": "arrived"}, knowledge=world(SCHEMA, "cup - item"))
+    run = rehearse(
+        made, "fetch", {"item": "cup"}, skills={"base.drive": "arrived"}, knowledge=world(SCHEMA, "cup - item")
+    )
     assert run.finished
     assert entered(run, "take/nap")
     assert run.seconds == pytest.approx(8)
@@ -52,11 +56,18 @@ def test_what_a_holder_would_notice_is_refused_and_says_where(interface, said):
 
 
 def test_a_parameter_of_its_own_with_a_default_and_fewer_outcomes_are_fine():
-    stub = plot("{plot: stub, parameters: {item: item, force: number, mood: {type: symbol, default: good}}, states: {e: {final: true}}}")
+    stub = plot(
+        "{plot: stub, parameters: {item: item, force: number, mood: {type: symbol, default: good}}, states: {e: {final: true}}}"
+    )
     with pytest.raises(SchemaError, match="'force'"):
         LIBRARY.substitute("pick", stub)
     fine = stub.model_copy(update={"parameters": {**stub.parameters, "force": PICK.parameters["force"]}})
-    assert validate_library(LIBRARY.substitute("pick", fine), SCHEMA, [*Arm().skills().values(), *Base().skills().values()]) == []
+    assert (
+        validate_library(
+            LIBRARY.substitute("pick", fine), SCHEMA, [*Arm().skills().values(), *Base().skills().values()]
+        )
+        == []
+    )
 
 
 CANDIDATE = plot("{plot: a, implements: act, when: (open), effects: assumed, confirm: 9, states: {e: {final: true}}}")
@@ -76,7 +87,9 @@ def test_a_substitute_plays_the_part_of_the_original_unless_it_names_its_own():
 
 def rehearsed(stub):
     facts = world(SCHEMA, "cup - item")
-    return rehearse(LIBRARY.substitute("pick", stub), "fetch", {"item": "cup"}, skills={"base.drive": "arrived"}, knowledge=facts)
+    return rehearse(
+        LIBRARY.substitute("pick", stub), "fetch", {"item": "cup"}, skills={"base.drive": "arrived"}, knowledge=facts
+    )
 
 
 def test_a_plot_can_be_made_to_be_done_with_its_effects():

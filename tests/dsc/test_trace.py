@@ -7,12 +7,12 @@ import json
 
 from dsc_charts import plot
 
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Cancel, Start
 from dsc.events import Event
-from dsc.sequencer.tracing import StepTracer
+from dsc.sequencer.step_tracing import StepTracer
 from dsc.trace import FORMAT, VERSION, Record, Trace, header, write_to
 from knowledge_base.facts import Change, Delta, fact
 from knowledge_base.store import KnowledgeBase
@@ -168,7 +168,9 @@ def test_a_step_tells_new_and_changed_variables_by_the_state_that_holds_their_pl
           a: {on: {go: {to: h, assign: {n: (+ ?n 1)}}}}
           h: {use: q, with: {m: ?n}, on: {again: {to: h}, still: {do: [{assign: {n: ?n}}]}}}
     """
-    library = Library([plot(outer), plot("{plot: q, parameters: {m: {type: number}}, states: {s: {}, e: {final: true}}}")])
+    library = Library(
+        [plot(outer), plot("{plot: q, parameters: {m: {type: number}}, states: {s: {}, e: {final: true}}}")]
+    )
     trace, heard = Trace(lambda: 0.0), []
     trace.listen(heard.append)
     tracer, machine = StepTracer(trace), Machine(library)

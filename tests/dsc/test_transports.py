@@ -6,7 +6,7 @@ import pytest
 
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint
-from dsc.components.pushing import Publisher
+from dsc.components.publication import Publisher
 from dsc.components.remote import Host
 from dsc.components.transport import LocalTransport
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated

@@ -15,7 +15,7 @@ from dsc.dynamic.library import Library
 from dsc.errors import PlotError
 from dsc.model.plot import ActionPlot
 from dsc.skills import skill
-from dsc.text.plots import load_library, parse_plot
+from dsc.text.plot_files import load_library, parse_plot
 from dsc.validation import raise_findings, validate_library, validate_plot
 from knowledge_base.world.schema import Schema
 
@@ -41,7 +41,11 @@ class Arm(Component):
 
 
 SKILLS = list(Arm().skills().values())
-COMPONENTS = {"arm": {}, "base": {}, "lift": {"pace": Parameter("number", default=1, least=0, most=2), "port": Parameter("text", changed_by="profile")}}
+COMPONENTS = {
+    "arm": {},
+    "base": {},
+    "lift": {"pace": Parameter("number", default=1, least=0, most=2), "port": Parameter("text", changed_by="profile")},
+}
 HELPERS = [
     plot("""
         plot: grasp
@@ -92,7 +96,7 @@ E = "  e: {final: true}\n"
 ITEM = "plot: p\nparameters: {item: item}\nstates:\n"
 GRASP = "    use: grasp\n    with: {item: ?item}\n"
 WIRED = "    on: {done: e, failed: e, lost: e}\n"
-H = "plot: p\nprofile: scxml\nstates:\n"
+H = "plot: p\ndialect: scxml\nstates:\n"
 FOUND = "  s: {{use: search, {}on: {{done: e}}}}\n  e: {{final: true}}\n"
 WRONG = [
     # -- structure
@@ -475,7 +479,7 @@ WRONG = [
     ("rule event", ITEM + "  a:\n" + GRASP + "    on: {done: b, failed: e, lost: e}\n  b: {use: wait, on: {done: e}}\n" + E + "rules:\n  - on: lost\n    of: b\n    do: {then: e}\n", 11, "'b' cannot end with 'lost'", ""),
     ("known event", S + "  a: {on: {done: e}}\n" + E + "handlers:\n  - on: low\n    do: {use: wait}\n", 6, "nothing here fires the event 'low'", "listen"),
     ("handler", S + "  a: {on: {done: e, x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    interrupt: true\n    do: {tell: (free)}\n", 7, "interrupts nothing", "use"),
-    ("profile", H + "  a: {on: {x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    do: {use: wait}\n", 7, "handlers are for plots of profile dsc", "transitions"),
+    ("dialect", H + "  a: {on: {x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    do: {use: wait}\n", 7, "handlers are for plots of dialect dsc", "transitions"),
     ("connectors lead on", S + "  a: {use: wait, on: {done: b}, after: {seconds: 9, to: e}}\n  b: {use: wait, on: {done: a}}\n" + E
      + "rules:\n  - {before: [a, b], when: (free), do: {then: continue}}\n", 6, "all steps of a circle", "`then`"),
     # -- parameters of components
@@ -576,7 +580,9 @@ def test_a_right_plot_gets_none(text):
 
 
 def test_without_schema_and_skills_the_rest_is_still_checked():
-    text = "plot: p\nwhen: (whatever ?x)\nstates:\n  a: {entry: {trigger: any.thing}, on: {ok: ende}}\n" + E.replace("e:", "end:")
+    text = "plot: p\nwhen: (whatever ?x)\nstates:\n  a: {entry: {trigger: any.thing}, on: {ok: ende}}\n" + E.replace(
+        "e:", "end:"
+    )
     findings = findings_of(text, None, None)
     assert [finding.rule for finding in findings] == ["target"]
 
@@ -619,10 +625,16 @@ def _handed_on(size):
     """Submachines one after the other, each with a choice before it that passes what the plot inside needs."""
     states = {}
     for n in range(size):
-        states[f"c{n}"] = {"choice": [{"to": f"c{n + 1}", "when": "(> ?n 0)"}, {"to": f"s{n}", "pass": {"item": "?item"}}]}
+        states[f"c{n}"] = {
+            "choice": [{"to": f"c{n + 1}", "when": "(> ?n 0)"}, {"to": f"s{n}", "pass": {"item": "?item"}}]
+        }
         states[f"s{n}"] = {"use": "search", "on": {"done": {"to": f"c{n + 1}", "assign": {"out": 1}}}}
     states[f"c{size}"] = {"select": "?n", "cases": {1: "e"}, "else": "e"}
-    more = {"parameters": {"item": "item"}, "variables": {"n": {"type": "number", "initial": 1}}, "outputs": {"out": "number"}}
+    more = {
+        "parameters": {"item": "item"},
+        "variables": {"n": {"type": "number", "initial": 1}},
+        "outputs": {"out": "number"},
+    }
     return {"plot": "handed_on", **more, "states": {"begin": {"on": {"done": "c0"}}, **states, "e": {"final": True}}}
 
 
@@ -635,7 +647,7 @@ def _remembering(size):
         }
         for n in range(size)
     }  # fmt: skip
-    return {"plot": "remembering", "profile": "scxml", "states": states}
+    return {"plot": "remembering", "dialect": "scxml", "states": states}
 
 
 @pytest.mark.parametrize("form", [_ring, _handed_on, _remembering])

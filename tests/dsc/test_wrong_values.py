@@ -66,7 +66,15 @@ def sequencer_of(**other):
     """Making one with something else in one place."""
 
     async def main():
-        Sequencer(**{"library": Library([PLOT]), "knowledge": KnowledgeBase(Schema()), "components": (), "clock": LoopClock(), **other})
+        Sequencer(
+            **{
+                "library": Library([PLOT]),
+                "knowledge": KnowledgeBase(Schema()),
+                "components": (),
+                "clock": LoopClock(),
+                **other,
+            }
+        )
 
     return lambda: run_simulated(main())
 
@@ -143,7 +151,9 @@ def test_a_skill_that_is_no_coroutine_says_what_to_write():
     text = "plot: q\nemits: {because: {why: text}}\nstates:\n  a: {entry: {trigger: arm.go}, on: {ok: e, skill_error: {to: e, emit: because, with: {why: ?event.reason}}}}\n  e: {final: true}"
 
     async def main():
-        return await Sequencer(Library([parse_plot(text)]), KnowledgeBase(Schema()), [component_of("arm", go)], LoopClock()).run("q")
+        return await Sequencer(
+            Library([parse_plot(text)]), KnowledgeBase(Schema()), [component_of("arm", go)], LoopClock()
+        ).run("q")
 
     (why,) = run_simulated(main()).emitted
     assert "it is no coroutine: write `async def`, or say that it is `blocking`" in why.attributes["why"]

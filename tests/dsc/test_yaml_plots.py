@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from dsc_charts import plot
 
-from dsc.text.files import MAX_BYTES
-from dsc.text.plots import load_library, load_plot, parse_plot, plot_to_yaml
+from dsc.text.plot_files import load_library, load_plot, parse_plot, plot_to_yaml
+from dsc.text.text_files import MAX_BYTES
 from dsc.text.yaml import load_document
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.expression import Variable
@@ -72,7 +72,11 @@ BROKEN = [
     ("plot: p\nparameters:\n  Item: item" + END, 3, "'Item' is no name for a variable"),
     ("plot: p\nvariables:\n  two words: item" + END, 3, "'two words' is no name for a variable"),
     ("plot: p\nemits:\n  failed:\n    itemName: item" + END, 4, "'itemName' is no name for a variable"),
-    ("plot: p\nparameters: {n: number}\nvariables:\n  n: number" + END, 4, "'n' is declared twice: as parameter and as variable"),
+    (
+        "plot: p\nparameters: {n: number}\nvariables:\n  n: number" + END,
+        4,
+        "'n' is declared twice: as parameter and as variable",
+    ),
     # states
     ("plot: p\nstates:\n  s: text", 3, "a mapping was expected"),
     ("plot: p\nstates:\n  a/b: {}", 3, "'a/b' is no name for a state"),
@@ -107,7 +111,11 @@ BROKEN = [
     (HEAD + "    on:\n      e:\n        do:\n          - assign:\n              n: (+ ?n", 8, "'(' is never closed"),
     (HEAD + "    after: {second: 5, to: s}", 4, "did you mean 'seconds'?"),
     (HEAD + "    every: {second: 5, to: s}", 4, "did you mean 'seconds'?"),
-    (HEAD + "    every:\n      - {seconds: 1, to: s}\n      - {to: s, seconds: 0}", 6, "longer than 0 seconds; found 0"),
+    (
+        HEAD + "    every:\n      - {seconds: 1, to: s}\n      - {to: s, seconds: 0}",
+        6,
+        "longer than 0 seconds; found 0",
+    ),
     (HEAD + "    at_least: soon", 4, "a number of seconds was expected; found 'soon'"),
     (HEAD + "    at_leest: 1", 4, "did you mean 'at_least'?"),
     (HEAD + "    on_brake: {switch: arm, to: up}", 4, "did you mean 'on_break'?"),
@@ -121,13 +129,25 @@ BROKEN = [
     (HEAD + "    selct: ?x\n    cases: {a: s}", 4, "did you mean 'select'?"),
     (HEAD + "    select: ?x\n    casses: {a: s}\n    else: s", 5, "did you mean 'cases'?"),
     (HEAD + "    select: ?x\n    cases: {a: s}", 3, "the key 'else' is missing"),
-    (HEAD + "    select: ?x\n    cases:\n      a: s\n      b: {emit: e}\n    else: s", 7, "nothing rests in a connector"),
+    (
+        HEAD + "    select: ?x\n    cases:\n      a: s\n      b: {emit: e}\n    else: s",
+        7,
+        "nothing rests in a connector",
+    ),
     (HEAD + "    select: ?x\n    cases:\n      1: {to: s, wen: (p)}\n    else: s", 6, "did you mean 'when'?"),
     (HEAD + "    select: ?x\n    cases: {1: s, '1': s}\n    else: s", 5, "two cases have the same value"),
     (HEAD + "    select: ?x\n    cases: {null: s}\n    else: s", 5, "a key is a name"),
     ("plot: p\noutputs:\n  n:\n    type: number\n    inital: 0" + END, 5, "did you mean 'initial'?"),
-    ("plot: p\nparameters: {n: number}\noutputs:\n  n: number" + END, 4, "'n' is declared twice: as parameter and as output"),
-    ("plot: p\nvariables: {n: number}\noutputs:\n  n: number" + END, 4, "'n' is declared twice: as variable and as output"),
+    (
+        "plot: p\nparameters: {n: number}\noutputs:\n  n: number" + END,
+        4,
+        "'n' is declared twice: as parameter and as output",
+    ),
+    (
+        "plot: p\nvariables: {n: number}\noutputs:\n  n: number" + END,
+        4,
+        "'n' is declared twice: as variable and as output",
+    ),
     (HEAD + "    after: {to: s}", 4, "the key 'seconds' is missing"),
     (HEAD + "    after: 5", 4, "a mapping was expected"),
     (HEAD + "    after: {seconds: soon, to: s}", 4, "a number of seconds was expected"),

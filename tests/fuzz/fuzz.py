@@ -114,7 +114,11 @@ def tried(case: Case) -> Finding | None:
         except fine() as error:
             return _unsaid(case, error)
         except (Exception, SystemExit, KeyboardInterrupt, GeneratorExit) as error:  # noqa: BLE001  what is looked for
-            return Finding(case, f"{case.target}: {type(error).__name__}, {_where(error)}", "".join(traceback.format_exception(error)))
+            return Finding(
+                case,
+                f"{case.target}: {type(error).__name__}, {_where(error)}",
+                "".join(traceback.format_exception(error)),
+            )
     return None
 
 
@@ -129,7 +133,9 @@ def _unsaid(case: Case, error: Exception) -> Finding | None:
 
 def _where(error: BaseException) -> str:
     """The last place of our own code, and what the error says if it is one of the judge's own."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if any(part in frame.filename for part in OURS)]
+    frames = [
+        frame for frame in traceback.extract_tb(error.__traceback__) if any(part in frame.filename for part in OURS)
+    ]
     last = f"{Path(frames[-1].filename).name}:{frames[-1].name}" if frames else "elsewhere"
     return f"{last}: {str(error)[:40]}" if isinstance(error, AssertionError) else last
 

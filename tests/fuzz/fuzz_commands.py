@@ -43,7 +43,19 @@ WORDS = (
     "mug", "table", "scxml", "mermaid", "plantuml", "svg", "json", "pddl", "pyperplan", "process", "power", "dsc:nothing",
     "domains.clean_up_table.deployment:bundle", "os:getcwd", "sys:exit", "-h", "--help", "--", "=", "@x",
 )  # fmt: skip
-MADE = ("out.svg", "out.yaml", "out.jsonl", "new.db", "out.pddl", "out.json", "none/out.yaml", "folder", "folder/x.yaml", ".", "..")
+MADE = (
+    "out.svg",
+    "out.yaml",
+    "out.jsonl",
+    "new.db",
+    "out.pddl",
+    "out.json",
+    "none/out.yaml",
+    "folder",
+    "folder/x.yaml",
+    ".",
+    "..",
+)
 
 
 @cache
@@ -105,7 +117,12 @@ def _called(argv: Sequence[str], home: Path) -> tuple[int, str]:
     before = Path.cwd()
     os.chdir(home)
     try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out), _nobody_waits(), patch("sys.argv", ["dsc", *argv]):
+        with (
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(out),
+            _nobody_waits(),
+            patch("sys.argv", ["dsc", *argv]),
+        ):
             main()
         status: Any = 0
     except SystemExit as ended:
@@ -125,7 +142,7 @@ def _nobody_waits() -> Iterator[None]:
         patch("typer.main.get_command", lambda _: whole),
         patch("dsc.viewer.cli.until_interrupt", lambda viewer: None),
         patch("webbrowser.open", lambda url: True),
-        patch("knowledge_base.cli.following.time", SimpleNamespace(sleep=_interrupted, monotonic=time.monotonic)),
+        patch("knowledge_base.cli.follow.time", SimpleNamespace(sleep=_interrupted, monotonic=time.monotonic)),
         patch("sys.stdin", io.StringIO("")),
         patch("sys.path", list(sys.path)),
     ):

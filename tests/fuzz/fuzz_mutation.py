@@ -224,7 +224,9 @@ def reset(file: Path, random: Random) -> None:
     """Another value in one column of one row of a database; what SQLite refuses is left as it was."""
     connection = sqlite3.connect(file, isolation_level=None)
     try:
-        tables = [name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")]
+        tables = [
+            name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")
+        ]
         table = random.choice(tables)
         columns = [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
         rows = connection.execute(f"SELECT * FROM {table} LIMIT 50").fetchall()  # noqa: S608  names of the file's own schema
@@ -249,7 +251,19 @@ def reset(file: Path, random: Random) -> None:
 
 
 BYTES: tuple[Mutation, ...] = (flip, flip, lose, cut, double, move, splice)
-TEXT: tuple[Mutation, ...] = (*BYTES[1:], insert, insert, reword, reword, reword, renumber, regroup, regroup, reline, recode)
+TEXT: tuple[Mutation, ...] = (
+    *BYTES[1:],
+    insert,
+    insert,
+    reword,
+    reword,
+    reword,
+    renumber,
+    regroup,
+    regroup,
+    reline,
+    recode,
+)
 JSON: tuple[Mutation, ...] = (revalue, revalue, revalue)
 LINES: tuple[Mutation, ...] = (reline_json, reline_json, reline)
 

@@ -20,32 +20,31 @@ from domains.clean_up_table.scenario import Scenario
 from dsc.components.component import Component
 from dsc.components.remote import Host
 from dsc.components.transport import LocalTransport
+from dsc.drawing import draw
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.dynamic.situation import KnowledgeSituation
 from dsc.engine.machine import Machine
-from dsc.engine.state import MachineState
-from dsc.errors import RunawayError
+from dsc.engine.machine_state import MachineState
+from dsc.errors import NotExpressibleError, RunawayError
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
+from dsc.scxml.reader import parse_scxml
+from dsc.scxml.writer import to_scxml
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.replay import replay
 from dsc.sequencer.run_tables import archive
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
-from dsc.text.diagram import draw
-from dsc.text.files import read_file
-from dsc.text.plots import load_plot, parse_plot, plot_to_yaml
-from dsc.text.profiles import load_profile, parse_profile, profile_to_yaml
-from dsc.text.scxml.errors import NotExpressibleError
-from dsc.text.scxml.reader import parse_scxml
-from dsc.text.scxml.writer import to_scxml
-from dsc.text.state_diagram import to_mermaid, to_plantuml
+from dsc.text.plot_files import load_plot, parse_plot, plot_to_yaml
+from dsc.text.profile_files import load_profile, parse_profile, profile_to_yaml
+from dsc.text.text_diagrams import to_mermaid, to_plantuml
+from dsc.text.text_files import read_file
 from dsc.trace import Trace, header
 from dsc.validation import review_plot, validate_plot
-from dsc.viewer.answers import Answers
+from dsc.viewer.address import PageAddress
 from dsc.viewer.control import Control
-from dsc.viewer.entrance import Entrance
-from dsc.viewer.opening import records_of
+from dsc.viewer.queries import PageQueries
+from dsc.viewer.record_sources import records_of
 from dsc.viewer.records import RecordLog, read_trace
 from dsc.viewer.server import Viewer
 from knowledge_base import InputError, KnowledgeBase, Schema
@@ -54,9 +53,9 @@ from knowledge_base.language.check import check, check_effect
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
 from knowledge_base.language.printer import to_text
 from knowledge_base.statements import retracted, told
+from planning.cancellable_work import WorkLimit, WorkLimitError
 from planning.domain import PlanningDomain
-from planning.patience import OutOfPatienceError, Patience
-from planning.posing.problem import pose
+from planning.problem.construction import build_problem
 
 HOME = Path(__file__).parent
 ROOT = HOME.parents[1]
@@ -194,7 +193,7 @@ def read_domain(data: bytes, folder: Path) -> None:
     PlanningDomain.parse(read.to_pddl())
     list(read.notes)
     kb = KnowledgeBase(Schema.from_pddl(file))
-    pose(read, kb, parse_condition("(and)"), patience=Patience(PATIENCE_S))
+    build_problem(read, kb, parse_condition("(and)"), patience=WorkLimit(PATIENCE_S))
 
 
 def read_fragment(data: bytes, folder: Path) -> None:
@@ -213,7 +212,7 @@ def read_problem_file(data: bytes, folder: Path) -> None:
     again.apply(read_problem(kb.to_pddl("kitchen", "again"), planning.schema).delta(), author="fuzz")
     if _known(again) != _known(kb):
         raise AssertionError("read again, it is another problem")
-    pose(planning, kb, problem.goal, problem.metric, patience=Patience(PATIENCE_S))
+    build_problem(planning, kb, problem.goal, problem.metric, patience=WorkLimit(PATIENCE_S))
 
 
 def read_condition(data: bytes, folder: Path) -> None:
@@ -265,7 +264,7 @@ def read_trace_file(data: bytes, folder: Path) -> None:
     """A trace, and what the page asks about it."""
     log = read_trace(_written(data, folder, "trace.jsonl"))
     log.batch(1)
-    answers = Answers(log)
+    answers = PageQueries(log)
     for seq in {0, 1, 2, len(log) // 2, len(log), len(log) + 1}:
         _unless(InputError, lambda seq=seq: answers.facts({"seq": seq}))
         _unless(InputError, lambda seq=seq: answers.query({"seq": seq, "expression": "(on ?x ?y)"}))
@@ -304,7 +303,7 @@ def _write_knowledge(file: Path) -> None:
 
 def _read_viewed(file: Path) -> None:
     with records_of(file) as log:
-        Answers(log).facts({"seq": len(log)})
+        PageQueries(log).facts({"seq": len(log)})
 
 
 def _read_runs(file: Path) -> None:
@@ -457,7 +456,11 @@ def _unless(errors: type[Exception], use: Callable[[], Any]) -> None:
 
 
 def _text(data: bytes) -> str:
-    return data.decode("utf-8", "surrogatepass" if b"\xed" in data else "replace") if _decodes(data) else data.decode("latin-1")
+    return (
+        data.decode("utf-8", "surrogatepass" if b"\xed" in data else "replace")
+        if _decodes(data)
+        else data.decode("latin-1")
+    )
 
 
 def _decodes(data: bytes) -> bool:
@@ -493,12 +496,14 @@ def _table() -> KnowledgeBase:
 
 @cache
 def _waiting() -> ActionPlot:
-    return parse_plot("plot: waiting\nreceives: {go: , stop: }\nstates:\n  a: {on: {go: a, stop: b}}\n  b: {final: true}\n")
+    return parse_plot(
+        "plot: waiting\nreceives: {go: , stop: }\nstates:\n  a: {on: {go: a, stop: b}}\n  b: {final: true}\n"
+    )
 
 
 @cache
-def _entrance() -> Entrance:
-    return Entrance.on()
+def _entrance() -> PageAddress:
+    return PageAddress.on()
 
 
 @cache
@@ -537,12 +542,16 @@ class StoreTarget(Target):
 
 
 READERS = (
-    Target("plot", read_plot, ("domains/*/plots/*.yaml", "planning/plots/*.yaml", "tests/dsc/broken/yaml/*.yaml"), share=6),
+    Target(
+        "plot", read_plot, ("domains/*/plots/*.yaml", "planning/plots/*.yaml", "tests/dsc/broken/yaml/*.yaml"), share=6
+    ),
     Target("chart", read_chart, ("tests/dsc/broken/scxml/*.scxml",), share=6),
     Target("profile", read_profile, ("domains/*/profiles/*.yaml",), share=3),
     Target("scenario", read_scenario, (), share=2),
     Target("state", read_state, (), "json", share=3),
-    Target("domain", read_domain, ("domains/*/domain.pddl", "examples/*.pddl", "tests/dsc/broken/domain.pddl"), share=5),
+    Target(
+        "domain", read_domain, ("domains/*/domain.pddl", "examples/*.pddl", "tests/dsc/broken/domain.pddl"), share=5
+    ),
     Target("fragment", read_fragment, ("examples/kitchen/domain.pddl",), share=2),
     Target("problem", read_problem_file, ("examples/kitchen/problem.pddl",), share=5),
     Target("condition", read_condition, (), share=6),
@@ -555,5 +564,5 @@ READERS = (
     StoreTarget("knowledge-store", partial(read_store, name="knowledge"), form="database", share=1),
     StoreTarget("run-store", partial(read_store, name="run"), form="database", share=1),
 )
-FINE = (InputError, RunawayError, OutOfPatienceError)
+FINE = (InputError, RunawayError, WorkLimitError)
 """How a reader may end besides returning."""

@@ -48,7 +48,9 @@ def test_what_was_found_before_ends_as_it_may(file):
     assert found is None, found.said
 
 
-@pytest.mark.parametrize("file", [file for file in CALLS if not any(slow in file.name for slow in SLOW)], ids=lambda file: file.stem)
+@pytest.mark.parametrize(
+    "file", [file for file in CALLS if not any(slow in file.name for slow in SLOW)], ids=lambda file: file.stem
+)
 def test_calls_end_as_they_may(file):
     found = fuzz.tried(fuzz.Case("command", file.read_bytes()))
     assert found is None, found.said
@@ -56,12 +58,20 @@ def test_calls_end_as_they_may(file):
 
 def test_an_input_depends_on_seed_and_number_alone():
     assert [fuzz.case_of(3, number) for number in range(40)] == [fuzz.case_of(3, number) for number in range(40)]
-    assert len({fuzz.case_of(3, number) for number in range(40)} | {fuzz.case_of(4, number) for number in range(40)}) > 70
+    assert (
+        len({fuzz.case_of(3, number) for number in range(40)} | {fuzz.case_of(4, number) for number in range(40)}) > 70
+    )
 
 
 def test_every_command_and_option_is_drawn():
     """Those of the app itself, so that a new one is covered the day it appears."""
-    declared = {(words, option) for words, params in commands().items() for one in params for option in one.opts if option.startswith("-")}
+    declared = {
+        (words, option)
+        for words, params in commands().items()
+        for one in params
+        for option in one.opts
+        if option.startswith("-")
+    }
     drawn, random = set(), Random(0)
     for _ in range(40):
         for words in commands():
@@ -115,7 +125,11 @@ def test_a_hang_is_a_finding_and_the_others_go_on(tmp_path):
     (tmp_path / "campaign.py").write_text(CAMPAIGN)
     environment = {**os.environ, "PYTHONPATH": str(Path(fuzz.__file__).parent)}
     process = subprocess.Popen(
-        [sys.executable, tmp_path / "campaign.py"], stdout=subprocess.PIPE, text=True, env=environment, start_new_session=True
+        [sys.executable, tmp_path / "campaign.py"],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment,
+        start_new_session=True,
     )
     try:
         said, _ = process.communicate(timeout=60)
@@ -159,7 +173,9 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("mutation", sorted({*fuzz_mutation.TEXT, *fuzz_mutation.JSON, *fuzz_mutation.LINES}, key=lambda one: one.__name__))
+@pytest.mark.parametrize(
+    "mutation", sorted({*fuzz_mutation.TEXT, *fuzz_mutation.JSON, *fuzz_mutation.LINES}, key=lambda one: one.__name__)
+)
 def test_a_mutation_takes_any_input(mutation):
     inputs = (b"", b"a", b"(a (b c) 1.5)", b"\xff\x00", b'{"a": [1, {"b": null}]}', b"<a><b/></a>", b"\n\n")
     for number, data in enumerate(inputs * 20):

@@ -69,9 +69,7 @@ def conditions(of: Language) -> st.SearchStrategy[ex.Expression]:
     variable = st.sampled_from(OBJECTS)
     thing = st.builds(ex.Variable, variable) | st.builds(ex.Constant, st.sampled_from(THINGS))
     numeral = st.builds(ex.Constant, st.sampled_from(NUMBERS))
-    calls = st.one_of(
-        st.builds(lambda *a, f=f: ex.Call(f, a), *[thing] * arity) for f, arity in of.functions.items()
-    )
+    calls = st.one_of(st.builds(lambda *a, f=f: ex.Call(f, a), *[thing] * arity) for f, arity in of.functions.items())
     number = st.one_of(st.just(ex.Variable(NUMBER)), numeral, calls)
     total = number | st.builds(ex.Arithmetic, st.sampled_from("+-*"), st.tuples(number, number))
     atoms = st.one_of(
@@ -118,5 +116,3 @@ def brute_witnesses(e: ex.Expression, params: dict, world) -> list[dict]:
         values = NUMBERS if name == NUMBER else world.objects("object")
         found = [{**one, name: value} for one in found for value in values]
     return [one for one in found if brute(e, world, {**params, **one})]
-
-

@@ -76,7 +76,7 @@ def any_effects() -> st.SearchStrategy[eff.Effect]:
     leaf = (
         st.builds(eff.Add, any_atoms())
         | st.builds(eff.Delete, any_atoms())
-        | st.builds(eff.Assign, st.sampled_from(eff.ASSIGNMENTS), call, any_terms())
+        | st.builds(eff.NumericEffect, st.sampled_from(eff.ASSIGNMENTS), call, any_terms())
     )
     return st.recursive(
         leaf,

@@ -13,9 +13,9 @@ from kb_strategies import SCHEMA, THINGS
 from kb_worlds import PROPERTY, Ticks
 
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
-from knowledge_base.conditions.announcement import Announcer
+from knowledge_base.conditions.notification import Notifier
 from knowledge_base.journal.history import Version
-from knowledge_base.journal.memory import MemoryHistory
+from knowledge_base.journal.memory_history import MemoryHistory
 
 ON_SHELF = Delta(added=(fact("on", "cup1", "shelf"),))
 OFF_SHELF = Delta(removed=(fact("on", "cup1", "shelf"),))
@@ -98,7 +98,9 @@ def test_a_world_that_was_read_from_json_goes_on_at_its_version(path):
     assert told == [(4, False)]
 
 
-@pytest.mark.parametrize("delta", [OFF_SHELF, Delta(removed_nodes=("cup1",)), Delta(values={fact("weight", "cup1"): 0})])
+@pytest.mark.parametrize(
+    "delta", [OFF_SHELF, Delta(removed_nodes=("cup1",)), Delta(values={fact("weight", "cup1"): 0})]
+)
 def test_a_write_that_fails_flips_nothing_and_is_told_to_nobody(path, delta):
     with opened(path) as kb:
         condition = kb.install("(and (on ?x shelf) (> (weight ?x) 1))")
@@ -180,7 +182,7 @@ def commit(kb, delta) -> None:
 
 def test_nobody_is_called_while_a_transaction_is_open():
     lock, heard = RLock(), []
-    announcer = Announcer(lock)
+    announcer = Notifier(lock)
     with lock:
         announcer.queue(lambda: heard.append("of another commit"))
         with announcer.quiet():

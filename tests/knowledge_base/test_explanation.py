@@ -19,7 +19,12 @@ from knowledge_base.world.state import WorldState
 @pytest.fixture
 def kb() -> KnowledgeBase:
     made = KnowledgeBase(SCHEMA)
-    facts = (fact("heavy", "can1"), fact("on", "cup1", "shelf"), fact("on", "cup2", "shelf"), fact("on", "cup2", "home"))
+    facts = (
+        fact("heavy", "can1"),
+        fact("on", "cup1", "shelf"),
+        fact("on", "cup2", "shelf"),
+        fact("on", "cup2", "home"),
+    )
     made.apply(Delta(nodes=THINGS, added=facts, values={fact("weight", "cup1"): 3}), author="test")
     return made
 

@@ -150,7 +150,13 @@ DOMAINS = [
     ("(:action)", ParseError, "1:20", "an action has a name", None),
     ("(:action a :precondition)", ParseError, "1:31", "followed by nothing", None),
     ("(:action a :effects (p))", ParseError, "1:31", "no part ':effects'", ":effect"),
-    ("(:action a) (:action A :effect (p))", SchemaError, "1:41", r"differently before \(at d:1:29\), with the effect", None),
+    (
+        "(:action a) (:action A :effect (p))",
+        SchemaError,
+        "1:41",
+        r"differently before \(at d:1:29\), with the effect",
+        None,
+    ),
     ("(:action a :parameters ?x)", ParseError, "1:43", "in parentheses", None),
 ]
 

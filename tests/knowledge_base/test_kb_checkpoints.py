@@ -10,7 +10,7 @@ import pytest
 from kb_worlds import Ticks
 
 from knowledge_base import Delta, Fact, KnowledgeBase, Schema
-from knowledge_base.journal import checkpoints, journal, transaction
+from knowledge_base.journal import checkpoints, journal, write_transaction
 from knowledge_base.journal.checkpoints import CHECKPOINTS
 
 SCHEMA = Schema.parse("(define (domain d) (:predicates (quiet)))")
@@ -43,7 +43,7 @@ def in_file(path):
 
 
 def test_files_are_tidied_up_while_their_writers_go_on(path, monkeypatch):
-    monkeypatch.setattr(transaction, "TIDY_UP_AFTER", 20)
+    monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 20)
     by = set()
     tidy_up = checkpoints._tidy_up
     monkeypatch.setattr(checkpoints, "_tidy_up", lambda path: by.add(threading.current_thread()) or tidy_up(path))
@@ -61,7 +61,7 @@ def test_files_are_tidied_up_while_their_writers_go_on(path, monkeypatch):
 
 
 def test_nothing_stays_beside_a_closed_store_that_is_to_be_tidied_up(path, monkeypatch):
-    monkeypatch.setattr(transaction, "TIDY_UP_AFTER", 2)
+    monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 2)
     for _ in range(20):
         with opened(path) as kb:
             commit(kb, 6)
@@ -69,7 +69,7 @@ def test_nothing_stays_beside_a_closed_store_that_is_to_be_tidied_up(path, monke
 
 
 def test_a_store_that_cannot_be_tidied_up_loses_nothing(path, monkeypatch):
-    monkeypatch.setattr(transaction, "TIDY_UP_AFTER", 5)
+    monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 5)
 
     def broken(_):
         raise sqlite3.OperationalError("disk I/O error")
@@ -84,7 +84,7 @@ def test_a_store_that_cannot_be_tidied_up_loses_nothing(path, monkeypatch):
 
 
 def test_a_log_that_grows_faster_than_it_is_tidied_up_is_kept_short_by_its_writer(path, monkeypatch):
-    monkeypatch.setattr(transaction, "TIDY_UP_AFTER", 10)
+    monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 10)
     monkeypatch.setattr(checkpoints, "MOST_IN_LOG", 30)
     tidy_up = checkpoints._tidy_up
     monkeypatch.setattr(checkpoints, "_tidy_up", lambda path: tidy_up(path) and 31)  # he is never done
@@ -97,7 +97,7 @@ def test_a_log_that_grows_faster_than_it_is_tidied_up_is_kept_short_by_its_write
 
 
 def test_what_has_left_nothing_in_the_log_asks_for_nothing(path, monkeypatch):
-    monkeypatch.setattr(transaction, "TIDY_UP_AFTER", 1)
+    monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 1)
     asked = []
     monkeypatch.setattr(checkpoints, "_tidy_up", lambda path: asked.append(path) or 0)
     with opened(path) as kb:
@@ -137,7 +137,7 @@ def test_a_change_is_not_called_failed_because_no_thread_can_tidy_up_after_it(pa
         def start(self):
             raise RuntimeError("can't start new thread")
 
-    monkeypatch.setattr(transaction, "TIDY_UP_AFTER", 2)
+    monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 2)
     monkeypatch.setattr(checkpoints, "Thread", NoMore)
     with opened(path) as kb:
         commit(kb, 50)
@@ -159,7 +159,7 @@ def test_a_change_is_not_called_failed_because_its_writer_cannot_tidy_up(path, m
 
     really_writing = journal.writing
     monkeypatch.setattr(journal, "writing", writing)
-    monkeypatch.setattr(transaction, "TIDY_UP_AFTER", 2)
+    monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 2)
     monkeypatch.setattr(CHECKPOINTS, "is_behind", lambda _: True)
     with opened(path) as kb:
         commit(kb, 9)

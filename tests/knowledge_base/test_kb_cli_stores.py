@@ -60,7 +60,11 @@ def test_a_question_answers_with_its_exit_status_and_says_why(store) -> None:
     assert (yes.exit_code, yes.output) == (0, "yes\n")
     assert (no.exit_code, no.output) == (1, "no\nfalse  (clean mug)\n")
     why = json.loads(invoke("ask", store, "(and (on mug table) (clean mug))", "--json").output)
-    assert (why["holds"], why["why"]["decider"], [p["truth"] for p in why["why"]["children"]]) == (False, 1, [True, False])
+    assert (why["holds"], why["why"]["decider"], [p["truth"] for p in why["why"]["children"]]) == (
+        False,
+        1,
+        [True, False],
+    )
 
 
 def test_telling_prints_what_became_different(store) -> None:
@@ -249,7 +253,7 @@ def test_how_a_query_will_be_looked_up(store) -> None:
 
 
 def test_names_of_older_stores_are_printed_so_that_they_do_nothing_to_a_terminal(store, monkeypatch) -> None:
-    monkeypatch.setattr("knowledge_base.world.admission.is_name", lambda _: True)
+    monkeypatch.setattr("knowledge_base.world.change_checks.is_name", lambda _: True)
     run("tell", store, '(cup "Red one")', '(on "Red one" table)', '(cup "\x1b[31m")')
     (said,) = [fact for fact in json.loads(run("show", store, "--json"))["facts"] if "Red" in fact]
     assert run("retract", store, said).startswith('- (on "Red one" table)')

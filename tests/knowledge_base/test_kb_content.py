@@ -61,7 +61,9 @@ def test_a_declaration_says_what_those_before_it_are_worth():
 def test_functions_are_worth_what_was_set_and_until_then_what_their_type_says(kb):
     said = [kb.value("label", ("cup1",)), kb.value("pose", ("cup1", "map")), kb.value("powered", ("lamp",))]
     assert said == ["red", POSE, True]
-    unset = [kb.value(f, a) for f, a in {"label": ("cup2",), "pose": ("cup2", "map"), "owner": (), "age": ("cup1",)}.items()]
+    unset = [
+        kb.value(f, a) for f, a in {"label": ("cup2",), "pose": ("cup2", "map"), "owner": (), "age": ("cup1",)}.items()
+    ]
     assert unset == ["", (), "", 0]
     assert KnowledgeBase(KITCHEN).value("powered", ("lamp",)) is False
     with pytest.raises(UnknownNameError, match="did you mean 'label'"):
@@ -245,7 +247,9 @@ def test_a_store_with_content_is_opened_again_with_the_types_it_was_written_with
         assert repr(store.values()) == repr(kb.values())
         assert store.schema.functions["pose"].result == "geometry"
     other = "(define (domain d) (:types thing - object cup device - thing) (:predicates (said ?t - text) (on ?a ?b - thing)) (:functions (label ?t - thing)))"
-    with pytest.raises(SchemaMismatchError, match="the function 'label' was declared 'label thing - text', now it is 'label thing'"):
+    with pytest.raises(
+        SchemaMismatchError, match="the function 'label' was declared 'label thing - text', now it is 'label thing'"
+    ):
         KnowledgeBase.open(Schema.parse(other), path)
 
 
@@ -315,4 +319,3 @@ def test_what_a_problem_cannot_say_is_an_error(kb, delta, how, message):
     kb.apply(delta, author="test")
     with pytest.raises(InputError, match=message):
         kb.to_pddl(**{"domain": "kitchen", **how})
-

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from knowledge_base import Delta, KnowledgeBase, Schema, UnknownNameError, fact
 from knowledge_base.drawing import MOST_DRAWN, draw
-from knowledge_base.drawing.layout import arranged
-from knowledge_base.drawing.scene import scene
+from knowledge_base.drawing.picture import picture_of
+from knowledge_base.drawing.placement import arranged
 
 SCHEMA = Schema.parse(
     """(define (domain d) (:types cup place - object)
@@ -41,14 +41,14 @@ def test_what_is_said_of_one_thing_stands_on_its_card_and_of_two_on_an_arrow() -
 
 
 def test_a_fact_about_three_things_is_a_card_that_leads_to_each() -> None:
-    picture = scene(world(fact("gives", "c0", "c1", "table")), "c1", 1, 10)
+    picture = picture_of(world(fact("gives", "c0", "c1", "table")), "c1", 1, 10)
     assert [card.title for card in picture.cards] == ["c1", "c0", "table", "gives"]
     assert [(link.target, link.label) for link in picture.links] == [("c0", "1"), ("c1", "2"), ("table", "3")]
 
 
 def test_hops_say_how_far_the_neighbourhood_goes() -> None:
     kb = world(*(fact("on", f"c{i}", f"c{i + 1}") for i in range(7)))
-    assert [[card.title for card in scene(kb, "c3", hops, 99).cards] for hops in (0, 1, 2)] == [
+    assert [[card.title for card in picture_of(kb, "c3", hops, 99).cards] for hops in (0, 1, 2)] == [
         ["c3"],
         ["c3", "c2", "c4"],
         ["c3", "c2", "c4", "c1", "c5"],
@@ -74,7 +74,7 @@ def test_an_empty_world_is_an_empty_picture() -> None:
 @given(st.sets(st.tuples(st.sampled_from(NAMES), st.sampled_from(NAMES)), max_size=20))
 def test_no_card_covers_another_and_all_are_inside(pairs) -> None:
     kb = world(*(fact("on", *pair) for pair in sorted(pairs)))
-    picture = arranged(scene(kb, None, 1, 99))
+    picture = arranged(picture_of(kb, None, 1, 99))
     for one, other in combinations(picture.cards.values(), 2):
         apart_across = abs(one.x - other.x) >= (one.width + other.width) / 2
         apart_down = abs(one.y - other.y) >= (one.height + other.height) / 2

@@ -124,7 +124,9 @@ def test_a_change_is_a_delta_of_facts(kb, delta):
     assert everything(kb) == before
 
 
-@pytest.mark.parametrize("how", [{"author": 5}, {"author": None}, {"author": "a", "key": 5}, {"author": "a", "key": b"k"}])
+@pytest.mark.parametrize(
+    "how", [{"author": 5}, {"author": None}, {"author": "a", "key": 5}, {"author": "a", "key": b"k"}]
+)
 def test_authors_and_keys_are_text(kb, how):
     with pytest.raises(InputError, match="is text, not"):
         kb.apply(Delta(added=(fact("quiet"),)), **how)
@@ -173,7 +175,10 @@ def test_links_that_lead_to_each_other_are_no_store(tmp_path):
 
 
 def test_a_replacement_of_everything_is_refused(kb):
-    with kb.transaction(author="test") as tx, pytest.raises(SchemaError, match="would replace all other facts of 'heavy'"):
+    with (
+        kb.transaction(author="test") as tx,
+        pytest.raises(SchemaError, match="would replace all other facts of 'heavy'"),
+    ):
         tx.replace("heavy", "cup2")
     assert kb.ask("(heavy cup1)")
 

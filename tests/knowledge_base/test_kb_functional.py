@@ -18,7 +18,7 @@ from knowledge_base import (
     UnknownNameError,
     fact,
 )
-from knowledge_base.exchange import forms
+from knowledge_base.exchange import json_forms
 
 TEXT = """(define (domain house) (:types item place)
   (:predicates (robot-at ?p - place) (at ?i - item ?p - place) (between ?i - item ?a ?b - place) (quiet)))"""
@@ -86,7 +86,9 @@ SECOND = [
 @pytest.mark.parametrize("delta", SECOND)
 def test_a_second_fact_is_refused_and_names_both(delta):
     kb = house(HOUSE)
-    with pytest.raises(SchemaError, match=r"\((robot-)?at .*\) and \((robot-)?at .*\) cannot both be true.*use replace"):
+    with pytest.raises(
+        SchemaError, match=r"\((robot-)?at .*\) and \((robot-)?at .*\) cannot both be true.*use replace"
+    ):
         kb.apply(delta, author="test")
     assert kb.version == 1
     assert house(OPEN).apply(delta, author="test").version == 2
@@ -99,7 +101,11 @@ def test_a_second_fact_is_refused_and_names_both(delta):
         Delta(added=(fact("at", "cup", "hall"),), removed=(fact("at", "cup", "hall"),)),
         Delta(added=(fact("at", "cup", "kitchen"),), removed_nodes=("cup",), nodes={"cup": "item"}),
         Delta(added=(fact("at", "cup", "kitchen"),), removed_nodes=("hall",)),
-        Delta(added=(fact("at", "cup", "kitchen"),), replaced=(fact("at", "cup", "yard"),), removed=(fact("at", "cup", "yard"),)),
+        Delta(
+            added=(fact("at", "cup", "kitchen"),),
+            replaced=(fact("at", "cup", "yard"),),
+            removed=(fact("at", "cup", "yard"),),
+        ),
         Delta(added=(fact("at", "cup", "kitchen"),), replaced=(fact("at", "cup", "kitchen"),)),
     ],
 )
@@ -128,7 +134,10 @@ def test_bad_replacements(kb, delta, kind, message):
 
 @pytest.mark.parametrize(
     ("name", "kind", "message"),
-    [("att", UnknownNameError, "did you mean 'at'"), ("quiet", SchemaError, "'quiet' has no argument that others could settle")],
+    [
+        ("att", UnknownNameError, "did you mean 'at'"),
+        ("quiet", SchemaError, "'quiet' has no argument that others could settle"),
+    ],
 )
 def test_what_cannot_be_functional(name, kind, message):
     with pytest.raises(kind, match=message):
@@ -146,7 +155,7 @@ def test_that_a_predicate_is_functional_lasts(tmp_path):
     with pytest.raises(SchemaMismatchError, match=r"the predicate 'at' was functional, now it is not; .*'robot-at'"):
         KnowledgeBase.open(OPEN, path)
     assert OPEN.merged(HOUSE).functional == {"at", "robot-at"}
-    assert forms.schema_hash(OPEN) != forms.schema_hash(HOUSE)
+    assert json_forms.schema_hash(OPEN) != json_forms.schema_hash(HOUSE)
 
 
 def test_a_world_that_says_two_things_is_not_made_functional(tmp_path):

@@ -23,7 +23,7 @@ from knowledge_base import (
     StoreError,
     fact,
 )
-from knowledge_base.journal import journal, memory
+from knowledge_base.journal import journal, memory_history
 
 QUIET = Delta(added=(Fact("quiet"),))
 LOUD = Delta(removed=(Fact("quiet"),))
@@ -173,7 +173,9 @@ def test_a_version_is_a_whole_number(kb, version):
     assert kb.oldest == 0
 
 
-@pytest.mark.parametrize("time", [True, "x", (1,), float("nan"), float("inf"), 10**400, pytest.param(10**5000, id="digits")])
+@pytest.mark.parametrize(
+    "time", [True, "x", (1,), float("nan"), float("inf"), 10**400, pytest.param(10**5000, id="digits")]
+)
 def test_a_time_is_a_finite_number(kb, time):
     with pytest.raises(InputError, match=r"^a time is a finite number of seconds, not [^\n]*$"):
         kb.at(time=time)
@@ -225,7 +227,7 @@ def test_compaction_makes_the_file_smaller_and_keeps_it_whole(path):
 
 
 def test_in_memory_only_the_last_changes_are_kept(monkeypatch):
-    monkeypatch.setattr(memory, "MOST_KEPT", 3)
+    monkeypatch.setattr(memory_history, "MOST_KEPT", 3)
     kb = opened(None)
     for number in range(5):
         kb.apply(LOUD if number % 2 else QUIET, author="test")

@@ -32,7 +32,9 @@ ODD = [
 def agrees(name: str) -> None:
     """Told through the API, the name is refused, or comes back out of a PDDL file in every place."""
     kb = KnowledgeBase(SCHEMA)
-    said = Delta(nodes={name: "cup"}, added=(fact("clean", name), fact("said", name, name)), values={fact("label", name): name})
+    said = Delta(
+        nodes={name: "cup"}, added=(fact("clean", name), fact("said", name, name)), values={fact("label", name): name}
+    )
     try:
         kb.apply(said, author="test")
     except InputError:
@@ -46,7 +48,7 @@ def agrees(name: str) -> None:
     assert kb.ask(f"(clean {name})")
 
 
-@given(st.text(st.characters(exclude_categories=()), max_size=6) | st.text("aA1-?:;#t. \r\n\"()\\", max_size=4))
+@given(st.text(st.characters(exclude_categories=()), max_size=6) | st.text('aA1-?:;#t. \r\n"()\\', max_size=4))
 def test_every_name_is_refused_or_read_back(name: str) -> None:
     agrees(name)
 
@@ -56,7 +58,10 @@ def test_odd_names_are_refused_or_read_back(name: str) -> None:
     agrees(name)
 
 
-@given(st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=8) | st.text('a\r\n\\"n', min_size=1, max_size=6))
+@given(
+    st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=8)
+    | st.text('a\r\n\\"n', min_size=1, max_size=6)
+)
 def test_every_text_is_read_back(text: str) -> None:
     kb = KnowledgeBase(SCHEMA)
     said = Delta(nodes={"red": "cup"}, added=(fact("said", "red", text),), values={fact("label", "red"): text})
@@ -68,7 +73,11 @@ def test_every_text_is_read_back(text: str) -> None:
 @pytest.mark.parametrize("part", ["added", "values"])
 def test_text_that_no_file_can_hold_is_refused(part: str) -> None:
     kb = KnowledgeBase(SCHEMA)
-    half = {"added": (fact("said", "red", "\udc80"),)} if part == "added" else {"values": {fact("label", "red"): "ü\ud800"}}
+    half = (
+        {"added": (fact("said", "red", "\udc80"),)}
+        if part == "added"
+        else {"values": {fact("label", "red"): "ü\ud800"}}
+    )
     with pytest.raises(InputError, match=r"text that can be written to a file, not '(\\xfc)?\\ud"):
         kb.apply(Delta(nodes={"red": "cup"}, **half), author="test")
     assert kb.version == 0
@@ -104,7 +113,7 @@ def test_each_door_refuses_what_pddl_cannot_say(tmp_path) -> None:
 
 def test_a_store_that_has_such_a_name_goes_on(tmp_path, monkeypatch) -> None:
     with monkeypatch.context() as older, KnowledgeBase.open(SCHEMA, tmp_path / "s.kb") as kb:
-        older.setattr("knowledge_base.world.admission.is_name", lambda _: True)
+        older.setattr("knowledge_base.world.change_checks.is_name", lambda _: True)
         kb.apply(Delta(nodes={BAD: "cup"}), author="old")
     with KnowledgeBase.open(None, tmp_path / "s.kb") as kb:
         kb.apply(Delta(nodes={BAD: "cup"}, added=(fact("clean", BAD),)), author="new")

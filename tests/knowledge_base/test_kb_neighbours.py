@@ -15,9 +15,9 @@ from hostile_files import LINKS_TO_TEXT, STRANGERS, picture
 from dsc.sequencer.run_tables import has_run
 from dsc.sequencer.run_tables import records_of as run_records
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
-from knowledge_base.cli.telling import new
+from knowledge_base.cli.changes import new
 from knowledge_base.journal.lock import WriterLock
-from knowledge_base.journal.neighbours import ENDINGS, is_database, store_owning
+from knowledge_base.journal.sidecar_files import ENDINGS, is_database, store_owning
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - cup)) (:constants c1 - cup))")
 CLEAN = Delta(added=(fact("clean", "c1"),))
@@ -213,7 +213,9 @@ def test_names_that_no_store_has(tmp_path, monkeypatch, name, read_only) -> None
     assert picture(tmp_path) == before
 
 
-@pytest.mark.parametrize("name", [b"a?mode=memory", b"a#b%20c%00", b"two\nlines", b"\xff\xfe.kb", "\u00fc\u4e2d".encode(), b"-wal"])
+@pytest.mark.parametrize(
+    "name", [b"a?mode=memory", b"a#b%20c%00", b"two\nlines", b"\xff\xfe.kb", "\u00fc\u4e2d".encode(), b"-wal"]
+)
 def test_odd_names_are_taken_literally(tmp_path, name) -> None:
     path = tmp_path / os.fsdecode(name)
     with KnowledgeBase.open(SCHEMA, path) as kb:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from knowledge_base import Fact, InputError, KnowledgeBase, Schema, SchemaError, fact
 from knowledge_base.exchange.pddl import read_domain, read_problem
 from knowledge_base.language.check import check, check_effect, check_parameters
-from knowledge_base.language.effect import AllOf, Assign, ForEach, When
+from knowledge_base.language.effect import AllOf, ForEach, NumericEffect, When
 from knowledge_base.language.expression import And
 from knowledge_base.language.parser import parse_condition, parse_effect
 from knowledge_base.language.printer import to_text
@@ -71,7 +71,7 @@ def test_a_domain_in_the_wild() -> None:
     assert drive.place.line == 15
     assert isinstance(drive.effect, AllOf)
     *_, cost, everything = drive.effect.parts
-    assert isinstance(cost, Assign)
+    assert isinstance(cost, NumericEffect)
     assert isinstance(everything, ForEach)
     assert isinstance(everything.effect, When)
     assert (noop.parameters, noop.precondition, noop.effect) == ((), And(()), AllOf(()))

@@ -12,9 +12,9 @@ from kb_strategies import SCHEMA, THINGS, deltas
 
 from knowledge_base import Delta, InputError, KnowledgeBase, SchemaError, UnknownNameError, fact
 from knowledge_base.language import expression as ex
-from knowledge_base.language.asking import holds, query
+from knowledge_base.language.evaluator import holds, query
+from knowledge_base.language.generated_code import MOST_LOOKUPS, condition_source, query_source
 from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.source import MOST_LOOKUPS, condition_source, query_source
 
 ITEMS, PLACES = ("cup1", "cup2", "can1"), ("shelf", "home")
 
@@ -129,7 +129,12 @@ def test_a_prepared_question_says_what_is_wrong(kb) -> None:
     with pytest.raises(InputError, match="'\\?place' is a name, a number or a truth value, not None"):
         below.query(None)
     heavy = kb.prepare("(and (on ?x ?p) (> (weight ?x) ?least))", "p", "least")
-    for ask, values in ((below.query, ()), (below.query, ("shelf", 1)), (heavy.query, ("shelf",)), (kb.prepare("(quiet)").ask, (1,))):
+    for ask, values in (
+        (below.query, ()),
+        (below.query, ("shelf", 1)),
+        (heavy.query, ("shelf",)),
+        (kb.prepare("(quiet)").ask, (1,)),
+    ):
         with pytest.raises(InputError, match=f"takes the values of its parameters .*, not {len(values)} values"):
             ask(*values)
     with pytest.raises(SchemaError, match="cannot be a geometry"):

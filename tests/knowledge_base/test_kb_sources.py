@@ -302,7 +302,9 @@ def test_sources_are_fed_from_many_threads(kb):
 
 
 STEPS = st.lists(
-    st.tuples(st.sampled_from(["feed", "close", "set", "remove"]), st.sampled_from(["cup1", "cup2"]), st.integers(0, 2)),
+    st.tuples(
+        st.sampled_from(["feed", "close", "set", "remove"]), st.sampled_from(["cup1", "cup2"]), st.integers(0, 2)
+    ),
     max_size=12,
 )
 
@@ -312,7 +314,11 @@ STEPS = st.lists(
 def test_conditions_agree_with_asking_anew_and_the_graph_with_the_world(steps):
     kb = KnowledgeBase(SCHEMA)
     kb.apply(Delta(nodes=NODES), author="test")
-    texts = ["(= (weight cup1) (weight cup2))", "(exists (?c - cup) (> (weight ?c) 1))", "(forall (?c - cup) (= (weight ?c) 0))"]
+    texts = [
+        "(= (weight cup1) (weight cup2))",
+        "(exists (?c - cup) (> (weight ?c) 1))",
+        "(forall (?c - cup) (= (weight ?c) 0))",
+    ]
     conditions = {text: kb.install(text) for text in texts}
     expected = {text: kb.ask(text) for text in texts}
     told, due = {text: heard(c) for text, c in conditions.items()}, {text: [] for text in texts}

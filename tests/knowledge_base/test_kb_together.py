@@ -115,7 +115,11 @@ def test_a_change_that_cannot_be_written_takes_the_others_with_it(path):
 
 
 def test_rows_that_cannot_be_written_are_told_as_an_error_of_the_store(path):
-    with KnowledgeBase.open(SCHEMA, path) as kb, pytest.raises(StoreError, match="nowhere"), kb.together() as connection:
+    with (
+        KnowledgeBase.open(SCHEMA, path) as kb,
+        pytest.raises(StoreError, match="nowhere"),
+        kb.together() as connection,
+    ):
         connection.execute("INSERT INTO nowhere VALUES (1)")
 
 

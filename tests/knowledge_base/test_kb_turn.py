@@ -12,7 +12,7 @@ import pytest
 from kb_interrupts import interrupted
 
 from knowledge_base import ConflictError, Delta, KnowledgeBase, Schema, fact
-from knowledge_base.world.turn import Stamp, Turn
+from knowledge_base.world.read_write_lock import ReadWriteLock, Stamp
 
 
 class Crowd:
@@ -20,7 +20,7 @@ class Crowd:
 
     def __init__(self) -> None:
         self.stamp = Stamp()
-        self.turn = Turn(self.stamp, patience_s=0)
+        self.turn = ReadWriteLock(self.stamp, patience_s=0)
         self.order: list[str] = []
         self._threads: list[threading.Thread] = []
 
@@ -167,7 +167,7 @@ def test_who_is_interrupted_while_waiting_keeps_nobody_waiting(crowd: Crowd, mon
 
     with crowd.turn.changing():
         with monkeypatch.context() as patch:
-            patch.setattr("knowledge_base.world.line.SimpleQueue", Interrupted)
+            patch.setattr("knowledge_base.world.fair_lock.SimpleQueue", Interrupted)
             for enter in (lambda: crowd.turn, crowd.turn.changing):
                 thread = threading.Thread(target=waits, args=(enter,))
                 thread.start()
@@ -203,27 +203,27 @@ def test_writers_get_on_among_readers_that_ask_without_pause(tmp_path, kept: str
         assert all(during)
 
 
-def changes(turn: Turn) -> None:
+def changes(turn: ReadWriteLock) -> None:
     with turn.changing():
         pass
 
 
-def changes_within_a_change(turn: Turn) -> None:
+def changes_within_a_change(turn: ReadWriteLock) -> None:
     with turn.changing(), turn.changing():
         turn.made()
 
 
-def is_alone(turn: Turn) -> None:
+def is_alone(turn: ReadWriteLock) -> None:
     with turn.alone():
         pass
 
 
-def changes_and_asks_alone(turn: Turn) -> None:
+def changes_and_asks_alone(turn: ReadWriteLock) -> None:
     with turn.alone(), turn.alone(), turn.changing():
         asks(turn)
 
 
-def asks(turn: Turn) -> None:
+def asks(turn: ReadWriteLock) -> None:
     with turn:
         pass
 
@@ -231,12 +231,12 @@ def asks(turn: Turn) -> None:
 @pytest.mark.parametrize("other", [None, changes, is_alone, asks])
 @pytest.mark.parametrize("work", [changes, changes_within_a_change, is_alone, changes_and_asks_alone, asks])
 def test_whoever_is_interrupted_at_any_moment_leaves_nothing_taken(
-    work: Callable[[Turn], None], other: Callable[[Turn], None] | None
+    work: Callable[[ReadWriteLock], None], other: Callable[[ReadWriteLock], None] | None
 ) -> None:
     was_interrupted, moment = True, 0
     while was_interrupted:
         stamp = Stamp()
-        turn, begun, over = Turn(stamp), threading.Event(), threading.Event()
+        turn, begun, over = ReadWriteLock(stamp), threading.Event(), threading.Event()
         others = [threading.Thread(target=keeps, args=(turn, other, begun, over), daemon=True)] if other else []
         for thread in others:
             thread.start()
@@ -254,7 +254,9 @@ def test_whoever_is_interrupted_at_any_moment_leaves_nothing_taken(
     assert moment > 1
 
 
-def keeps(turn: Turn, how: Callable[[Turn], None], begun: threading.Event, over: threading.Event) -> None:
+def keeps(
+    turn: ReadWriteLock, how: Callable[[ReadWriteLock], None], begun: threading.Event, over: threading.Event
+) -> None:
     """Keep others waiting until one waits, or has given up."""
     how_long = {changes: turn.changing, is_alone: turn.alone, asks: lambda: turn}[how]
     with how_long():

@@ -9,7 +9,7 @@ import pytest
 from kb_strategies import SCHEMA, THINGS
 
 from knowledge_base import Delta, InputError, KnowledgeBase, ParseError, fact
-from knowledge_base.conditions.hysteresis import relaxed
+from knowledge_base.conditions.damping import relaxed
 from knowledge_base.language import effect as eff
 from knowledge_base.language import expression as ex
 from knowledge_base.language.check import check, check_effect, check_term

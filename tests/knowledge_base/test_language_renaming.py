@@ -16,7 +16,11 @@ from knowledge_base.language.renaming import fresh, renamed
         ("(< (+ (weight ?x) 1) (weight ?y))", {"x": "z"}, "(< (+ (weight ?z) 1) (weight ?y))"),
         ("(exists (?x) (on ?x ?y))", {"x": "z"}, "(exists (?x) (on ?x ?y))"),
         ("(exists (?x) (on ?x ?y))", {"y": "x"}, "(exists (?x_2) (on ?x_2 ?x))"),
-        ("(forall (?x - cup) (or (on ?x ?y) (on ?x_2 ?x)))", {"y": "x"}, "(forall (?x_3 - cup) (or (on ?x_3 ?x) (on ?x_2 ?x_3)))"),
+        (
+            "(forall (?x - cup) (or (on ?x ?y) (on ?x_2 ?x)))",
+            {"y": "x"},
+            "(forall (?x_3 - cup) (or (on ?x_3 ?x) (on ?x_2 ?x_3)))",
+        ),
         ("(exists (?x) (forall (?y) (on ?x ?z)))", {"z": "y"}, "(exists (?x) (forall (?y_2) (on ?x ?y)))"),
         ("(exists (?x ?y) (on ?x ?z))", {"z": "x", "q": "y"}, "(exists (?x_2 ?y) (on ?x_2 ?x))"),
     ],

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from knowledge_base import KnowledgeBase, Schema, outputs
+from knowledge_base import KnowledgeBase, Schema, output_files
 from knowledge_base.errors import InputError
-from knowledge_base.outputs import Output, write_all
+from knowledge_base.output_files import Output, write_all
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - cup)))")
 
@@ -40,7 +40,13 @@ def ways_to(path: Path) -> dict[str, Path]:
     (folder / "link2").symlink_to(folder / "link")
     (folder / "hard").hardlink_to(path)
     dotted = Path(f"{folder}/./dir/../{path.name}")
-    return {"itself": path, "link": folder / "link", "link to it": folder / "link2", "hard": folder / "hard", "dots": dotted}
+    return {
+        "itself": path,
+        "link": folder / "link",
+        "link to it": folder / "link2",
+        "hard": folder / "hard",
+        "dots": dotted,
+    }
 
 
 # --- stores and other files of the command
@@ -176,7 +182,7 @@ def test_a_process_that_dies_half_way_leaves_the_old_file(tmp_path) -> None:
     file.write_text("old")
     code = """
 import os, signal, sys
-from knowledge_base.outputs import Output
+from knowledge_base.output_files import Output
 os.fsync = lambda _: os.kill(os.getpid(), signal.SIGKILL)
 Output(sys.argv[1], "--to").write("new" * 100_000)
 """
@@ -190,7 +196,7 @@ def test_a_full_medium_leaves_the_old_file(tmp_path) -> None:
     file.write_text("old")
     code = """
 import resource, sys
-from knowledge_base.outputs import Output
+from knowledge_base.output_files import Output
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 try:
     Output(sys.argv[1], "--to").write("new" * 100_000)
@@ -238,7 +244,7 @@ def test_a_fifo_gets_the_text_and_stays(tmp_path) -> None:
 
 
 def test_a_fifo_that_nobody_reads_is_not_waited_for(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(outputs, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(output_files, "PATIENCE_S", 0.0)
     os.mkfifo(tmp_path / "fifo")
     out = Output(tmp_path / "fifo", "--to")
     with pytest.raises(InputError, match="nobody reads it"):

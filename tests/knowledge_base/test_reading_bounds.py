@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from knowledge_base import KnowledgeBase
 from knowledge_base.cli.app import app
 from knowledge_base.errors import InputError, ParseError, SchemaError
-from knowledge_base.journal.neighbours import is_database
+from knowledge_base.journal.sidecar_files import is_database
 from knowledge_base.pddl import files
 from knowledge_base.pddl.domain_text import MOST_IMPLIED, parse_domain
 from knowledge_base.world.schema import MAX_TYPE_DEPTH, MAX_TYPES, Schema
@@ -46,7 +46,7 @@ def steps_of(work) -> int:
 @pytest.mark.parametrize("read", [Schema.from_pddl, KnowledgeBase.from_json])
 def test_a_device_without_end_is_refused_at_the_bound(read, monkeypatch):
     monkeypatch.setattr(files, "MAX_BYTES", 1000)
-    monkeypatch.setattr("knowledge_base.exchange.json.MAX_WORLD_BYTES", 1000)
+    monkeypatch.setattr("knowledge_base.exchange.world_json.MAX_WORLD_BYTES", 1000)
     with pytest.raises(InputError, match="/dev/zero: the text has 1001 bytes; at most 1000 are read"):
         read(Path("/dev/zero"))
 

@@ -32,7 +32,9 @@ class ObedientRobot(Component):
         self.knowledge = None
 
     @skill(outcomes={"did": {}, "failed": {}})
-    async def act(self, call: SkillCall, way: str, action: str, one: str = "", two: str = "", three: str = "") -> Outcome:
+    async def act(
+        self, call: SkillCall, way: str, action: str, one: str = "", two: str = "", three: str = ""
+    ) -> Outcome:
         """One planning action, done in one way."""
         await call.clock.sleep(self.seconds)
         if self.until is not None:
@@ -48,7 +50,9 @@ class ObedientRobot(Component):
 
 def plots(domain, ways=None):
     """A plot for each planning action; of those named in `ways` one for each of these names."""
-    return [plot(action, way) for action in domain.actions.values() for way in (ways or {}).get(action.name, [action.name])]
+    return [
+        plot(action, way) for action in domain.actions.values() for way in (ways or {}).get(action.name, [action.name])
+    ]
 
 
 def plot(action, way):

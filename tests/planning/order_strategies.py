@@ -37,7 +37,8 @@ class Planned:
 def atoms(terms: tuple[str, ...]) -> st.SearchStrategy[str]:
     """Facts that some action may change."""
     return st.one_of(
-        st.sampled_from(["(p)", "(q)"]), st.builds("({} {})".format, st.sampled_from(["r", "s"]), st.sampled_from(terms))
+        st.sampled_from(["(p)", "(q)"]),
+        st.builds("({} {})".format, st.sampled_from(["r", "s"]), st.sampled_from(terms)),
     )
 
 

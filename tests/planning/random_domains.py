@@ -36,7 +36,8 @@ ACTIONS = st.lists(_action, min_size=2, max_size=4)
 START = st.tuples(st.sets(st.sampled_from(FACTS), max_size=1), st.tuples(*3 * [st.integers(0, 1)]), st.integers(0, 2))
 _wanted = st.sampled_from(["(p a)", "(p b)", "(r)", "(> (f b) 1)", "(= (f a) 3)", "(>= (g) 2)", "(< (f a) (g))"])
 GOAL = st.one_of(
-    st.builds("(and {} {})".format, _wanted, _wanted), st.builds("(or (and {0} {1}) (and {2} (not {1})))".format, *3 * [_wanted])
+    st.builds("(and {} {})".format, _wanted, _wanted),
+    st.builds("(or (and {0} {1}) (and {2} (not {1})))".format, *3 * [_wanted]),
 )
 
 

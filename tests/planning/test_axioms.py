@@ -15,10 +15,10 @@ from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep
-from planning.posing.axioms import Derivable
-from planning.posing.derived import derivation
+from planning.problem.axioms import Derivable
+from planning.problem.derived import derivation
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 
 ROOMS, DOORS = "abc", (("a", "b"), ("b", "c"))
@@ -46,7 +46,7 @@ def grid(*facts):
 
 
 def plan_for(domain, world, goal):
-    return solution(Derivable.of(domain).pose(world, parse_condition(goal)), eagerly)
+    return solution(Derivable.of(domain).build_problem(world, parse_condition(goal)), eagerly)
 
 
 def eagerly(problem):
@@ -113,10 +113,20 @@ def facts_of(world, domain, name):
 @given(
     st.sets(st.sampled_from(DOORS)),
     st.sets(st.sampled_from(ROOMS), max_size=2),
-    st.lists(st.sampled_from(["(at c)", "(reach a c)", "(stuck c)", "(sees a)", "(not (lit b))"]), min_size=1, max_size=2, unique=True),
+    st.lists(
+        st.sampled_from(["(at c)", "(reach a c)", "(stuck c)", "(sees a)", "(not (lit b))"]),
+        min_size=1,
+        max_size=2,
+        unique=True,
+    ),
 )
 def test_there_is_a_plan_if_and_only_if_the_axioms_say_so(opened, stuck, parts):
-    domain, world = grid(fact("at", "a"), fact("lit", "b"), *(fact("open", *one) for one in opened), *(fact("stuck", one) for one in stuck))
+    domain, world = grid(
+        fact("at", "a"),
+        fact("lit", "b"),
+        *(fact("open", *one) for one in opened),
+        *(fact("stuck", one) for one in stuck),
+    )
     goal = f"(and {' '.join(parts)})"
     plan = plan_for(domain, world, goal)
     assert (plan is not None) == reachable(domain, world, goal)
@@ -137,7 +147,10 @@ def test_what_was_derived_is_gone_when_what_it_followed_from_is():
 @pytest.mark.parametrize(
     ("goal", "said"),
     [
-        ("(not (reach a c))", r"the goal asks for the opposite of 'reach'.*grid.pddl:4:.*'open', 'stuck'.*Fast Downward"),
+        (
+            "(not (reach a c))",
+            r"the goal asks for the opposite of 'reach'.*grid.pddl:4:.*'open', 'stuck'.*Fast Downward",
+        ),
         ("(imply (sees a) (lit a))", "the goal asks for the opposite of 'reach'"),
     ],
 )
@@ -147,9 +160,14 @@ def test_that_something_does_not_follow_cannot_be_asked_for(goal, said):
 
 
 def test_an_action_that_asks_for_that_is_named_with_its_place():
-    text = GRID.replace("(:action oil", "(:action cry :parameters (?a - room) :precondition (not (sees ?a)) :effect (lit ?a))\n  (:action oil")
+    text = GRID.replace(
+        "(:action oil",
+        "(:action cry :parameters (?a - room) :precondition (not (sees ?a)) :effect (lit ?a))\n  (:action oil",
+    )
     domain, (_, world) = PlanningDomain.parse(text, "grid.pddl"), grid(fact("at", "a"))
-    with pytest.raises(UnsupportedActionError, match="the planning action 'cry' asks for the opposite of 'reach'") as caught:
+    with pytest.raises(
+        UnsupportedActionError, match="the planning action 'cry' asks for the opposite of 'reach'"
+    ) as caught:
         plan_for(domain, world, "(lit c)")
     assert caught.value.place.source == "grid.pddl"
 

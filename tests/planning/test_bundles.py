@@ -68,7 +68,12 @@ def test_each_program_has_components_of_its_own():
 def test_what_is_needed_comes_first_and_once():
     one, two = Bundle("one", needs=("two",)), Bundle("two", needs=("one",))
     there = {"handling": HANDLING, "one": one, "two": two}
-    assert [bundle.name for bundle in gathered([TASKS, "handling", "one"], there)] == ["handling", "tasks", "two", "one"]
+    assert [bundle.name for bundle in gathered([TASKS, "handling", "one"], there)] == [
+        "handling",
+        "tasks",
+        "two",
+        "one",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -116,7 +121,10 @@ def test_a_folder_is_read_with_its_mistakes_named(tmp_path):
 @pytest.mark.parametrize(
     ("found", "said"),
     [
-        (ImportError("no module named robots"), "the bundle 'odd' of 'robots:odd' cannot be loaded: ImportError: no module"),
+        (
+            ImportError("no module named robots"),
+            "the bundle 'odd' of 'robots:odd' cannot be loaded: ImportError: no module",
+        ),
         (5, "the entry point 'odd' of 'robots:odd' leads to 5, which is no Bundle"),
     ],
 )

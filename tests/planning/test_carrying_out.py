@@ -13,7 +13,7 @@ from obedient_robot import FAILED, ObedientRobot, plots
 from dsc import Event, parse_plot
 from knowledge_base import Delta, fact
 from planning import Executive, Plan, PlannerProcess, PlanStep
-from planning.execution.telling import why_broken
+from planning.execution.plan_records import why_broken
 from planning.plan import EngineFailed, PlanFound
 from planning.validation import Validation
 
@@ -28,7 +28,9 @@ class Run:
         self.planner = planner or BreadthFirst()
         self.robot = ObedientRobot(DOMAIN, script, seconds=1.0 if simulated else 0.02)
         holder = parse_plot(HOLDER.replace("GOAL", goal).replace("REPLANS", str(replans)))
-        program = Executive(DOMAIN, [holder, *plots(DOMAIN, ways)], [self.robot], planner=self.planner, foresight=foresight)
+        program = Executive(
+            DOMAIN, [holder, *plots(DOMAIN, ways)], [self.robot], planner=self.planner, foresight=foresight
+        )
         self.knowledge = self.robot.knowledge = program.knowledge
         told = [fact("at", "a"), *(fact("in", t, "a") for t in things), *(fact("way", *one.split()) for one in links)]
         nodes = {**dict.fromkeys(ROOMS, "room"), **dict.fromkeys(things, "thing")}
@@ -120,11 +122,15 @@ def test_a_running_step_that_the_new_plan_begins_with_is_not_interrupted():
     late = (0.5, Delta(added=(fact("in", "plate", "a"),), nodes={"plate": "thing"}))
     run = Run("(forall (?t - thing) (in ?t b))", then=[late])
     assert run.how == "reached"
-    assert len(run.done) == len(set(run.done)) == 5  # the first step was done once, although the plan was broken meanwhile
+    assert (
+        len(run.done) == len(set(run.done)) == 5
+    )  # the first step was done once, although the plan was broken meanwhile
     (broken,) = run.said("broken")
     (replaced,) = run.said("replaced")
     assert (replaced["after"], replaced["plot"]) == ("plan_1", "plan_2")
-    cancelled = [r for r in run.records if r.type == "action" and r.data.get("action") == "start" and "act" in r.data["skill"]]
+    cancelled = [
+        r for r in run.records if r.type == "action" and r.data.get("action") == "start" and "act" in r.data["skill"]
+    ]
     began = [r.data["arguments"]["action"] for r in cancelled if r.t < 1.0]
     assert began == ["take"]
     assert why_broken(broken).endswith("which the goal needs, does not hold since version 2 (somebody)")
@@ -137,7 +143,9 @@ def test_a_running_step_that_is_hit_itself_is_interrupted_and_the_reason_can_be_
     assert run.done == ["(go a b)", "(take cup b)", "(go b c)", "(put cup c)"]
     (broken,) = run.said("broken")
     assert broken["link"] == {"fact": "(in cup a)", "step": 1, "user": "(take cup a)"}
-    assert why_broken(broken) == "(in cup a), which step 1, (take cup a), needs, does not hold since version 2 (somebody)"
+    assert (
+        why_broken(broken) == "(in cup a), which step 1, (take cup a), needs, does not hold since version 2 (somebody)"
+    )
 
 
 def test_what_somebody_else_did_is_skipped_and_said():
@@ -259,7 +267,9 @@ class Bad:
 )  # fmt: skip
 def test_a_planner_that_misbehaves_ends_in_no_plan_and_is_named(how, said, monkeypatch):
     if how == "hangs":
-        monkeypatch.setattr("planning.execution.asking.PATIENCE", -4.9)  # its five seconds of real time are over soon
+        monkeypatch.setattr(
+            "planning.execution.planner_call.PATIENCE", -4.9
+        )  # its five seconds of real time are over soon
     planner = Bad(how)
     run = Run("(at c)", planner=planner)
     assert run.end.finished

@@ -12,7 +12,7 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from planning import Executive, PlanningDomain, PlanStep
 from planning.plan import PlanFound
-from planning.posing.problem import pose
+from planning.problem.construction import build_problem
 
 THINGS = ("x", "y", "z")
 PREDICATES = ("p", "q", "r", "s")
@@ -34,7 +34,9 @@ def domains(draw):
         condition = [draw(literal(draw(st.sampled_from(variables)))) for _ in range(draw(st.integers(0, 2)))]
         if draw(st.integers(0, 5)) == 0:
             condition.append(f"(forall (?t - thing) (or {draw(literal('?t'))} {draw(literal('?t'))}))")
-        effect = list(dict.fromkeys(draw(literal(draw(st.sampled_from(variables)))) for _ in range(draw(st.integers(1, 2)))))
+        effect = list(
+            dict.fromkeys(draw(literal(draw(st.sampled_from(variables)))) for _ in range(draw(st.integers(1, 2))))
+        )
         if draw(st.integers(0, 4)) == 0:
             effect.append(f"(when {draw(literal(variables[0]))} {draw(literal(variables[-1]))})")
         declared = " ".join(variables)
@@ -54,7 +56,9 @@ def tasks(draw):
     domain, facts = draw(domains()), draw(st.sets(st.sampled_from(FACTS)))
     start, ahead = a_world(domain, facts), a_world(domain, facts)
     for choice in draw(st.lists(st.integers(0, 99), min_size=3, max_size=8)):
-        steps = [step for step in all_steps(domain) if domain.applicable(step, ahead) and news(start, ahead, domain, step)]
+        steps = [
+            step for step in all_steps(domain) if domain.applicable(step, ahead) and news(start, ahead, domain, step)
+        ]
         if steps:
             step = steps[choice % len(steps)]
             ahead.apply(domain.effects(step, ahead), "walk")
@@ -135,7 +139,7 @@ def test_a_run_ends_and_claims_only_what_holds_and_gets_there_if_it_can(task, ch
 
 def solvable(domain, world, wanted):
     planner = BreadthFirst()
-    coroutine = planner.solve(pose(domain, world, wanted), 1.0)
+    coroutine = planner.solve(build_problem(domain, world, wanted), 1.0)
     try:
         coroutine.send(None)
     except StopIteration as answer:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planning.ordering.chains import chains
-from planning.ordering.order import PartialOrder
+from planning.ordering.partial_order import PartialOrder
 from planning.plan import PlanStep
 
 

@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from dsc.text.plots import parse_plot
+from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
 from planning.cli import doctor_command, plan_command
 from planning.engines import registry
@@ -174,7 +174,7 @@ def test_the_doctor_lists_every_engine_with_what_it_can_do_and_what_it_lacks(mon
 
 
 def test_the_doctor_fits_a_terminal_of_100_columns(monkeypatch):
-    monkeypatch.setattr("planning.cli.doctor.PIPE_WIDTH", 100)
+    monkeypatch.setattr("planning.cli.commands.PIPE_WIDTH", 100)
     app = typer.Typer()
     app.command()(doctor_command)
     lines = CliRunner().invoke(app, [], catch_exceptions=False).stdout.splitlines()
@@ -347,13 +347,18 @@ ERRAND = """(define (domain errand) (:types place) (:predicates (at ?p - place) 
         ("(= (left) 0) (= (toll a) 2)", []),
         ("(= (left) 0)", ["(toll a) has no value and counts as 0"]),
         ("", ["(left) has no value and counts as 0", "(toll a) has no value and counts as 0"]),
-        ("(= (left) 0) (= (toll a) 2) (near a)", ["problem.pddl: what :init says of 'near' is not heeded: it is derived"]),
+        (
+            "(= (left) 0) (= (toll a) 2) (near a)",
+            ["problem.pddl: what :init says of 'near' is not heeded: it is derived"],
+        ),
     ],
 )
 def test_numbers_without_a_value_and_facts_that_only_follow_from_others_are_noted(run, tmp_path, init, notes):
     (tmp_path / "errand.pddl").write_text(ERRAND)
     problem = f"(define (problem p) (:domain errand) (:objects a - place) (:init {init}) (:goal (near a)))"
-    answer = json.loads(run("--json", "--engine", "pyperplan", problem=problem, domains=[tmp_path / "errand.pddl"]).stdout)
+    answer = json.loads(
+        run("--json", "--engine", "pyperplan", problem=problem, domains=[tmp_path / "errand.pddl"]).stdout
+    )
     assert answer["steps"] == ["(go a)"]
     assert [one.replace(f"{tmp_path}/", "") for one in answer["notes"]] == notes
 
@@ -373,7 +378,9 @@ TOWERS = """(define (domain towers) (:types block)
         ("(above a a)", 1, "there is no plan"),
     ],
 )
-def test_a_predicate_that_follows_from_itself_and_from_what_actions_change_is_planned_with(run, tmp_path, goal, status, said):
+def test_a_predicate_that_follows_from_itself_and_from_what_actions_change_is_planned_with(
+    run, tmp_path, goal, status, said
+):
     (tmp_path / "towers.pddl").write_text(TOWERS)
     problem = f"(define (problem p) (:domain towers) (:objects a b c - block) (:init (clear a) (clear b) (clear c)) (:goal {goal}))"
     result = run("--engine", "pyperplan", "--explain", problem=problem, domains=[tmp_path / "towers.pddl"])

@@ -22,7 +22,7 @@ from planning.engines.race import PlannerRace
 from planning.engines.registry import engine
 from planning.engines.request import read, written
 from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, Timing
-from planning.posing.problem import pose
+from planning.problem.construction import build_problem
 from planning.validation import validate
 
 CELLAR = """(define (domain cellar) (:types match fuse)
@@ -53,7 +53,7 @@ def cellar(matches=2, fuses=2, burns=5.0):
 
 
 def posed(goal=GOAL, **world):
-    return pose(DOMAIN, cellar(**world), parse_condition(goal), durations=True)
+    return build_problem(DOMAIN, cellar(**world), parse_condition(goal), durations=True)
 
 
 def step(text):
@@ -73,7 +73,7 @@ def indices(problem, *timed):
 def said(world, *timed, goal=GOAL):
     """What both judges say: the domain's and the ground problem's."""
     found = validate(schedule(*timed), DOMAIN, world, parse_condition(goal))
-    timed_form = pose(DOMAIN, world, parse_condition(goal), durations=True).timed
+    timed_form = build_problem(DOMAIN, world, parse_condition(goal), durations=True).timed
     plan = timed_form.scheduled(indices(timed_form, *timed))
     assert found.valid == isinstance(plan, Plan), (found, plan)
     return found
@@ -223,7 +223,7 @@ needs_aries = pytest.mark.skipif(bool(engine("aries").lacks()), reason=f"aries: 
 @pytest.mark.parametrize("make", [PlannerRace, lambda: PlannerProcess("aries")])
 def test_aries_finds_a_plan_with_two_actions_at_once(make):
     world, goal = cellar(2, 2, burns=4.5), parse_condition(GOAL)
-    found = solved(make(), pose(DOMAIN, world, goal, durations=True))
+    found = solved(make(), build_problem(DOMAIN, world, goal, durations=True))
     assert isinstance(found, PlanFound), found
     assert validate(found.plan, DOMAIN, world, goal).valid
     assert found.cost == found.plan.seconds == max(one.end for one in found.plan.schedule)
@@ -271,7 +271,7 @@ def test_ground_problem_and_domain_agree_on_every_schedule(start, over_all, end,
     domain = PlanningDomain.parse(text.replace("END", end).replace(":duration", ":parameters () :duration"))
     world = KnowledgeBase(domain.schema)
     world.apply(Delta(added=tuple(map(fact, sorted(facts)))), author="test")
-    problem = pose(domain, world, parse_condition(goal), durations=True).timed
+    problem = build_problem(domain, world, parse_condition(goal), durations=True).timed
     if problem is None:
         return
     known: dict[str, list[int]] = {}
@@ -285,6 +285,6 @@ def test_ground_problem_and_domain_agree_on_every_schedule(start, over_all, end,
         ground = [
             problem.scheduled([(n, at, 2.0) for n, (_, at) in zip(chosen, timed, strict=True)]) for chosen in ways
         ]
-        assert validate(plan, domain, world, parse_condition(goal)).valid == any(isinstance(one, Plan) for one in ground)
-
-
+        assert validate(plan, domain, world, parse_condition(goal)).valid == any(
+            isinstance(one, Plan) for one in ground
+        )

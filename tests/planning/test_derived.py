@@ -13,11 +13,11 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import Plan, PlanStep
-from planning.posing.derived import derivation
-from planning.posing.problem import pose
-from planning.posing.unsolvable import why_unsolvable
+from planning.problem.construction import build_problem
+from planning.problem.derived import derivation
+from planning.problem.unsolvability import why_unsolvable
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 
 ROOMS = """(define (domain rooms) (:types room robot thing)
@@ -46,7 +46,7 @@ def rooms(*facts, text=ROOMS):
 
 def plan_for(domain, world, goal):
     wanted = parse_condition(goal)
-    plan = solution(pose(domain, world, wanted))
+    plan = solution(build_problem(domain, world, wanted))
     assert plan is None or validate(plan, domain, world, wanted).valid
     return plan
 
@@ -68,7 +68,7 @@ def test_goals_and_actions_ask_for_derived_predicates(goal, steps):
 
 
 def test_a_derived_predicate_that_holds_is_a_goal_that_holds():
-    assert pose(*rooms(), parse_condition("(connected a c)")).goal == ()
+    assert build_problem(*rooms(), parse_condition("(connected a c)")).goal == ()
 
 
 def test_what_nobody_changes_is_the_least_fixpoint():
@@ -104,9 +104,9 @@ def test_a_recursive_predicate_that_actions_change_is_an_error_where_it_matters(
     world = KnowledgeBase(domain.schema)
     world.apply(Delta(nodes=dict.fromkeys("ab", "block")), author="test")
     with pytest.raises(UnsupportedGoalError, match=r"'above'.*towers.pddl:3.*'on'"):
-        pose(domain, world, parse_condition("(above a b)"))
+        build_problem(domain, world, parse_condition("(above a b)"))
     with pytest.raises(UnsupportedActionError, match="'stack' asks for 'above'") as caught:
-        pose(domain, world, parse_condition("(on a b)"))
+        build_problem(domain, world, parse_condition("(on a b)"))
     assert caught.value.place.line == 4
     assert len(plan_for(domain, world, "(painted a)").steps) == 1
 

@@ -39,7 +39,9 @@ class Run:
         self.knowledge = self.robot.knowledge = program.knowledge
         doors = [fact("door", *pair) for pair in ("ab", "cb", "cd")]
         nodes = {**dict.fromkeys("abcd", "room"), "cup": "thing"}
-        self.knowledge.apply(Delta(nodes=nodes, added=(*doors, fact("at", "a"), fact("lies", "cup", lies), *known)), "t")
+        self.knowledge.apply(
+            Delta(nodes=nodes, added=(*doors, fact("at", "a"), fact("lies", "cup", lies), *known)), "t"
+        )
         self.types = []
         program.listen(lambda record: self.types.append(record.type))
 
@@ -83,7 +85,9 @@ def test_a_recursive_predicate_that_ceases_to_hold_breaks_the_plan():
 
 
 def test_a_recursive_predicate_that_begins_to_hold_is_made_use_of():
-    run = Run("(at d)", fact("closed", "c"), fact("closed", "b"), then=[(SECONDS, Delta(removed=(fact("closed", "b"),)))])
+    run = Run(
+        "(at d)", fact("closed", "c"), fact("closed", "b"), then=[(SECONDS, Delta(removed=(fact("closed", "b"),)))]
+    )
     assert (run.end.finished, run.outcome) == (True, None)
     assert run.knowledge.ask("(at d)")
 
@@ -101,6 +105,8 @@ def test_a_transient_failure_is_retried_with_derived_conditions():
     assert (run.outcome, run.types.count("plan.asked")) == (None, 1)
 
 
-@pytest.mark.parametrize("goal", ["(and (busy) (not (busy)))", "(exists (?a ?b - room) (and (at ?a) (at ?b) (not (= ?a ?b))))"])
+@pytest.mark.parametrize(
+    "goal", ["(and (busy) (not (busy)))", "(exists (?a ?b - room) (and (at ?a) (at ?b) (not (= ?a ?b))))"]
+)
 def test_what_cannot_be_reached_is_never_claimed(goal):
     assert Run(goal).outcome.name == "no_plan"

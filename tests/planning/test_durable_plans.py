@@ -118,7 +118,7 @@ def test_a_run_with_plans_is_replayed_without_a_planner(whole):
 
 def test_the_planner_remembers_its_plans_as_plain_data(whole, planner):
     with archive(whole[2][-2]) as runs:
-        text = runs.standing().memory["planner"]
+        text = runs.latest_snapshot().memory["planner"]
     assert '"plans":2' in text
     assert '"switch-on","c"' in text
 
@@ -202,5 +202,5 @@ def test_what_is_known_and_what_was_run_lasts_from_one_program_to_the_next(plann
 def test_plans_that_are_over_are_not_remembered(whole):
     path, _, _ = whole
     with archive(path) as runs:
-        text = runs.standing().memory["planner"]
+        text = runs.latest_snapshot().memory["planner"]
     assert json.loads(text)["carried"] == []

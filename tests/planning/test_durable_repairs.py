@@ -37,7 +37,9 @@ class LastingRobot(Component):
         return other
 
     @skill(outcomes={"did": {}, "failed": {}}, after_crash="same_id")
-    async def act(self, call: SkillCall, way: str, action: str, one: str = "", two: str = "", three: str = "") -> Outcome:
+    async def act(
+        self, call: SkillCall, way: str, action: str, one: str = "", two: str = "", three: str = ""
+    ) -> Outcome:
         """One planning action, done in one way."""
         await call.clock.sleep(1.0)
         if call.action_id not in self.ended:
@@ -104,7 +106,11 @@ CASES = {
     "hit": ("(in cup c)", {"then": GONE}, "broken"),
     "skipped": ("(and (clean a) (clean b) (clean c))", {"then": Delta(added=(fact("clean", "b"),))}, "skipped"),
     "reached": ("(clean c)", {"then": Delta(added=(fact("clean", "c"),))}, "skipped"),
-    "side by side": ("(and (holding cup) (clean a))", {"script": {"(sweep a)": [FAILED]}, "concurrent": True}, "skipped"),
+    "side by side": (
+        "(and (holding cup) (clean a))",
+        {"script": {"(sweep a)": [FAILED]}, "concurrent": True},
+        "skipped",
+    ),
     "foreseen": ("(at c)", {"foresight": Refuses("(go b c)"), "script": {"(go d c)": [FAILED]}}, "rejected"),
 }
 
@@ -167,7 +173,7 @@ def test_what_the_planner_has_answered_is_not_lost_when_something_else_was_heard
     checked = 0
     for path, robot in kept.copies[1:]:
         with archive(path) as runs:
-            memory = runs.standing().memory.get("planner", "")
+            memory = runs.latest_snapshot().memory.get("planner", "")
         if '"plan_invalid"' in memory:
             kept.check(path, robot)
             checked += 1

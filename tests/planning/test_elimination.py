@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from knowledge_base.facts import Fact
-from planning.elimination import indispensable
+from planning.action_elimination import indispensable
 from planning.plan import Plan, PlanStep
-from planning.quantities import Assignment, Bound
+from planning.quantities import Assignment, NumericBound
 from planning.strips import GroundAction, Problem
 
 HOME, AWAY, DONE = Fact("at", ("home",)), Fact("at", ("away",)), Fact("done")
@@ -20,7 +20,13 @@ BACK = GroundAction(PlanStep("back"), (AWAY,), (HOME,), (AWAY,))
 WORK = GroundAction(PlanStep("work"), (HOME,), (DONE,), ())
 LOAD = GroundAction(PlanStep("load"), (HOME,), (), (), assignments=(Assignment(ENERGY, 5, increase=True),))
 STRAIN = GroundAction(
-    PlanStep("strain"), (HOME,), (DONE,), (), 1.0, (Bound(">=", ENERGY, 8),), (Assignment(ENERGY, -8, increase=True),)
+    PlanStep("strain"),
+    (HOME,),
+    (DONE,),
+    (),
+    1.0,
+    (NumericBound(">=", ENERGY, 8),),
+    (Assignment(ENERGY, -8, increase=True),),
 )
 ERRAND = Problem("d", {}, (HOME,), (DONE,), (GO, BACK, WORK, LOAD, STRAIN), numbers={ENERGY: 0})
 
@@ -60,7 +66,9 @@ def test_a_planner_gives_no_needless_steps_and_the_cost_of_what_is_left():
     assert (found.plan, found.cost) == (Plan((WORK.step,)), 1)
 
 
-_facts = st.lists(st.sampled_from([Fact("p", (i,)) for i in range(5)]), max_size=2).map(lambda fs: tuple(dict.fromkeys(fs)))
+_facts = st.lists(st.sampled_from([Fact("p", (i,)) for i in range(5)]), max_size=2).map(
+    lambda fs: tuple(dict.fromkeys(fs))
+)
 
 
 @given(

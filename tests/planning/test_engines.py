@@ -21,7 +21,7 @@ from planning.engines.process import Deadline, EngineProcess, EngineStoppedError
 from planning.engines.registry import DISTRIBUTION, ENGINES
 from planning.engines.request import written
 from planning.plan import PlanStep
-from planning.posing.problem import pose
+from planning.problem.construction import build_problem
 from planning.strips import GroundAction, Problem
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
@@ -60,13 +60,13 @@ def asked(process, problem, seconds=60.0):
 
 
 def test_stacking_first_makes_three_trips(engine, clean_up, table):
-    problem = pose(clean_up, table(4, 3, ["one", "two"]), ALL_TIDY)
+    problem = build_problem(clean_up, table(4, 3, ["one", "two"]), ALL_TIDY)
     plan = problem.plan(asked(engine, problem)["actions"])
     assert [step.action for step in plan.steps].count("throw-away") == 3
 
 
 def test_the_same_problem_gets_the_same_plan_fresh_or_warm(engine, clean_up, table):
-    problems = [pose(clean_up, table(*size), ALL_TIDY) for size in [(4, 3, ["one", "two"]), (3,), (5,)]]
+    problems = [build_problem(clean_up, table(*size), ALL_TIDY) for size in [(4, 3, ["one", "two"]), (3,), (5,)]]
     warm = [asked(engine, problem) for problem in problems]
     again = [asked(engine, problem) for problem in reversed(problems)]
     fresh = EngineProcess(worker("pyperplan"))
@@ -206,7 +206,9 @@ def test_a_worker_that_does_not_say_that_its_search_has_ended_is_ended_itself(sc
 @pytest.mark.parametrize("group", ["0", "1", "-1", "true", "os.getppid()", "'all'", "10 ** 30"])
 def test_a_worker_cannot_make_us_kill_others(scripted, group):
     words = "True" if group == "true" else group
-    process = scripted(READY + f"sys.stdin.readline(); print(json.dumps({{'searching': {words}}}), flush=True); time.sleep(600)")
+    process = scripted(
+        READY + f"sys.stdin.readline(); print(json.dumps({{'searching': {words}}}), flush=True); time.sleep(600)"
+    )
     process.start(60)
     with pytest.raises(EngineStoppedError, match="no process group of its own"):
         process.ask(written(PROBLEM), Deadline(60), print)

@@ -14,7 +14,7 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.world.overlay import Overlay
 from planning.plan import PlanStep
-from planning.posing.problem import Poser, pose
+from planning.problem.construction import ProblemBuilder, build_problem
 from planning.validation import validate
 
 
@@ -45,7 +45,7 @@ def test_what_is_posed_has_a_plan_exactly_if_there_is_one_and_at_the_same_cost(a
     facts, numbers, limit = start
     domain, goal, state = domain_of(actions), parse_condition(goal_text), (frozenset(facts), numbers)
     world = world_of(domain, state, limit)
-    problem = pose(domain, world, goal)
+    problem = build_problem(domain, world, goal)
     least = least_cost(domain, state, limit, goal)
     whole = problem.whole or problem
     chosen = None if problem.unreachable else cheapest(whole)
@@ -61,7 +61,7 @@ def test_what_is_posed_has_a_plan_exactly_if_there_is_one_and_at_the_same_cost(a
 @given(ACTIONS, st.lists(st.tuples(START, GOAL), min_size=2, max_size=3))
 def test_a_poser_poses_the_same_numeric_problem_again(actions, turns):
     domain = domain_of(actions)
-    poser = Poser(domain)
+    builder = ProblemBuilder(domain)
     for (facts, numbers, limit), goal_text in turns:
         world, goal = world_of(domain, (frozenset(facts), numbers), limit), parse_condition(goal_text)
-        assert poser.pose(world, goal) == Poser(domain).pose(world, goal)
+        assert builder.build_problem(world, goal) == ProblemBuilder(domain).build_problem(world, goal)

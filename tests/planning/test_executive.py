@@ -8,7 +8,7 @@ import pytest
 from dsc import Component, Event, Library, Outcome, SkillCall, Stream, parse_plot, primitive_plot, skill
 from dsc.components.parameters import Parameter
 from dsc.errors import PlotError
-from dsc.models import MODELS, described
+from dsc.reflection import MODELS, design_facts
 from knowledge_base import Delta, InputError, KnowledgeBase, fact
 from planning import Executive, Plan, PlanningDomain, PlanStep
 from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
@@ -485,7 +485,10 @@ MISBEHAVIOUR = [
     (stuck, "lamps.light: RuntimeError: the switch is stuck"),
     (lambda _: Outcome("dark"), "lamps.light: it ended with 'dark', which it does not declare"),
     (lambda _: "lit", "lamps.light: it ended with 'lit', which is no outcome"),
-    (lambda lamp: Outcome("lit", observed=Delta(added=(fact("onn", lamp),))), "lamps.light: there is no predicate 'onn'"),
+    (
+        lambda lamp: Outcome("lit", observed=Delta(added=(fact("onn", lamp),))),
+        "lamps.light: there is no predicate 'onn'",
+    ),
     (lambda _: Outcome("lit", observed=Delta(added=(fact("on", "l9"),))), "lamps.light: there is no object 'l9'"),
 ]
 
@@ -520,7 +523,9 @@ def test_a_skill_that_hangs_is_a_failed_step():
             await asyncio.Event().wait()
 
     deaf = Deaf()
-    with Executive(DOMAIN, [primitive_plot(deaf.skills()["light"], done="lit", implements="switch-on")], [deaf]) as robot:
+    with Executive(
+        DOMAIN, [primitive_plot(deaf.skills()["light"], done="lit", implements="switch-on")], [deaf]
+    ) as robot:
         robot.knowledge.apply(Delta(nodes={"l1": "lamp"}, added=(fact("works", "l1"),)), "test")
         (gave_up,) = robot.achieve("(on l1)").emitted
     assert "lamps.light: no outcome within 300 s" in gave_up.attributes["reason"]
@@ -574,7 +579,9 @@ def test_a_component_whose_parameter_nobody_has_said_is_refused_before_anything_
     class Laser(Component):
         name = "laser"
         declares: ClassVar = {
-            "port": Parameter("text", changed_by="profile"), "rate": Parameter("number", default=30), "most": Parameter("number", default=20),
+            "port": Parameter("text", changed_by="profile"),
+            "rate": Parameter("number", default=30),
+            "most": Parameter("number", default=20),
         }
         relations = ("(<= ?rate ?most)",)
 
@@ -597,12 +604,17 @@ def test_plots_ask_for_rules_if_the_knowledge_has_the_design():
       over: {final: true}
     rules: [{on: lost, do: {then: continue}}]
     """
-    plots = [parse_plot(text), parse_plot("plot: part\nemits: {lost: }\nstates: {a: {after: {seconds: 1, to: e, emit: lost}}, e: {final: true}}")]
+    plots = [
+        parse_plot(text),
+        parse_plot(
+            "plot: part\nemits: {lost: }\nstates: {a: {after: {seconds: 1, to: e, emit: lost}}, e: {final: true}}"
+        ),
+    ]
     domain, library, seconds = PlanningDomain.parse("(define (domain d))"), Library(plots), []
     with pytest.raises(PlotError, match="there is no predicate 'stands-in'"):
         Executive(domain, library, [])
     design = KnowledgeBase(domain.schema.merged(MODELS))
-    design.apply(described(library, []), author="design")
+    design.apply(design_facts(library, []), author="design")
     with Executive(domain, library, [], design) as robot:
         robot.listen(lambda record: seconds.append(record.t))
         assert robot.run("p").finished

@@ -6,8 +6,8 @@ from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.parser import parse_condition
 from planning.domain import PlanningDomain
-from planning.posing.problem import pose
-from planning.posing.unsolvable import why_unsolvable
+from planning.problem.construction import build_problem
+from planning.problem.unsolvability import why_unsolvable
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
 
@@ -129,5 +129,5 @@ def test_who_only_uses_up_a_number_does_not_make_enough_of_it(world_of, fuel, go
       (:action drive :parameters () :precondition (>= (fuel) 7) :effect (and (there) (decrease (fuel) 7)))
       (:action idle :parameters () :effect (decrease (fuel) 1)))""")
     world, wanted = world_of(domain.schema, {}, (), {fact("fuel"): fuel}), parse_condition(goal)
-    assert pose(domain, world, wanted).unreachable == (goal,)
+    assert build_problem(domain, world, wanted).unreachable == (goal,)
     assert why_unsolvable(domain, world, wanted) == (why,)

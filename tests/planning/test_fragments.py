@@ -164,7 +164,10 @@ PARTS = [
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
-@given(st.lists(st.sets(st.integers(0, 3), min_size=1), min_size=len(PARTS), max_size=len(PARTS)), st.permutations(range(4)))
+@given(
+    st.lists(st.sets(st.integers(0, 3), min_size=1), min_size=len(PARTS), max_size=len(PARTS)),
+    st.permutations(range(4)),
+)
 def test_how_a_domain_is_cut_and_in_which_order_it_comes_does_not_matter(owners, order):
     def piece(number):
         own = [part for part, fragments in zip(PARTS, owners, strict=True) if number in fragments]
@@ -211,7 +214,9 @@ def test_an_executive_plans_with_what_its_components_bring():
 
 
 def test_a_mistake_in_what_a_component_brings_is_named_with_its_class():
-    with pytest.raises(InputError, match=r"Gripper\.domain:2:\d+: there is no predicate 'near' in room, Gripper\.domain"):
+    with pytest.raises(
+        InputError, match=r"Gripper\.domain:2:\d+: there is no predicate 'near' in room, Gripper\.domain"
+    ):
         Executive("(define (domain room) (:types item)\n)", [], [Gripper()])
 
 

@@ -10,8 +10,8 @@ from dsc import ActionPlot, Component, Library, Outcome, SkillCall, skill
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.language.parser import parse_condition, parse_term
-from planning import Executive, Plan, PlanningDomain, PlanStep, plot_from_plan, pose
-from planning.execution.needs import Needs
+from planning import Executive, Plan, PlanningDomain, PlanStep, build_problem, plot_from_plan
+from planning.execution.causal_needs import CausalNeeds
 from planning.execution.regression import conjuncts, leaves, regressed
 
 TEXT = """
@@ -70,7 +70,7 @@ def test_what_no_step_touches_is_needed_as_if_each_had_been_asked(steps, goal_te
         ground = DOMAIN.ground(step)
         after = [part for one in needed for part in conjuncts(regressed(one, leaves(ground.effect)))]
         needed = dict.fromkeys((*conjuncts(ground.typed), *after))
-    assert set(Needs(steps, DOMAIN, goal).before(tuple(range(1, len(steps) + 1)))) == set(needed)
+    assert set(CausalNeeds(steps, DOMAIN, goal).before(tuple(range(1, len(steps) + 1)))) == set(needed)
 
 
 def test_ground_steps_are_kept_within_bounds():
@@ -108,7 +108,7 @@ def test_few_plots_are_expected_at_a_time():
 
 def test_a_slice_of_a_problem_whose_metric_is_ignored_costs_the_same_everywhere(clean_up, table):
     metric = Metric("minimize", parse_term("(total-time)"))
-    problem = pose(clean_up, table(cups=2), parse_condition("(forall (?i - item) (tidy ?i))"), metric)
+    problem = build_problem(clean_up, table(cups=2), parse_condition("(forall (?i - item) (tidy ?i))"), metric)
     assert problem.whole is not None
     assert {action.cost for form in (problem, problem.whole) for action in form.actions} == {1.0}
 

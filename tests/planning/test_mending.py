@@ -6,8 +6,8 @@ from breadth_first import BreadthFirst
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.parser import parse_condition
 from planning import Plan, PlanningDomain, PlanStep, validate
-from planning.execution.course import Course
-from planning.execution.mending import mending
+from planning.execution.local_repair import mending
+from planning.execution.progress import PlanProgress
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain shopping)
@@ -17,12 +17,23 @@ DOMAIN = PlanningDomain.parse("""
   (:action buy :parameters (?w - ware ?s - shop) :precondition (and (at ?s) (sells ?s ?w)) :effect (have ?w)))
 """)
 GOAL = parse_condition("(and (have nut) (have egg))")
-STEPS = (PlanStep("go", ("a", "b")), PlanStep("buy", ("nut", "b")), PlanStep("go", ("b", "c")), PlanStep("buy", ("egg", "c")))
+STEPS = (
+    PlanStep("go", ("a", "b")),
+    PlanStep("buy", ("nut", "b")),
+    PlanStep("go", ("b", "c")),
+    PlanStep("buy", ("egg", "c")),
+)
 
 
 def world(at="a", *facts):
     kb = KnowledgeBase(DOMAIN.schema)
-    told = (fact("at", at), fact("sells", "b", "nut"), fact("sells", "c", "egg"), *(fact("open", s) for s in "abc"), *facts)
+    told = (
+        fact("at", at),
+        fact("sells", "b", "nut"),
+        fact("sells", "c", "egg"),
+        *(fact("open", s) for s in "abc"),
+        *facts,
+    )
     kb.apply(Delta(nodes={**dict.fromkeys("abcd", "shop"), "nut": "ware", "egg": "ware"}, added=told), "test")
     return kb
 
@@ -36,7 +47,7 @@ def solved(how):
 
 def test_the_nearest_end_is_kept_and_reached_in_the_fewest_steps():
     here = world("d")
-    how = mending(Course(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
+    how = mending(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
     assert how.end == STEPS[1:]  # from d to b at once, not by way of a
     plan = how.mended(solved(how), STEPS, DOMAIN, here, GOAL)
     assert plan.steps == (PlanStep("go", ("d", "b")), *STEPS[1:])
@@ -44,26 +55,26 @@ def test_the_nearest_end_is_kept_and_reached_in_the_fewest_steps():
 
 
 def test_an_end_with_a_step_that_is_done_without_is_not_kept():
-    how = mending(Course(STEPS, DOMAIN, GOAL), {STEPS[1]}, DOMAIN, world("d"), GOAL)
+    how = mending(PlanProgress(STEPS, DOMAIN, GOAL), {STEPS[1]}, DOMAIN, world("d"), GOAL)
     assert how.end == STEPS[2:]
-    assert mending(Course(STEPS, DOMAIN, GOAL), {STEPS[3]}, DOMAIN, world("d"), GOAL) is None
+    assert mending(PlanProgress(STEPS, DOMAIN, GOAL), {STEPS[3]}, DOMAIN, world("d"), GOAL) is None
 
 
 def test_what_lacks_something_that_nothing_brings_is_not_mended():
     here = world("d")
     here.apply(Delta(removed=(fact("sells", "c", "egg"),)), "test")
-    assert mending(Course(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
+    assert mending(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
 
 
 def test_what_lacks_too_much_is_not_mended():
     here = world("d")
     here.apply(Delta(removed=(fact("open", "b"), fact("open", "c"), fact("sells", "b", "nut"))), "test")
-    assert mending(Course(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
+    assert mending(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
 
 
 def test_a_mended_plan_that_is_much_longer_or_wrong_is_not_taken():
     here = world("d")
-    how = mending(Course(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
+    how = mending(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
     round_trip = [PlanStep("go", way) for way in (("d", "a"), ("a", "d"), ("d", "a"), ("a", "b"))]
     assert how.mended(Plan(tuple(round_trip)), STEPS, DOMAIN, here, GOAL) is None
     assert how.mended(Plan(()), STEPS, DOMAIN, here, GOAL) is None

@@ -5,8 +5,8 @@ import pytest
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.parser import parse_condition
 from planning import PlanningDomain, PlanStep
-from planning.execution.course import Course, shortest_end, thinned
-from planning.execution.monitor import Broken, Monitor, Reached, Shorter
+from planning.execution.monitor import Broken, GoalReached, Monitor, Shorter
+from planning.execution.progress import PlanProgress, shortest_end, thinned
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain parcels)
@@ -48,7 +48,7 @@ class Watched:
         known = "at bob store, in p1 store, in p2 store, in p3 store, open store, open office, open hall"
         told = tuple(fact(*one.split()) for one in known.split(", "))
         self.kb.apply(Delta(nodes={**nodes, "bob": "robot", "eve": "robot"}, added=(*told, *facts)), "test")
-        self.course = Course(steps, DOMAIN, goal, before)
+        self.course = PlanProgress(steps, DOMAIN, goal, before)
         self.news = []
         self.monitor = Monitor(self.course, DOMAIN, self.kb, lambda author: author == "bob", self.news.append)
         self.monitor.look("earlier")
@@ -125,7 +125,7 @@ def test_what_touches_no_link_is_not_looked_at(monkeypatch):
     plan.begin(1)
     looked = []
     monkeypatch.setattr("planning.execution.monitor.shortest_end", lambda *args: looked.append(args))
-    monkeypatch.setattr(Course, "stands", lambda *args: looked.append(args))
+    monkeypatch.setattr(PlanProgress, "stands", lambda *args: looked.append(args))
     plan.change("eve", now="painted hall, painted office, in p3 hall", values={fact("weight", "p1"): 3.0})
     assert looked == []
     assert plan.news == []
@@ -135,7 +135,7 @@ def test_the_goal_reached_by_somebody_else_is_heard_at_once():
     plan = Watched()
     plan.begin(1)
     plan.change("eve", gone="in p1 store, in p2 store", now="in p1 office, in p2 office")
-    assert plan.news[-1] == Reached("eve")
+    assert plan.news[-1] == GoalReached("eve")
 
 
 def test_what_somebody_else_did_already_is_skipped_when_the_next_step_begins():
@@ -180,7 +180,12 @@ SIDE_BY_SIDE = frozenset({(1, 3), (3, 5), (2, 4), (4, 6)})
 
 
 def test_steps_at_work_at_once_may_each_be_done_or_not():
-    plan = Watched(TWO, parse_condition("(and (in p1 office) (in p2 office))"), SIDE_BY_SIDE, (fact("at", "eve", "hall"), fact("in", "p2", "hall")))
+    plan = Watched(
+        TWO,
+        parse_condition("(and (in p1 office) (in p2 office))"),
+        SIDE_BY_SIDE,
+        (fact("at", "eve", "hall"), fact("in", "p2", "hall")),
+    )
     plan.begin(1)
     plan.begin(2)
     assert plan.course.at_work == (1, 2)
@@ -211,7 +216,12 @@ def test_a_step_that_is_of_no_use_any_more_since_somebody_else_did_it_is_interru
 
 
 def test_steps_at_work_at_once_are_left_out_of_what_is_left_when_they_are_done():
-    plan = Watched(TWO, parse_condition("(and (in p1 office) (in p2 office))"), SIDE_BY_SIDE, (fact("at", "eve", "hall"), fact("in", "p2", "hall")))
+    plan = Watched(
+        TWO,
+        parse_condition("(and (in p1 office) (in p2 office))"),
+        SIDE_BY_SIDE,
+        (fact("at", "eve", "hall"), fact("in", "p2", "hall")),
+    )
     plan.begin(1)
     plan.begin(2)
     assert plan.course.shortest_end(plan.kb) == tuple(TWO)

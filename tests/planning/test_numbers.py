@@ -14,11 +14,11 @@ from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.engines.request import read, written
-from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep
-from planning.posing.problem import pose
-from planning.posing.unsolvable import why_unsolvable
-from planning.quantities import Assignment, Bound, Operation, linear, text
+from planning.problem.construction import build_problem
+from planning.problem.unsolvability import why_unsolvable
+from planning.quantities import Assignment, NumericBound, Operation, linear, text
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 
 JARS = """(define (domain jars)
@@ -53,12 +53,12 @@ def kitchen(domain, *facts):
 
 def found(domain, world, goal, search=breadth_first):
     wanted = parse_condition(goal)
-    plan = solution(pose(domain, world, wanted), search)
+    plan = solution(build_problem(domain, world, wanted), search)
     assert plan is None or validate(plan, domain, world, wanted).valid
     return plan
 
 
-# ---- posing ----------------------------------------------------------------------------------------------
+# ---- grounded ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_goals_about_numbers_are_reached(jars, goal, steps):
 
 
 def test_what_no_action_changes_is_folded_in(jars):
-    problem = pose(jars, kitchen(jars), parse_condition("(= (litres big) 4)"))
+    problem = build_problem(jars, kitchen(jars), parse_condition("(= (litres big) 4)"))
     bounds = {str(bound) for action in problem.actions for bound in action.bounds}
     assert "(<= (+ (litres big) (litres small)) 3)" in bounds
     assert problem.features == {"numeric"}
@@ -88,23 +88,23 @@ def test_what_no_action_changes_is_folded_in(jars):
 
 
 def test_a_number_that_nobody_asks_about_is_left_out(jars):
-    problem = pose(jars, kitchen(jars), parse_condition("(sealed big)"))
+    problem = build_problem(jars, kitchen(jars), parse_condition("(sealed big)"))
     assert fact("poured") not in {one.fluent for action in problem.actions for one in action.assignments}
 
 
 def test_a_numeric_problem_is_json_and_back(jars):
-    problem = pose(jars, kitchen(jars), parse_condition("(and (sealed big) (> (poured) 3))"))
+    problem = build_problem(jars, kitchen(jars), parse_condition("(and (sealed big) (> (poured) 3))"))
     assert read(json.loads(written(problem))) == problem
 
 
 def test_a_number_that_no_possible_action_changes_is_proven_out_of_reach(jars):
     world = kitchen(jars, fact("sealed", "big"), fact("sealed", "small"))
     goal = parse_condition("(> (poured) 0)")
-    assert pose(jars, world, goal).unreachable == ()  # topping up is possible as far as relaxation sees
+    assert build_problem(jars, world, goal).unreachable == ()  # topping up is possible as far as relaxation sees
     closed = PlanningDomain.parse(JARS.replace("(:action top-up", "(:action never").replace(
         "(> (+ (litres ?a)", "(< 1 0) (> (+ (litres ?a)"))  # fmt: skip
     world = kitchen(closed, fact("sealed", "big"), fact("sealed", "small"))
-    assert pose(closed, world, goal).unreachable == ("(> (poured) 0)",)
+    assert build_problem(closed, world, goal).unreachable == ("(> (poured) 0)",)
     [why] = why_unsolvable(closed, world, goal)
     assert why == "(> (poured) 0) does not hold, and no planning action that can be taken changes that"
 
@@ -123,7 +123,7 @@ def test_what_an_action_lacks_may_be_a_number(jars):
 
 def test_a_fact_about_a_changing_number_is_named(jars):
     with pytest.raises(UnsupportedGoalError, match=r"\(poured\)"):
-        pose(jars, kitchen(jars), parse_condition("(and (named (poured)) (> (poured) 1))"))
+        build_problem(jars, kitchen(jars), parse_condition("(and (named (poured)) (> (poured) 1))"))
 
 
 def test_two_assignments_of_one_number_are_named():
@@ -131,14 +131,14 @@ def test_two_assignments_of_one_number_are_named():
         """(define (domain d) (:functions (f))
   (:action a :effect (and (assign (f) 1) (increase (f) 2))))""", "d.pddl")  # fmt: skip
     with pytest.raises(UnsupportedActionError, match=r"'a' changes \(f\) in two ways") as caught:
-        pose(domain, KnowledgeBase(domain.schema), parse_condition("(> (f) 1)"))
+        build_problem(domain, KnowledgeBase(domain.schema), parse_condition("(> (f) 1)"))
     assert caught.value.place.line == 2
 
 
 def test_increases_in_one_effect_add_up():
     domain = PlanningDomain.parse("""(define (domain d) (:functions (f))
       (:action a :effect (and (increase (f) 1) (increase (f) 2) (decrease (f) 0.5))))""")
-    problem = pose(domain, KnowledgeBase(domain.schema), parse_condition("(= (f) 5)"))
+    problem = build_problem(domain, KnowledgeBase(domain.schema), parse_condition("(= (f) 5)"))
     assert problem.plan([0, 0]).steps == (PlanStep("a"),) * 2
     assert "(= (f) 5)" in problem.plan([0])
 
@@ -154,7 +154,7 @@ def test_a_conditional_change_happens_only_when_its_condition_holds():
 def test_a_plan_that_divides_by_zero_is_no_solution():
     domain = PlanningDomain.parse("""(define (domain d) (:functions (f) (g))
       (:action a :effect (assign (f) (/ 1 (g)))) (:action b :effect (increase (g) 1)))""")
-    problem = pose(domain, KnowledgeBase(domain.schema), parse_condition("(> (f) 0)"))
+    problem = build_problem(domain, KnowledgeBase(domain.schema), parse_condition("(> (f) 0)"))
     names = [action.step.action for action in problem.actions]
     assert "cannot be computed" in problem.plan([names.index("a")])
     assert problem.plan([names.index("b"), names.index("a")]).steps
@@ -164,7 +164,7 @@ def test_a_plan_that_divides_by_zero_is_no_solution():
 
 
 def test_a_bound_is_written_as_in_pddl():
-    bound = Bound(">=", Operation("-", (Operation("*", (2, fact("fuel", "t1"))), 1.5)), fact("least"))
+    bound = NumericBound(">=", Operation("-", (Operation("*", (2, fact("fuel", "t1"))), 1.5)), fact("least"))
     assert str(bound) == "(>= (- (* 2 (fuel t1)) 1.5) (least))"
 
 
@@ -227,7 +227,7 @@ def there(problem, search):
 
 
 def test_total_cost_is_the_cost_of_each_action():
-    problem = pose(*roads(), parse_condition("(at b)"))
+    problem = build_problem(*roads(), parse_condition("(at b)"))
     assert problem.features == {"costs"}
     assert there(problem, breadth_first) == (10, ["go"])
     assert there(problem, cheapest) == (6.5, ["go"] * 3)
@@ -235,9 +235,9 @@ def test_total_cost_is_the_cost_of_each_action():
 
 def test_a_metric_is_a_sum_of_what_actions_raise():
     domain, world = roads()
-    problem = pose(domain, world, parse_condition("(at b)"), cheap("(+ (* 3 (total-cost)) (tolls) 7)"))
+    problem = build_problem(domain, world, parse_condition("(at b)"), cheap("(+ (* 3 (total-cost)) (tolls) 7)"))
     assert there(problem, cheapest) == (28.5, ["go"] * 3)
-    problem = pose(domain, world, parse_condition("(at b)"), cheap("(+ (* 2 (total-cost)) (tolls))"))
+    problem = build_problem(domain, world, parse_condition("(at b)"), cheap("(+ (* 2 (total-cost)) (tolls))"))
     assert there(problem, cheapest) == (21.0, ["pay", "go", "go", "go"])
 
 
@@ -245,19 +245,19 @@ def test_to_maximize_is_to_minimize_the_opposite():
     domain, world = roads()
     slow = Metric("maximize", parse_term("(- (total-cost))"))
     goal = parse_condition("(at b)")
-    assert pose(domain, world, goal, slow) == pose(domain, world, goal)
+    assert build_problem(domain, world, goal, slow) == build_problem(domain, world, goal)
 
 
 @pytest.mark.parametrize("metric", ["(* (tolls) (total-cost))", "(speed)", "(total-time)"])
 def test_a_metric_that_is_no_cost_is_ignored_and_said(metric):
-    problem = pose(*roads(), parse_condition("(and (at b) (paid))"), cheap(metric))
+    problem = build_problem(*roads(), parse_condition("(and (at b) (paid))"), cheap(metric))
     assert problem.features == frozenset()
     assert metric in problem.notes[0]
     assert {action.cost for action in problem.actions} == {1.0}
 
 
 def test_costs_neither_add_actions_nor_numbers():
-    problem = pose(*roads(), parse_condition("(at b)"))
+    problem = build_problem(*roads(), parse_condition("(at b)"))
     assert {action.step.action for action in problem.actions} == {"go"}
     assert problem.numbers == {}
 
@@ -269,7 +269,7 @@ def planned(problem, engine):
     """The plan that an engine of unified-planning finds for the translated problem, as action numbers."""
     from unified_planning.shortcuts import get_environment
 
-    from planning.engines.translation import translated
+    from planning.engines.up import translated
 
     factory = get_environment().factory
     if engine not in factory.engines:
@@ -285,12 +285,12 @@ def planned(problem, engine):
 @pytest.mark.parametrize("goal", ["(sealed big)", "(and (= (litres big) 2) (> (* 2 (litres small)) 1.5))"])
 def test_enhsp_solves_what_was_posed(jars, goal):
     world, wanted = kitchen(jars), parse_condition(goal)
-    problem = pose(jars, world, wanted)
+    problem = build_problem(jars, world, wanted)
     plan = problem.plan(planned(problem, "enhsp"))
     assert validate(plan, jars, world, wanted).valid
 
 
 @pytest.mark.parametrize("engine", ["fast-downward-opt", "enhsp-opt"])
 def test_optimal_engines_find_cheapest_plans(engine):
-    problem = pose(*roads(), parse_condition("(at b)"))
+    problem = build_problem(*roads(), parse_condition("(at b)"))
     assert problem.cost(planned(problem, engine)) == 6.5

@@ -13,7 +13,7 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.ordering.order import PartialOrder, causal_links, deordered, reduced, standing
+from planning.ordering.partial_order import PartialOrder, causal_links, deordered, reduced, standing
 from planning.plan import Plan, PlanStep
 from planning.validation import validate
 

@@ -3,16 +3,16 @@
 import pytest
 
 from dsc import ActionPlot, Component, Library, Outcome, parse_plot, skill, validate_plot
+from dsc.drawing import draw
 from dsc.skills import signatures
-from dsc.text.diagram import draw
-from dsc.text.plots import plot_to_yaml
+from dsc.text.plot_files import plot_to_yaml
 from knowledge_base import Delta, fact
 from knowledge_base.errors import InputError
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.printer import to_text
 from planning import Executive, Plan, PlanningDomain, PlanStep, plot_from_plan
-from planning.generation.usage import fitting, usage
-from planning.ordering.order import PartialOrder, deordered
+from planning.generation.carried_steps import fitting, usage
+from planning.ordering.partial_order import PartialOrder, deordered
 from planning.plan import PlanFound, Timing
 
 DOMAIN = PlanningDomain.parse("""
@@ -240,7 +240,9 @@ def executed(plan, goal, facts, *workers, change=None):
     plots = [plot for plot in plots if plot.implements != "plug-in"]
     plots.append(primitive("plug", "plug-in", "worker", parameters=()))
     robot = Executive(DOMAIN, plots, workers, planner=Answers(plan))
-    robot.knowledge.apply(Delta(nodes=dict.fromkeys("ab", "lamp"), added=facts, values={fact("slowness", "a"): 1.0}), "me")
+    robot.knowledge.apply(
+        Delta(nodes=dict.fromkeys("ab", "lamp"), added=facts, values={fact("slowness", "a"): 1.0}), "me"
+    )
     records = []
     robot.listen(records.append)
     arguments = {"goal": goal, "holder": "", "replans": 0, "seconds": 5}

@@ -11,7 +11,7 @@ from dsc.trace import Record
 from knowledge_base.language.printer import to_text
 from knowledge_base.world.overlay import Overlay
 from planning import Executive, PlanStep, plot_from_plan
-from planning.ordering.order import deordered
+from planning.ordering.partial_order import deordered
 
 
 class Everybody(Component):

@@ -9,8 +9,8 @@ from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
 from knowledge_base import Delta, fact
 from knowledge_base.language.parser import parse_condition
 from planning import Executive, PlanningDomain
-from planning.patience import OutOfPatienceError, Patience, aside
-from planning.posing.problem import pose
+from planning.cancellable_work import WorkLimit, WorkLimitError, aside
+from planning.problem.construction import build_problem
 
 # Nothing needs the parameters, so that any choice will do, of which there are 30 ** 7.
 MANY = """(define (domain many) (:types thing) (:predicates (p ?a - thing) (g))
@@ -39,42 +39,42 @@ def many(precondition="(p ?a)"):
 def test_posing_ends_when_its_time_is_up(precondition, world_of):
     domain = many(precondition)
     world = world_of(domain.schema, FACTS.nodes, FACTS.added)
-    with pytest.raises(OutOfPatienceError, match="out of time while grounding action 'a'"):
-        pose(domain, world, GOAL, patience=Patience(0.01))
+    with pytest.raises(WorkLimitError, match="out of time while grounding action 'a'"):
+        build_problem(domain, world, GOAL, patience=WorkLimit(0.01))
 
 
 def test_a_goal_with_too_many_parts_for_the_time_says_so(world_of):
     domain = many()
     world = world_of(domain.schema, THINGS.nodes)
     goal = parse_condition("(exists (?x ?y ?z ?u ?v ?w - thing) (and (g) (not (p ?x)) (p ?y) (p ?z) (p ?u) (p ?v)))")
-    with pytest.raises(OutOfPatienceError, match="out of time while grounding the goal"):
-        pose(domain, world, goal, patience=Patience(0.01))
+    with pytest.raises(WorkLimitError, match="out of time while grounding the goal"):
+        build_problem(domain, world, goal, patience=WorkLimit(0.01))
 
 
 def test_what_was_broken_off_is_no_part_of_the_next_problem(world_of):
     domain = PlanningDomain.parse(LAMPS)
     small, large = (world_of(domain.schema, {f"l{i}": "lamp" for i in range(n)}) for n in (2, 8))
     goal = parse_condition("(forall (?l - lamp) (on ?l))")
-    first = pose(domain, small, goal)
-    with pytest.raises(OutOfPatienceError):
-        pose(domain, large, goal, patience=Patience(0.0))
-    assert pose(domain, small, goal) == first
-    assert pose(domain, large, goal) == pose(PlanningDomain.parse(LAMPS), large, goal)
+    first = build_problem(domain, small, goal)
+    with pytest.raises(WorkLimitError):
+        build_problem(domain, large, goal, patience=WorkLimit(0.0))
+    assert build_problem(domain, small, goal) == first
+    assert build_problem(domain, large, goal) == build_problem(PlanningDomain.parse(LAMPS), large, goal)
 
 
 def test_without_a_limit_it_takes_what_it_takes():
-    patience = Patience()
+    patience = WorkLimit()
     for _ in range(10_000):
         patience.spend()
     patience.cancel()
-    with pytest.raises(OutOfPatienceError):
+    with pytest.raises(WorkLimitError):
         patience.spend()
 
 
 def test_work_that_does_not_ask_is_left_alone_when_its_time_is_up():
     never = threading.Event()
-    with pytest.raises(OutOfPatienceError):
-        asyncio.run(aside(never.wait, Patience(0.01)))
+    with pytest.raises(WorkLimitError):
+        asyncio.run(aside(never.wait, WorkLimit(0.01)))
     never.set()
 
 

@@ -81,8 +81,7 @@ def oracle(domain_file, clean_up):
 
     def valid(taken):
         chosen = [
-            ActionInstance(problem.action(s.action), tuple(things(problem.object(a)) for a in s.args))
-            for s in taken
+            ActionInstance(problem.action(s.action), tuple(things(problem.object(a)) for a in s.args)) for s in taken
         ]
         result = validator.validate(problem, SequentialPlan(chosen))
         return result.status is ValidationResultStatus.VALID
@@ -92,7 +91,7 @@ def oracle(domain_file, clean_up):
 
 def _applicable(domain, world):
     """All applicable steps, found by trying every choice of arguments."""
-    from planning.posing.conditions import Grounder
+    from planning.problem.conditions import Grounder
 
     grounder = Grounder(world, frozenset())
     found = []

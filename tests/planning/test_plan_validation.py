@@ -13,7 +13,7 @@ from searching import solution
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.printer import to_text
 from planning.plan import Plan, PlanStep
-from planning.posing.problem import pose
+from planning.problem.construction import build_problem
 from planning.validation import validate
 
 
@@ -53,7 +53,7 @@ def test_both_judge_alike_plans_that_were_found_and_what_became_of_them(actions,
     domain, goal, state = domain_of(actions), parse_condition(goal_text), (frozenset(facts), numbers)
     world = world_of(domain, state, limit)
     oracle = Oracle(domain_text(actions), state, limit, goal)
-    for plan in _plans(solution(pose(domain, world, goal)), domain, random.Random(seed)):  # noqa: S311  a seed, no secret
+    for plan in _plans(solution(build_problem(domain, world, goal)), domain, random.Random(seed)):  # noqa: S311  a seed, no secret
         assert validate(plan, domain, world, goal).valid == oracle.valid(plan), plan
 
 

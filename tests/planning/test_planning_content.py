@@ -5,8 +5,8 @@ import pytest
 from knowledge_base import fact
 from knowledge_base.language.parser import parse_condition
 from planning.domain import PlanningDomain
-from planning.errors import UnsupportedActionError, UnsupportedGoalError
-from planning.posing.problem import pose
+from planning.problem.construction import build_problem
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 
 PAINTING = """(define (domain painting) (:types thing place)
   (:predicates (at ?p - place) (touched ?t - thing) (known ?l - text) (seen ?t - thing))
@@ -34,25 +34,26 @@ def world(painting, world_of):
 
 
 def test_content_that_no_action_changes_is_evaluated_when_posing(painting, world):
-    problem = pose(painting, world, parse_condition("(touched red1)"))
+    problem = build_problem(painting, world, parse_condition("(touched red1)"))
     assert [str(action.step) for action in problem.actions] == ["(touch red1)"]
     for never in ("(touched red2)", "(touched blue)"):
-        assert pose(painting, world, parse_condition(never)).unreachable == (never,)
+        assert build_problem(painting, world, parse_condition(never)).unreachable == (never,)
 
 
 def test_content_that_is_only_assigned_is_left_out(painting, world):
-    (action,) = pose(painting, world, parse_condition("(seen blue)")).actions
+    (action,) = build_problem(painting, world, parse_condition("(seen blue)")).actions
     assert (str(action.step), action.adds) == ("(mark blue)", (fact("seen", "blue"),))
 
 
 @pytest.mark.parametrize("condition", ['(= (stamp ?t) "done")', "(known (stamp ?t))"])
 def test_an_action_that_asks_for_content_which_actions_change_is_named(world, condition):
     domain = PlanningDomain.parse(PAINTING.replace("CHECK", condition), "painting.pddl")
-    with pytest.raises(UnsupportedActionError, match=r"painting.pddl:9:.*'check' asks for a value that planning actions change"):
-        pose(domain, world, parse_condition("(at home)"))
+    with pytest.raises(
+        UnsupportedActionError, match=r"painting.pddl:9:.*'check' asks for a value that planning actions change"
+    ):
+        build_problem(domain, world, parse_condition("(at home)"))
 
 
 def test_a_goal_that_asks_for_it_is_refused(painting, world):
     with pytest.raises(UnsupportedGoalError, match=r"asks for a value .*: \(= \(stamp red1\)"):
-        pose(painting, world, parse_condition('(= (stamp red1) "done")'))
-
+        build_problem(painting, world, parse_condition('(= (stamp red1) "done")'))

@@ -18,12 +18,12 @@ from knowledge_base.world.computation import computed
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.engines.request import read, written
-from planning.errors import UnsupportedActionError, UnsupportedGoalError
 from planning.plan import PlanStep
-from planning.posing.conditions import Grounder
-from planning.posing.grounding import variants
-from planning.posing.problem import Poser, pose
-from planning.posing.unsolvable import why_unsolvable
+from planning.problem.conditions import Grounder
+from planning.problem.construction import ProblemBuilder, build_problem
+from planning.problem.grounding import variants
+from planning.problem.unsolvability import why_unsolvable
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
@@ -58,7 +58,7 @@ def lamps(domain, *facts, number=2, limit=0):
 
 
 def plan_for(domain, world, goal):
-    problem = pose(domain, world, parse_condition(goal))
+    problem = build_problem(domain, world, parse_condition(goal))
     plan = solution(problem)
     if plan is not None:
         assert validate(plan, domain, world, parse_condition(goal)).valid
@@ -69,7 +69,7 @@ def plan_for(domain, world, goal):
 
 
 def test_surfaces_that_nothing_lies_on_are_left_out(clean_up, table):
-    problem = pose(clean_up, table(cups=2, robot_at="table"), ALL_TIDY)
+    problem = build_problem(clean_up, table(cups=2, robot_at="table"), ALL_TIDY)
     assert {"shelf", "floor", "operator", "bin"}.isdisjoint(problem.objects)
     assert {"shelf", "floor"} <= set(problem.whole.objects)
 
@@ -80,19 +80,19 @@ def test_a_surface_that_something_lies_on_stays(clean_up, table):
         Delta(removed=(fact("lies-at", "cup1", "table"),), added=(fact("lies-at", "cup1", "shelf"),)),
         author="test",
     )
-    problem = pose(clean_up, world, ALL_TIDY)
+    problem = build_problem(clean_up, world, ALL_TIDY)
     assert "shelf" in problem.objects
     assert "floor" not in problem.objects
 
 
 def test_a_surface_in_the_goal_stays(clean_up, table):
-    problem = pose(clean_up, table(cups=1), parse_condition("(lies-at cup1 shelf)"))
+    problem = build_problem(clean_up, table(cups=1), parse_condition("(lies-at cup1 shelf)"))
     assert "shelf" in problem.objects
     assert len(breadth_first(problem)) == 4
 
 
 def test_what_the_goal_does_not_ask_about_is_left_out(clean_up, table):
-    problem = pose(clean_up, table(cups=3), parse_condition("(robot-at shelf)"))
+    problem = build_problem(clean_up, table(cups=3), parse_condition("(robot-at shelf)"))
     assert {a.step.action for a in problem.actions} == {"drive"}
     assert set(problem.objects) == {"operator", "shelf"}
     assert problem.init == (fact("robot-at", "operator"),)
@@ -120,7 +120,7 @@ def test_when_a_stand_in_is_not_enough_the_whole_problem_is_solved(world_of):
         :effect (and (not (at ?r ?a)) (done ?r))))""")
     world = world_of(domain.schema, {"a": "peg", "b": "peg", "r": "ring"}, [fact("at", "r", "a")])
     goal = "(and (done r) (at r a))"
-    problem = pose(domain, world, parse_condition(goal))
+    problem = build_problem(domain, world, parse_condition(goal))
     assert problem.whole is not None
     assert breadth_first(problem) is None
     assert len(plan_for(domain, world, goal).steps) >= 2
@@ -129,23 +129,23 @@ def test_when_a_stand_in_is_not_enough_the_whole_problem_is_solved(world_of):
 def test_posing_leaves_the_world_alone(clean_up, table):
     world = table(cups=3)
     before = (world.version, list(world.facts()))
-    pose(clean_up, world, ALL_TIDY)
+    build_problem(clean_up, world, ALL_TIDY)
     assert (world.version, list(world.facts())) == before
 
 
 def test_the_same_world_gives_the_same_problem(clean_up, table):
-    one = pose(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
-    assert one == pose(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
+    one = build_problem(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
+    assert one == build_problem(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
 
 
 def test_a_problem_is_json_and_back(clean_up, table):
-    problem = pose(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
+    problem = build_problem(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
     assert problem.whole is not None
     assert read(json.loads(written(problem))) == replace(problem, unsliced=None)
 
 
 def test_the_simulated_duration_grows_with_the_problem(clean_up, table):
-    small, large = (pose(clean_up, table(cups=n), ALL_TIDY).simulated_seconds for n in (2, 6))
+    small, large = (build_problem(clean_up, table(cups=n), ALL_TIDY).simulated_seconds for n in (2, 6))
     assert 0 < small < large
 
 
@@ -153,7 +153,7 @@ def test_the_simulated_duration_grows_with_the_problem(clean_up, table):
 
 
 def test_a_goal_that_holds_needs_nothing(switches):
-    problem = pose(switches, lamps(switches, fact("on", "l1")), parse_condition("(on l1)"))
+    problem = build_problem(switches, lamps(switches, fact("on", "l1")), parse_condition("(on l1)"))
     assert problem.goal == ()
     assert problem.unreachable == ()
 
@@ -186,10 +186,8 @@ def test_goals_of_every_form_are_reached(switches, goal, steps):
     "goal", ["(or)", "(= l1 l2)", "(not (touched l3))", "(or (not (touched l3)) (not (broken l2)))"]
 )
 def test_goals_that_cannot_be_reached_say_so(switches, goal):
-    world = lamps(
-        switches, *(fact(*f) for f in (("on", "l1"), ("touched", "l3"), ("broken", "l2"))), number=3
-    )
-    assert pose(switches, world, parse_condition(goal)).unreachable == (goal,)
+    world = lamps(switches, *(fact(*f) for f in (("on", "l1"), ("touched", "l3"), ("broken", "l2"))), number=3)
+    assert build_problem(switches, world, parse_condition(goal)).unreachable == (goal,)
 
 
 def test_a_disjunct_that_is_undone_later_does_not_count(switches):
@@ -232,9 +230,9 @@ def test_what_is_computed_from_things_that_stay_is_evaluated_when_the_problem_is
     world.apply(Delta(nodes=nodes, added=(fact("broken", "dark"),), values=values), author="test")
     plan = plan_for(domain, world, "(forall (?l - lamp) (imply (lit ?l) (on ?l)))")
     assert [str(step) for step in plan.steps] == ["(press low)"]
-    assert pose(domain, world, parse_condition("(on high)")).unreachable == ("(on high)",)
+    assert build_problem(domain, world, parse_condition("(on high)")).unreachable == ("(on high)",)
     wanted = parse_condition("(and (on low) (lit dark) (not (lit low)))")
-    assert pose(domain, world, wanted).unreachable == ("(lit dark)", "(not (lit low))")
+    assert build_problem(domain, world, wanted).unreachable == ("(lit dark)", "(not (lit low))")
     assert why_unsolvable(domain, world, wanted) == (
         "(lit dark) does not hold, and no planning action makes it true",
         "(lit low) holds, and no planning action makes it false",
@@ -248,9 +246,9 @@ def test_what_is_computed_from_things_that_actions_change_cannot_be_planned_with
     world = KnowledgeBase(domain.schema)
     world.apply(Delta(nodes={"l": "lamp"}, values={fact("height", "l"): 5}), author="test")
     with pytest.raises(UnsupportedGoalError, match=r"<text>:1:6: .* computed from .*: \(lit l\) reads \("):
-        pose(domain, world, parse_condition("(and (lit l))"))
+        build_problem(domain, world, parse_condition("(and (lit l))"))
     with pytest.raises(UnsupportedActionError, match=r"lamps.pddl:6:19: .*'press' .*: \(in-reach \?l\) reads \("):
-        pose(domain, world, parse_condition("(on l)"))
+        build_problem(domain, world, parse_condition("(on l)"))
 
 
 def test_no_planning_action_makes_true_what_is_computed():
@@ -272,7 +270,7 @@ def test_too_many_conditional_effects_are_told():
     kb = KnowledgeBase(domain.schema)
     kb.apply(Delta(nodes={f"t{i}": "thing" for i in range(9)}), author="test")
     with pytest.raises(UnsupportedActionError, match=r"'carry' has 9 conditional effects.*Fast Downward"):
-        pose(domain, kb, parse_condition("(moved t1)"))
+        build_problem(domain, kb, parse_condition("(moved t1)"))
 
 
 @pytest.mark.parametrize(
@@ -296,7 +294,7 @@ def test_effects_under_conditions_that_do_not_matter_are_no_ways_of_their_own(ef
 
 def test_a_free_variable_is_an_error(clean_up, table):
     with pytest.raises(InputError, match="exists"):
-        pose(clean_up, table(cups=1), parse_condition("(tidy ?i)"))
+        build_problem(clean_up, table(cups=1), parse_condition("(tidy ?i)"))
 
 
 @pytest.mark.parametrize(
@@ -304,7 +302,7 @@ def test_a_free_variable_is_an_error(clean_up, table):
 )
 def test_an_unknown_name_in_a_goal_names_the_nearest(clean_up, table, goal, nearest):
     with pytest.raises(UnknownNameError, match=f"'{nearest}'"):
-        pose(clean_up, table(cups=1), parse_condition(goal))
+        build_problem(clean_up, table(cups=1), parse_condition(goal))
 
 
 # ---- exactness --------------------------------------------------------------------------------------------
@@ -361,7 +359,7 @@ def test_a_posed_problem_has_a_plan_exactly_if_there_is_one(actions, present, go
     domain, goal = _random_domain(actions), parse_condition(goal_text)
     world = KnowledgeBase(domain.schema)
     world.apply(Delta(added=tuple(sorted(present, key=str))), author="test")
-    plan = solution(pose(domain, world, goal))
+    plan = solution(build_problem(domain, world, goal))
     assert (plan is not None) == _solvable(domain, world, goal)
     assert plan is None or validate(plan, domain, world, goal).valid
 
@@ -375,20 +373,20 @@ _CHANGES = st.lists(st.tuples(st.sampled_from(_GROUND), st.booleans()), max_size
 @given(st.lists(_action, min_size=1, max_size=3), st.lists(st.tuples(_CHANGES, _goal), min_size=2, max_size=4))
 def test_a_poser_that_posed_before_poses_the_same_problem(actions, turns):
     domain = _random_domain(actions)
-    world, poser = KnowledgeBase(domain.schema), Poser(domain)
+    world, builder = KnowledgeBase(domain.schema), ProblemBuilder(domain)
     for changes, goal_text in turns:
         removed = tuple(one for one, there in changes if not there)
         world.apply(Delta(removed=removed, added=tuple(one for one, there in changes if there)), author="test")
         goal = parse_condition(goal_text)
-        again, afresh = poser.pose(world, goal), Poser(domain).pose(world, goal)
+        again, afresh = builder.build_problem(world, goal), ProblemBuilder(domain).build_problem(world, goal)
         assert again == afresh
         assert again.whole == afresh.whole
 
 
 def test_a_poser_follows_things_that_come_and_go(clean_up, table):
-    poser = Poser(clean_up)
+    builder = ProblemBuilder(clean_up)
     for world in (table(2), table(3, 2, ["two"]), table(1), table(3, 1, ["one"]), table(2, 2, ["two"])):
-        again, afresh = poser.pose(world, ALL_TIDY), Poser(clean_up).pose(world, ALL_TIDY)
+        again, afresh = builder.build_problem(world, ALL_TIDY), ProblemBuilder(clean_up).build_problem(world, ALL_TIDY)
         assert again == afresh
         assert again.whole == afresh.whole
 
@@ -399,7 +397,7 @@ def test_a_poser_follows_what_conditions_were_evaluated_on():
       (:action press :parameters (?l - lamp) :precondition
         (and (< (limit) 5) (forall (?other - lamp) (imply (near ?l ?other) (on ?other)))) :effect (on ?l)))""")
     world = lamps(domain, fact("near", "l1", "l2"), number=2)
-    poser, goal = Poser(domain), parse_condition("(on l1)")
+    builder, goal = ProblemBuilder(domain), parse_condition("(on l1)")
     turns = [
         Delta(),
         Delta(values={fact("limit"): 9}),
@@ -409,4 +407,4 @@ def test_a_poser_follows_what_conditions_were_evaluated_on():
     ]
     for change in turns:
         world.apply(change, author="test")
-        assert poser.pose(world, goal) == Poser(domain).pose(world, goal)
+        assert builder.build_problem(world, goal) == ProblemBuilder(domain).build_problem(world, goal)

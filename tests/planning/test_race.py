@@ -55,7 +55,9 @@ RUBBISH = answering("here you are")
 UNSOLVABLE = answering('{"actions": null}')
 
 
-@pytest.mark.parametrize("other", [HANGING, CRASHING, WRONG, RUBBISH, "raise SystemExit(3)", "import time; time.sleep(600)"])
+@pytest.mark.parametrize(
+    "other", [HANGING, CRASHING, WRONG, RUBBISH, "raise SystemExit(3)", "import time; time.sleep(600)"]
+)
 @pytest.mark.parametrize("swapped", [False, True])
 def test_the_first_valid_plan_wins_whatever_the_other_does(other, swapped):
     pair = (other, answering(SOLVED)) if swapped else (answering(SOLVED), other)
@@ -126,7 +128,9 @@ def test_stopping_takes_effect_at_once_and_leaves_no_process():
 
 def test_a_cheaper_plan_follows_the_first_whoever_finds_it():
     async def run():
-        racing = race(answering(LONGER), READY + f"for line in sys.stdin: print({SOLVED!r}, flush=True); time.sleep(600)")
+        racing = race(
+            answering(LONGER), READY + f"for line in sys.stdin: print({SOLVED!r}, flush=True); time.sleep(600)"
+        )
         async with aclosing(racing.plans(PROBLEM, 600)) as plans:
             async for found in plans:
                 if found.cost == 2:
@@ -192,8 +196,8 @@ BEHAVIOURS = {
     "babble": "print('bla' * 100_000, end='', flush=True)",
     "rubbish": "print('no plan of mine', flush=True)",
     "wrong plan": "print('{\"actions\": [1, 0]}', flush=True)",
-    "no numbers": "print('{\"actions\": [\"first\"]}', flush=True)",
-    "fail": "print('{\"failed\": \"tired\"}', flush=True)",
+    "no numbers": 'print(\'{"actions": ["first"]}\', flush=True)',
+    "fail": 'print(\'{"failed": "tired"}\', flush=True)',
     "end": "print('{\"ended\": 0}', flush=True)",
     "fork": "os.fork()",
     "plan": f"print({SOLVED!r}, flush=True)",

@@ -7,10 +7,10 @@ from knowledge_base.facts import Delta, fact
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.posing.problem import Poser
-from planning.posing.reach import reachable
-from planning.posing.reduction import Task, pruned
-from planning.posing.ways import Ways
+from planning.problem.construction import ProblemBuilder
+from planning.problem.operators import OperatorIndex
+from planning.problem.reduction import Task, pruned
+from planning.problem.relaxed_reachability import reachable
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain boxes) (:types place box)
@@ -43,16 +43,16 @@ FEW = st.sets(st.sampled_from([*FACTS[3:5], *FACTS[-12:-6], *FACTS[5:7]]), max_s
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(ALL, st.lists(FEW, min_size=1, max_size=6), st.sampled_from(GOALS))
 def test_what_is_found_again_is_what_comes_of_working_it_out_anew(start, turns, goal_text):
-    world, poser, goal = KnowledgeBase(DOMAIN.schema), Poser(DOMAIN), parse_condition(goal_text)
+    world, builder, goal = KnowledgeBase(DOMAIN.schema), ProblemBuilder(DOMAIN), parse_condition(goal_text)
     nodes = {**dict.fromkeys(PLACES, "place"), **dict.fromkeys(BOXES, "box")}
     world.apply(Delta(nodes=nodes, added=tuple(start)), "test")
     for changed in (set(), *turns):
         gone = tuple(one for one in changed if world.holds(one.predicate, one.args))
         world.apply(Delta(removed=gone, added=tuple(changed - {*gone})), "test")
-        task = poser.posing(world, goal).task
+        task = builder.grounded(world, goal).task
         if task is None:
             continue
-        anew = Task(task.numbering, task.init, task.goal, Ways(task.ways.all))
+        anew = Task(task.numbering, task.init, task.goal, OperatorIndex(task.ways.all))
         reach, reach_anew = reachable(task), reachable(anew)
         assert set(reach.facts) == set(reach_anew.facts)
         assert reach.taken == reach_anew.taken

@@ -14,7 +14,7 @@ from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, wo
 from planning.engines.registry import ENGINES
 from planning.engines.request import written
 from planning.plan import PlanStep
-from planning.posing.problem import pose
+from planning.problem.construction import build_problem
 from planning.strips import GroundAction, Problem
 
 NAMES = [
@@ -63,7 +63,7 @@ def answers(process, problem, seconds=60.0):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_plans_and_the_plan_is_valid(process_of, name, clean_up, table):
-    problem = pose(clean_up, table(2), parse_condition("(forall (?i - item) (tidy ?i))"))
+    problem = build_problem(clean_up, table(2), parse_condition("(forall (?i - item) (tidy ?i))"))
     seconds = 1.0 if BY_NAME[name].anytime else 60.0
     for answer in answers(process_of(name), problem, seconds):
         plan = problem.plan(answer["actions"])
@@ -106,7 +106,7 @@ def test_an_engine_that_can_count_does(process_of, name, world_of):
     if "numeric" not in BY_NAME[name].features:
         pytest.skip(f"{name} does not say that it can")
     domain = PlanningDomain.parse(COUNTING)
-    problem = pose(domain, world_of(domain.schema, {}, values={Fact("n"): 0}), parse_condition("(done)"))
+    problem = build_problem(domain, world_of(domain.schema, {}, values={Fact("n"): 0}), parse_condition("(done)"))
     assert "numeric" in problem.features
     plan = problem.plan(answers(process_of(name), problem)[0]["actions"])
     assert [step.action for step in plan.steps] == ["more"] * 3 + ["stop"]

@@ -9,7 +9,7 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.printer import to_text
 from planning import Plan, PlanningDomain, PlanStep, validate
-from planning.execution.needs import Needs
+from planning.execution.causal_needs import CausalNeeds
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain everything)
@@ -42,7 +42,7 @@ STEPS = [
 
 
 def needed_before(steps, goal, domain=DOMAIN):
-    return Needs(steps, domain, goal).before(tuple(range(1, len(steps) + 1)))
+    return CausalNeeds(steps, domain, goal).before(tuple(range(1, len(steps) + 1)))
 
 
 def a_world(facts=(), weights=(0, 0, 0), total=0):

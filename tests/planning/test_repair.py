@@ -5,7 +5,7 @@ import pytest
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.parser import parse_condition
 from planning import PlanningDomain, PlanStep
-from planning.execution.repair import MOST_RESUMED, Attempt, Failure, Rung, situation, without
+from planning.execution.repair import MOST_RESUMED, Attempt, EscalationStep, Failure, situation, without
 from planning.strips import GroundAction, Problem
 
 STEP = PlanStep("go", ("a", "b"))
@@ -15,9 +15,19 @@ HERE = Failure(STEP, "no_path", "here")
 @pytest.mark.parametrize(
     ("stands", "others", "rungs"),
     [
-        (True, True, [Rung.RESUME, Rung.OTHER_CANDIDATE, Rung.EXCLUDE, Rung.GIVE_UP, Rung.GIVE_UP]),
-        (True, False, [Rung.RESUME, Rung.EXCLUDE, Rung.GIVE_UP]),
-        (False, True, [Rung.REPLAN, Rung.EXCLUDE, Rung.GIVE_UP]),
+        (
+            True,
+            True,
+            [
+                EscalationStep.RESUME,
+                EscalationStep.OTHER_CANDIDATE,
+                EscalationStep.EXCLUDE,
+                EscalationStep.GIVE_UP,
+                EscalationStep.GIVE_UP,
+            ],
+        ),
+        (True, False, [EscalationStep.RESUME, EscalationStep.EXCLUDE, EscalationStep.GIVE_UP]),
+        (False, True, [EscalationStep.REPLAN, EscalationStep.EXCLUDE, EscalationStep.GIVE_UP]),
     ],
 )
 def test_the_same_failure_in_the_same_situation_gets_the_next_answer(stands, others, rungs):
@@ -28,16 +38,16 @@ def test_the_same_failure_in_the_same_situation_gets_the_next_answer(stands, oth
 def test_another_failure_or_another_situation_begins_anew():
     attempt = Attempt()
     for failure in (HERE, Failure(STEP, "no_path", "there"), Failure(STEP, "slipped", "here")):
-        assert attempt.failed(failure, stands=True, others=False) is Rung.RESUME
+        assert attempt.failed(failure, stands=True, others=False) is EscalationStep.RESUME
 
 
 def test_going_on_at_the_same_step_is_bounded_whatever_the_situation():
     attempt = Attempt()
     attempt.resumed[STEP] = MOST_RESUMED
-    assert attempt.failed(HERE, stands=True, others=True) is Rung.REPLAN
-    assert attempt.interrupted(STEP) is Rung.REPLAN
-    assert attempt.interrupted(PlanStep("stay")) is Rung.RESUME
-    assert attempt.interrupted(None) is Rung.REPLAN
+    assert attempt.failed(HERE, stands=True, others=True) is EscalationStep.REPLAN
+    assert attempt.interrupted(STEP) is EscalationStep.REPLAN
+    assert attempt.interrupted(PlanStep("stay")) is EscalationStep.RESUME
+    assert attempt.interrupted(None) is EscalationStep.REPLAN
 
 
 DOMAIN = PlanningDomain.parse("""

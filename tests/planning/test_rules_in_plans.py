@@ -205,7 +205,9 @@ def away(rules, *facts, beside="", parallel=True, holder=HOLDER, records=None, *
 
 
 @pytest.mark.parametrize("parallel", [True, False])
-@pytest.mark.parametrize("rule", ["{on: blurred, do: {then: over}}", "{on: blurred, of: show, do: {tell: (noticed), then: over}}"])
+@pytest.mark.parametrize(
+    "rule", ["{on: blurred, do: {then: over}}", "{on: blurred, of: show, do: {tell: (noticed), then: over}}"]
+)
 def test_a_rule_leads_out_of_a_plan_to_a_state_beside_its_goal(rule, parallel):
     end, studio, knowledge = away(f"rules: [{rule}]", blurred=["cup", "pot"], parallel=parallel)
     assert (end.finished, end.emitted, end.problem) == (True, (), None)
@@ -214,13 +216,17 @@ def test_a_rule_leads_out_of_a_plan_to_a_state_beside_its_goal(rule, parallel):
 
 
 def test_a_step_that_would_begin_is_left_for_another_state():
-    end, studio, _ = away("rules: [{before: show, when: (dirty ?step.thing), do: {then: aside}}]", fact("dirty", "pot"), beside=ASIDE)
+    end, studio, _ = away(
+        "rules: [{before: show, when: (dirty ?step.thing), do: {then: aside}}]", fact("dirty", "pot"), beside=ASIDE
+    )
     assert (end.finished, end.emitted) == (True, ())
     assert [one for one in studio.done if one[1] == "pot"] == [("light", "pot"), ("wipe", "pot"), ("show wide", "pot")]
 
 
 def test_what_a_rule_passes_arrives_with_the_state_it_leads_to():
-    rules = "rules: [{on: blurred, do: {use: wipe, with: {thing: ?event.thing}, then: told, pass: {what: ?event.thing}}}]"
+    rules = (
+        "rules: [{on: blurred, do: {use: wipe, with: {thing: ?event.thing}, then: told, pass: {what: ?event.thing}}}]"
+    )
     end, studio, _ = away(rules, blurred=["pot"], beside=TOLD)
     assert end.finished
     assert studio.parameters["told"] == "pot"
@@ -229,7 +235,9 @@ def test_what_a_rule_passes_arrives_with_the_state_it_leads_to():
 
 def test_a_rule_that_leads_away_again_and_again_ends_with_giving_up():
     """The step is left for a state that leads back at once: as many new plans as the budget has, then the reason."""
-    holder = HOLDER.replace("goal: (forall (?t - thing) (shown ?t))", "goal: (forall (?t - thing) (shown ?t))\n    budget: {replans: 3}")
+    holder = HOLDER.replace(
+        "goal: (forall (?t - thing) (shown ?t))", "goal: (forall (?t - thing) (shown ?t))\n    budget: {replans: 3}"
+    )
     records = []
     rule, beside = "rules: [{before: light, do: {then: aside}}]", "  aside: {on: {done: all}}\n"
     end, studio, _ = away(rule, holder=holder, beside=beside, records=records)
@@ -273,21 +281,32 @@ def test_giving_up_for_being_led_away_too_often_reaches_whoever_wires_it(own, pa
 
 def test_leading_away_is_bounded_anew_when_the_goal_has_been_reached():
     """A plot that goes on for ever may be led away each time once; only what never gets anywhere is given up."""
-    holder = HOLDER.replace("goal: (forall", "budget: {replans: 0}\n    goal: (forall").replace("done: over\n", "done: again\n", 1)
-    holder = holder.replace("  over:", "  again: {always: [{to: all, when: (noticed), tell: [(not (noticed)), (not (shown cup)), (dirty cup)]}, over]}\n  over:")
+    holder = HOLDER.replace("goal: (forall", "budget: {replans: 0}\n    goal: (forall").replace(
+        "done: over\n", "done: again\n", 1
+    )
+    holder = holder.replace(
+        "  over:",
+        "  again: {always: [{to: all, when: (noticed), tell: [(not (noticed)), (not (shown cup)), (dirty cup)]}, over]}\n  over:",
+    )
     rule = "rules: [{before: show, when: (dirty ?step.thing), do: {then: aside}}]"
-    end, studio, _ = away(rule, fact("dirty", "cup"), fact("noticed"), holder=holder, beside=ASIDE.replace("pot", "cup"))
+    end, studio, _ = away(
+        rule, fact("dirty", "cup"), fact("noticed"), holder=holder, beside=ASIDE.replace("pot", "cup")
+    )
     assert (end.finished, end.emitted) == (True, ())
     assert [one for one in studio.done if one == ("wipe", "cup")] == [("wipe", "cup")] * 2
 
 
 def test_leaving_a_plan_takes_what_runs_in_it_and_its_watching_along():
     """Exit actions of the step that goes on in another lane put its component at rest, and its skill is cancelled."""
-    slow = PLOTS[0].replace("a: {entry: {trigger: studio.light", "a: {exit: {switch: studio, to: dark}, entry: {trigger: studio.light")
+    slow = PLOTS[0].replace(
+        "a: {entry: {trigger: studio.light", "a: {exit: {switch: studio, to: dark}, entry: {trigger: studio.light"
+    )
     studio, records = Studio(blurred=["cup"]), []
     studio.concurrent = True
     studio.seconds = {("light", "pot"): 50.0}
-    plots = [parse_plot(text) for text in (HOLDER + "rules: [{on: blurred, do: {then: over}}]", TELL_IT, slow, *PLOTS[1:])]
+    plots = [
+        parse_plot(text) for text in (HOLDER + "rules: [{on: blurred, do: {then: over}}]", TELL_IT, slow, *PLOTS[1:])
+    ]
     with Executive(DOMAIN, plots, [studio]) as robot:
         robot.listen(records.append)
         known = [fact("known", thing) for thing in ("cup", "pot")]

@@ -17,8 +17,8 @@ FOUND = PlanFound(Plan((PlanStep("go", ("a", "b")),)), "fake", 0.0, 0.1)
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch):
-    monkeypatch.setattr("planning.execution.asking.PATIENCE", -4.9)  # of the five seconds that the goal has
-    monkeypatch.setattr("planning.execution.bounds.STOPPING", 0.1)
+    monkeypatch.setattr("planning.execution.planner_call.PATIENCE", -4.9)  # of the five seconds that the goal has
+    monkeypatch.setattr("planning.execution.planner_deadline.STOPPING", 0.1)
 
 
 async def goes_on():
@@ -81,7 +81,7 @@ def test_a_planner_that_cannot_be_cancelled_ends_in_no_plan(simulated):
 
 @pytest.mark.parametrize("simulated", [True, False])
 def test_a_stop_does_not_wait_for_a_planner_that_cannot_be_cancelled(simulated, monkeypatch, caplog):
-    monkeypatch.setattr("planning.execution.asking.PATIENCE", 3600)
+    monkeypatch.setattr("planning.execution.planner_call.PATIENCE", 3600)
     planner = Stubborn()
 
     async def stop_when_it_works(sequencer):
@@ -134,7 +134,7 @@ class Tidy:
 
 
 def test_a_program_that_is_interrupted_ends_when_planners_have_stopped(monkeypatch, caplog):
-    monkeypatch.setattr("planning.execution.bounds.STOPPING", 5)
+    monkeypatch.setattr("planning.execution.planner_deadline.STOPPING", 5)
     planner = Tidy()
 
     async def interrupted(sequencer):

@@ -9,7 +9,7 @@ from test_testing_with_plans import DOMAIN, LIGHT_UP, PLOTS, Lamps, OnePlan
 
 from dsc.testing import Answer, Fault, Faults, ScriptedSkills, world
 from planning import Executive
-from planning.execution.asking import PATIENCE
+from planning.execution.planner_call import PATIENCE
 from planning.testing import FaultyPlanner
 
 PLANNER = [Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_DIES, Fault.PLANNER_LIES]

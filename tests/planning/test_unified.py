@@ -54,7 +54,9 @@ def test_their_examples_are_the_same_problem_here_and_back_again(name: str) -> N
 def _sequential():
     for name, example in EXAMPLES.items():
         for number, plan in enumerate(example.valid_plans):
-            if isinstance(plan, SequentialPlan) and plan.actions and name != "basic_undef_numeric":  # it leaves the goal
+            if (
+                isinstance(plan, SequentialPlan) and plan.actions and name != "basic_undef_numeric"
+            ):  # it leaves the goal
                 yield pytest.param(example.problem, plan, id=f"{name} {number}")
 
 

@@ -11,13 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 
-from knowledge_base.exchange.forms import delta_of
+from knowledge_base.exchange.json_forms import delta_of
 from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import And, Not, substitute
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.world.overlay import Overlay
-from planning.ordering.order import causal_links, standing
+from planning.ordering.partial_order import causal_links, standing
 from planning.plan import Plan, PlanStep
 
 STATE = re.compile(r"(?:.*/)?(step|after)_(\d+)")
@@ -130,4 +130,3 @@ class Replay:
 def _state(path):
     found = STATE.fullmatch(path)
     return (found[1], int(found[2])) if found else ("", 0)
-

@@ -16,8 +16,8 @@ httpx = pytest.importorskip("httpx", reason="the extra `viewer` is not installed
 
 from dsc.trace import header  # noqa: E402
 from dsc.viewer.access import CODE_LIFE_S, MOST_WRONG_CODES, Access, Keys  # noqa: E402
+from dsc.viewer.address import PageAddress  # noqa: E402
 from dsc.viewer.cli import page  # noqa: E402
-from dsc.viewer.entrance import Entrance  # noqa: E402
 from dsc.viewer.live import LivePage  # noqa: E402
 from dsc.viewer.records import RecordLog  # noqa: E402
 from dsc.viewer.server import Viewer  # noqa: E402
@@ -177,7 +177,7 @@ def opened(monkeypatch) -> list[str]:
 
 
 def test_the_browser_is_given_a_code_and_people_the_token(opened, capsys) -> None:
-    entrance = Entrance.on()
+    entrance = PageAddress.on()
     with page(Viewer(RecordLog(), entrance), opens=True) as viewer:
         printed = capsys.readouterr().out.strip()
         (given,) = opened
@@ -194,13 +194,13 @@ def test_a_machine_without_a_browser_prints_the_address(monkeypatch, capsys) -> 
         raise webbrowser.Error("could not locate runnable browser")
 
     monkeypatch.setattr(webbrowser, "open", none)
-    with page(Viewer(RecordLog(), Entrance.on()), opens=True) as viewer:
+    with page(Viewer(RecordLog(), PageAddress.on()), opens=True) as viewer:
         assert capsys.readouterr().out.strip() == viewer.url
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="there is no /proc on this system")
 def test_nobody_reads_a_key_from_the_process_that_serves_the_page(opened) -> None:
-    entrance = Entrance.on()
+    entrance = PageAddress.on()
     with page(LivePage(header(), entrance), opens=True) as live:
         assert status(opened[0]) == 200  # its process has started
         folder = Path("/proc") / str(live._process.pid)

@@ -14,14 +14,14 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 
 from dsc.trace import Record, header
-from dsc.viewer import answers
-from dsc.viewer.answers import Answers
+from dsc.viewer import queries
+from dsc.viewer.address import PageAddress
 from dsc.viewer.control import MOST_BREAKS, MOST_STATEMENTS, MOST_WORK, Control
-from dsc.viewer.entrance import Entrance
+from dsc.viewer.queries import PageQueries
 from dsc.viewer.records import RecordLog, read_trace
 from dsc.viewer.server import Viewer
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema
-from knowledge_base.exchange.forms import schema_form, world_form
+from knowledge_base.exchange.json_forms import schema_form, world_form
 
 DOMAIN = """(define (domain d) (:types item - object)
     (:predicates (clean ?x - item)) (:functions (weight ?x - item)))"""
@@ -56,40 +56,40 @@ def test_a_trace_is_read_no_further_than_its_bounds(tmp_path, monkeypatch) -> No
 
 
 def test_a_browser_gets_so_many_answers_and_learns_that_there_are_more(log, monkeypatch) -> None:
-    monkeypatch.setattr(answers, "MOST_ANSWERS", 7)
-    said = Answers(log).query({"seq": 1, "expression": CARTESIAN})
+    monkeypatch.setattr(queries, "MOST_ANSWERS", 7)
+    said = PageQueries(log).query({"seq": 1, "expression": CARTESIAN})
     assert len(said["answers"]) == 7
     assert said["more"]
-    assert "more" not in Answers(log).query({"seq": 1, "expression": "(and (item ?a) (= ?a o3))"})
-    facts = Answers(log).facts({"seq": 1})
+    assert "more" not in PageQueries(log).query({"seq": 1, "expression": "(and (item ?a) (= ?a o3))"})
+    facts = PageQueries(log).facts({"seq": 1})
     assert len(facts["things"]) == 7
     assert facts["more"]
 
 
 def test_a_question_of_a_browser_is_given_up_after_some_seconds(log, monkeypatch) -> None:
-    monkeypatch.setattr(answers, "MOST_SECONDS", 0.05)
+    monkeypatch.setattr(queries, "MOST_SECONDS", 0.05)
     with pytest.raises(InputError, match=r"takes longer than 0\.05 s"):
-        Answers(log).query({"seq": 1, "expression": NEST})
+        PageQueries(log).query({"seq": 1, "expression": NEST})
 
 
 def test_an_answer_without_its_reason_is_an_answer(log, monkeypatch) -> None:
-    monkeypatch.setattr(answers, "MOST_EXPLAINED", -1.0)
-    said = Answers(log).query({"seq": 1, "expression": "(item o3)"})
+    monkeypatch.setattr(queries, "MOST_EXPLAINED", -1.0)
+    said = PageQueries(log).query({"seq": 1, "expression": "(item o3)"})
     assert said["holds"]
     assert said["why"]["truth"]
     assert "takes longer than" in said["why"]["detail"]
 
 
 def test_an_expression_of_a_browser_is_no_longer_than_its_bound(log, monkeypatch) -> None:
-    monkeypatch.setattr(answers, "MOST_TEXT", 10)
+    monkeypatch.setattr(queries, "MOST_TEXT", 10)
     with pytest.raises(InputError, match="'expression' has 12 characters; a browser may send 10"):
-        Answers(log).query({"seq": 1, "expression": "(clean o333)"})
+        PageQueries(log).query({"seq": 1, "expression": "(clean o333)"})
 
 
 def test_a_question_ends_when_its_browser_leaves(log, monkeypatch) -> None:
     """Formerly it went on in the thread that it had been given."""
     begun, ended = threading.Event(), threading.Event()
-    real = Answers.query
+    real = PageQueries.query
 
     def query(self, asked, left):
         begun.set()
@@ -98,8 +98,8 @@ def test_a_question_ends_when_its_browser_leaves(log, monkeypatch) -> None:
         finally:
             ended.set()
 
-    monkeypatch.setattr(Answers, "query", query)
-    viewer = Viewer(log, Entrance.on())
+    monkeypatch.setattr(PageQueries, "query", query)
+    viewer = Viewer(log, PageAddress.on())
     viewer.start()
     try:
         body = f'{{"seq": 1, "expression": "{NEST}"}}'
@@ -111,7 +111,7 @@ def test_a_question_ends_when_its_browser_leaves(log, monkeypatch) -> None:
             )
             assert begun.wait(10)
             assert not ended.is_set()
-        assert ended.wait(answers.MOST_SECONDS - 1)
+        assert ended.wait(queries.MOST_SECONDS - 1)
     finally:
         viewer.close()
 

@@ -161,7 +161,10 @@ def test_a_parameter_is_set_within_what_is_left_to_operators() -> None:
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ({"do": "set", "owner": "base", "name": "sped", "value": 1}, "component 'base' has no parameter 'sped'; did you mean 'speed'"),
+        (
+            {"do": "set", "owner": "base", "name": "sped", "value": 1},
+            "component 'base' has no parameter 'sped'; did you mean 'speed'",
+        ),
         ({"do": "set", "owner": "wait", "name": "seconds", "value": "long"}, "'wait.seconds' is a number; found long"),
         ({"do": "stepp"}, "there is nothing to do called 'stepp'; did you mean 'step'"),
         ({"do": "break", "on": {"stat": "clear"}}, "a breakpoint is on one of"),

@@ -12,7 +12,7 @@ pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 from typer.testing import CliRunner
 
 from dsc.trace import header
-from dsc.viewer.answers import Answers
+from dsc.viewer.queries import PageQueries
 from dsc.viewer.records import RecordLog, read_trace
 from knowledge_base import InputError
 
@@ -82,7 +82,7 @@ def test_a_last_line_that_was_cut_is_said_and_the_rest_is_there(tmp_path) -> Non
         ([], "run.jsonl:1: the file is empty"),
         ([""] * 3, "run.jsonl:1: the file is empty"),
         ([HEADER[:-3], *LINES], "run.jsonl:1: the first line of this trace is damaged"),
-        (['{"format": "dsc-trace", "version": 2}', *LINES], "run.jsonl:1: a trace of version 2; this program reads version 1"),
+        (['{"format": "dsc-trace", "version": 9}', *LINES], "run.jsonl:1: a trace of version 9; this program reads version 2"),
         (['{"format": "dsc-trace"}', *LINES], "a trace of version null"),
         (['{"format": "dsc-trace", "version": ' + "[" * 100_000, *LINES], "the first line of this trace is damaged"),
         (LINES, "neither a store nor a trace"),
@@ -122,7 +122,7 @@ def test_the_command_names_what_is_damaged(tmp_path, monkeypatch) -> None:
 )
 def test_a_question_about_what_a_damaged_record_changed_is_refused_with_its_number(damage) -> None:
     lines = [LINES[0], f'{{"seq": 2, "t": 1.0, "type": "knowledge", "cause": null, {damage}', LINES[2]]
-    answers = Answers(RecordLog(HEADER, lines))
+    answers = PageQueries(RecordLog(HEADER, lines))
     assert answers.facts({"seq": 1})["facts"] == []
     with pytest.raises(InputError, match="record 2 is damaged"):
         answers.facts({"seq": 3})

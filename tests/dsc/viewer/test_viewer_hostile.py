@@ -19,7 +19,7 @@ from hypothesis import strategies as st  # noqa: E402
 
 from dsc.events import Event  # noqa: E402
 from dsc.trace import header  # noqa: E402
-from dsc.viewer.entrance import Entrance  # noqa: E402
+from dsc.viewer.address import PageAddress  # noqa: E402
 from dsc.viewer.records import RecordLog  # noqa: E402
 from dsc.viewer.server import Viewer  # noqa: E402
 from knowledge_base import InputError  # noqa: E402
@@ -55,13 +55,13 @@ class FakeHands:
 @pytest.fixture(scope="module")
 def viewer():
     from knowledge_base import Schema
-    from knowledge_base.exchange.forms import schema_form
+    from knowledge_base.exchange.json_forms import schema_form
 
     schema = schema_form(
         Schema.parse("(define (domain d) (:types item place) (:predicates (on ?a - item ?b - place)))")
     )
     world = json.dumps({"seq": 1, "t": 0.0, "type": "world", "cause": None, **WORLD, "schema": schema})
-    viewer = Viewer(RecordLog(header(), [world]), Entrance.on(), FakeHands())
+    viewer = Viewer(RecordLog(header(), [world]), PageAddress.on(), FakeHands())
     viewer.start()
     yield viewer
     viewer.close()

@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed  # noqa: E402
 from domains.clean_up_table.deployment import deploy  # noqa: E402
 from domains.clean_up_table.scenario import Scenario  # noqa: E402
 from dsc.trace import Record, header  # noqa: E402
-from dsc.viewer.entrance import Entrance  # noqa: E402
+from dsc.viewer.address import PageAddress  # noqa: E402
 from dsc.viewer.live import LivePage  # noqa: E402
 
 MUCH = 2000
@@ -29,7 +29,7 @@ LONG = "x" * 1000
 
 @pytest.fixture
 def live():
-    page = LivePage(header(run="test"), Entrance.on())
+    page = LivePage(header(run="test"), PageAddress.on())
     page.start()
     yield page
     page.close()
@@ -116,16 +116,16 @@ def test_a_page_ends_with_the_program_that_it_belongs_to(live):
 
 
 def test_a_page_that_nobody_started_gives_its_address_back():
-    entrance = Entrance.on()
+    entrance = PageAddress.on()
     port = entrance.port
     LivePage(header(), entrance).close()
-    Entrance.on(port).listening.close()
+    PageAddress.on(port).listening.close()
 
 
 @pytest.fixture
 def held():
     """A run that stands still before its first event, and a browser that may change it."""
-    page = LivePage(header(), Entrance.on(), control=True)
+    page = LivePage(header(), PageAddress.on(), control=True)
     page.start()
     table = deploy(Scenario.parse("table: {cups: 1}"), 1, 0.0, listener=page.hear)
     page.control._steps = 0

@@ -14,7 +14,7 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 httpx = pytest.importorskip("httpx", reason="the extra `viewer` is not installed")
 
-from dsc.viewer.entrance import Entrance  # noqa: E402
+from dsc.viewer.address import PageAddress  # noqa: E402
 from dsc.viewer.records import RecordLog  # noqa: E402
 from dsc.viewer.server import STATIC, Viewer  # noqa: E402
 
@@ -71,7 +71,7 @@ def test_each_file_is_served_with_its_type(served, name):
 
 @pytest.fixture(scope="module")
 def served():
-    viewer = Viewer(RecordLog(), Entrance.on())
+    viewer = Viewer(RecordLog(), PageAddress.on())
     viewer.start()
     with httpx.Client(base_url=f"http://127.0.0.1:{viewer.port}", params={"token": viewer.token}) as client:
         yield client

@@ -13,7 +13,7 @@ from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.trace import Trace
-from dsc.viewer.opening import records_of
+from dsc.viewer.record_sources import records_of
 from knowledge_base import KnowledgeBase, Schema, StoreError
 
 SCHEMA = Schema.parse("(define (domain d))")

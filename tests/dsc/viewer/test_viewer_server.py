@@ -15,7 +15,7 @@ websockets = pytest.importorskip("websockets.sync.client", reason="the extra `vi
 from domains.clean_up_table.deployment import deploy  # noqa: E402
 from domains.clean_up_table.scenario import Scenario  # noqa: E402
 from dsc.trace import header  # noqa: E402
-from dsc.viewer.entrance import Entrance  # noqa: E402
+from dsc.viewer.address import PageAddress  # noqa: E402
 from dsc.viewer.records import RecordLog, read_trace  # noqa: E402
 from dsc.viewer.server import Viewer  # noqa: E402
 from knowledge_base import InputError  # noqa: E402
@@ -36,7 +36,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def viewer(run):
-    viewer = Viewer(run[0], Entrance.on())
+    viewer = Viewer(run[0], PageAddress.on())
     viewer.start()
     yield viewer
     viewer.close()
@@ -122,7 +122,7 @@ def test_all_records_come_without_a_gap_from_where_they_are_wanted(run, viewer) 
 
 def test_new_records_follow_and_the_end_is_told() -> None:
     log = RecordLog(header(run="live"), ['{"seq": 1, "t": 0.0, "type": "log", "cause": null}'], live=True)
-    viewer = Viewer(log, Entrance.on())
+    viewer = Viewer(log, PageAddress.on())
     viewer.start()
     try:
         with socket(viewer) as connection:
@@ -181,7 +181,7 @@ def test_control_is_refused_unless_it_was_allowed(page) -> None:
 
 def test_a_port_that_is_taken_is_said(viewer) -> None:
     with pytest.raises(InputError, match=f"cannot listen on port {viewer.port}"):
-        Entrance.on(viewer.port)
+        PageAddress.on(viewer.port)
 
 
 def test_a_trace_file_is_read_and_a_damaged_one_refused_with_its_line(run, tmp_path) -> None:

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from dsc.viewer.answers import Answers
-from dsc.viewer.opening import records_of
+from dsc.viewer.queries import PageQueries
+from dsc.viewer.record_sources import records_of
 from knowledge_base import InputError, KnowledgeBase, Schema
 
 DOMAIN = """(define (domain kitchen) (:types cup surface - object)
@@ -35,14 +35,18 @@ def test_the_past_of_a_store_is_records_with_version_author_and_time(store):
     with records_of(store) as log:
         world, *changes = [log.record(seq) for seq in range(1, len(log) + 1)]
         assert (world["type"], world["version"], world["facts"]) == ("world", 0, [])
-        assert [(r["version"], r["author"], r["t"]) for r in changes] == [(1, "eye", 0.0), (2, "scale", 5.0), (3, "arm", 10.0)]
+        assert [(r["version"], r["author"], r["t"]) for r in changes] == [
+            (1, "eye", 0.0),
+            (2, "scale", 5.0),
+            (3, "arm", 10.0),
+        ]
         assert [r["removed"] for r in changes if "removed" in r] == [[["on", "cup", "table"]]]
         assert (log.header["store"], log.header["run"]) == (True, "kitchen.db")
 
 
 def test_any_version_is_asked(store):
     with records_of(store) as log, KnowledgeBase.open(None, store, read_only=True) as kb:
-        answers = Answers(log)
+        answers = PageQueries(log)
         for seq in range(1, len(log) + 1):
             then = kb.at(version=log.record(seq)["version"])
             said = answers.query({"seq": seq, "expression": "(on ?c ?s)"})

@@ -13,9 +13,8 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 from starlette.websockets import WebSocketDisconnect
 
 from dsc.trace import Record, header
+from dsc.viewer.broadcast import Broadcast, BrowserStream
 from dsc.viewer.records import MOST_RECORDS, RecordLog
-from dsc.viewer.rounds import Rounds
-from dsc.viewer.stream import Stream
 
 
 class Browser:
@@ -60,8 +59,8 @@ def streamed(use) -> None:
 
     async def going() -> None:
         browser, log, how = Browser(), RecordLog(header(), live=True), {"paused": None}
-        rounds = Rounds(log, lambda: dict(how), sleep=lambda _: asyncio.sleep(0))
-        stream = Stream(browser, log, rounds, control=False)  # type: ignore[arg-type]
+        rounds = Broadcast(log, lambda: dict(how), sleep=lambda _: asyncio.sleep(0))
+        stream = BrowserStream(browser, log, rounds, control=False)  # type: ignore[arg-type]
         serving = asyncio.create_task(stream.serve())
         await use(browser, log, how)
         browser.wants.put_nowait(None)
@@ -122,11 +121,11 @@ def test_of_a_status_only_the_latest_is_said_and_only_if_it_is_new():
 def test_all_browsers_are_offered_the_same_in_a_round_and_one_that_takes_nothing_holds_up_nobody():
     async def going() -> None:
         log, made = RecordLog(header(), live=True), []
-        rounds = Rounds(log, lambda: {"paused": None}, sleep=lambda _: asyncio.sleep(0))
+        rounds = Broadcast(log, lambda: {"paused": None}, sleep=lambda _: asyncio.sleep(0))
         browsers = [Browser() for _ in range(3)]
         slow, *quick = browsers
         for browser in browsers:
-            made.append(asyncio.create_task(Stream(browser, log, rounds, control=False).serve()))  # type: ignore[arg-type]
+            made.append(asyncio.create_task(BrowserStream(browser, log, rounds, control=False).serve()))  # type: ignore[arg-type]
             browser.wants.put_nowait({"want": 1})
         for count in (5, 10, 15):
             feed(log, 5)

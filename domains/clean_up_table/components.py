@@ -1,0 +1,231 @@
+"""The robot of clean-up-table as components over one world: base, arm, camera, voice (S0.7, S0.8).
+
+A skill takes its time first and acts on the world after it, in one go: a call that is cancelled on the way
+changes nothing. It hands over what the robot observes, never the world's truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from domains.clean_up_table.observations import initial_knowledge, learned
+from domains.clean_up_table.places import PLACES, distance
+from dsc.calls import Ended, Outcome, SkillCall
+from dsc.components.component import Component
+from dsc.components.parameters import Parameter
+from dsc.skills import skill
+
+if TYPE_CHECKING:
+    from domains.clean_up_table.results import Result
+    from domains.clean_up_table.table_world import TableWorld
+    from dsc.skills import AfterCrash
+
+__all__ = ["Arm", "Base", "Camera", "Voice", "initial_knowledge"]
+
+
+def seconds(default: float) -> Parameter:
+    """How long something takes; the integrator knows the robot, plots cannot make it faster."""
+    return Parameter("number", default=default, least=0.1, most=60.0, changed_by="profile")
+
+
+ITEM_AT = {"item": "item", "surface": "surface"}
+ITEM_IN = {"item": "item", "carrier": "item", "surface": "surface"}
+CARRIER_AT = {"carrier": "item", "surface": "surface"}
+NOT_POSSIBLE: dict[str, str | None] = {"reason": None}
+ONCE: AfterCrash = "same_id"
+"""The world does each id once."""
+
+drives = skill(
+    outcomes={
+        "arrived": {"to": "place"},
+        "no_path": {"to": "place"},
+        "slipped": {"item": "item", "surface": "surface", "to": "place"},
+        "not_possible": NOT_POSSIBLE,
+    },
+    types={"to": "place"},
+    after_crash=ONCE,
+)
+"""What every base says of driving."""
+
+picks_up = skill(
+    outcomes={
+        "picked_up": ITEM_AT,
+        "grasp_failed": ITEM_AT,
+        "no_ik": ITEM_AT,
+        "gone": ITEM_AT,
+        "not_possible": NOT_POSSIBLE,
+    },
+    types=ITEM_AT,
+    after_crash=ONCE,
+)
+"""What every arm says of picking up."""
+
+takes_out = skill(
+    outcomes={
+        "taken_out": ITEM_IN,
+        "grasp_failed": ITEM_IN,
+        "no_ik": ITEM_IN,
+        "gone": ITEM_AT,
+        "not_possible": NOT_POSSIBLE,
+    },
+    types=ITEM_IN,
+    after_crash=ONCE,
+)
+"""What every arm says of taking out."""
+
+recognises = skill(
+    outcomes={
+        "recognised": {"surface": "surface", "count": None},
+        "nothing_found": {"surface": "surface"},
+        "not_possible": NOT_POSSIBLE,
+    },
+    types={"surface": "surface"},
+    after_crash=ONCE,
+)
+"""What every camera says of recognising."""
+
+
+class TablePart(Component):
+    """A part of the robot, which acts on the world.
+
+    Args:
+        world: remembers what was done in it.
+        name: how charts address the part.
+    """
+
+    def __init__(self, world: TableWorld, name: str | None = None) -> None:
+        super().__init__(name)
+        self.world = world
+
+    async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
+        """Nothing goes on by itself here; what was done is done."""
+        self.world.catch_up()
+        results = [self.world.done.get(one) for one in (again(action_id), action_id)]
+        return next((Ended(outcome_of(result)) for result in results if result is not None), None)
+
+
+class Base(TablePart):
+    """The mobile base."""
+
+    name = "base"
+    declares: ClassVar[Mapping[str, Parameter]] = {
+        "navigation": Parameter("text", default="planned", among=("planned", "reactive")),
+        "speed": Parameter("number", default=0.5, least=0.05, most=1.5),  # metres a second
+        "starting": seconds(1.0),  # until it moves
+    }
+
+    @drives
+    async def drive(self, call: SkillCall, to: str) -> Outcome:
+        """Drive to a place; a held item may slip, and then robot and item are at the floor."""
+        metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
+        await call.clock.sleep(self.parameters["starting"] + metres / self.parameters["speed"])
+        return outcome_of(self.world.drive(call.action_id, to))
+
+
+class Arm(TablePart):
+    """The arm with its one hand."""
+
+    name = "arm"
+    declares: ClassVar[Mapping[str, Parameter]] = {
+        "approach": Parameter("text", default="above", among=("above", "side")),
+        "grasping": seconds(4.0),
+        "putting": seconds(3.0),
+        "stacking": seconds(5.0),
+        "throwing": seconds(3.0),
+    }
+
+    @picks_up
+    async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
+        """Pick an item, with everything in it, up from a surface."""
+        await call.clock.sleep(self.parameters["grasping"])
+        return outcome_of(self.world.pick_up(call.action_id, item, surface))
+
+    @skill(outcomes={"put_down": ITEM_AT, "not_possible": NOT_POSSIBLE}, types=ITEM_AT, after_crash=ONCE)
+    async def put_down(self, call: SkillCall, item: str, surface: str) -> Outcome:
+        """Put the held item on a surface."""
+        await call.clock.sleep(self.parameters["putting"])
+        return outcome_of(self.world.put_down(call.action_id, item, surface))
+
+    @skill(
+        outcomes={
+            "stacked": ITEM_IN,
+            "stack_fell": {**ITEM_IN, "items": None},
+            "gone": ITEM_AT,
+            "not_possible": NOT_POSSIBLE,
+        },
+        types=ITEM_IN,
+        after_crash=ONCE,
+    )
+    async def stack(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
+        """Put the held item into a carrier on a surface; `gone` names the carrier."""
+        await call.clock.sleep(self.parameters["stacking"])
+        return outcome_of(self.world.stack(call.action_id, item, carrier, surface))
+
+    @takes_out
+    async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
+        """Take an item out of its carrier on a surface; `gone` names the carrier."""
+        await call.clock.sleep(self.parameters["grasping"])
+        return outcome_of(self.world.take_out(call.action_id, item, carrier, surface))
+
+    @skill(
+        outcomes={
+            "thrown_away": {"item": "item", "destination": "destination"},
+            "not_possible": NOT_POSSIBLE,
+        },
+        types={"item": "item", "destination": "destination"},
+        after_crash=ONCE,
+    )
+    async def throw_away(self, call: SkillCall, item: str, destination: str) -> Outcome:
+        """Throw the held item, with everything in it, into its destination."""
+        await call.clock.sleep(self.parameters["throwing"])
+        return outcome_of(self.world.throw_away(call.action_id, item, destination))
+
+
+class Camera(TablePart):
+    """The camera, which reports what it sees; what it should have seen is the plots' business."""
+
+    name = "camera"
+    declares: ClassVar[Mapping[str, Parameter]] = {"recognising": seconds(2.0), "looking": seconds(1.5)}
+
+    @recognises
+    async def recognise(self, call: SkillCall, surface: str) -> Outcome:
+        """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
+        await call.clock.sleep(self.parameters["recognising"])
+        return outcome_of(self.world.recognise(call.action_id, surface))
+
+    @skill(
+        outcomes={"looked": CARRIER_AT, "gone": ITEM_AT, "not_possible": NOT_POSSIBLE},
+        types=CARRIER_AT,
+        after_crash=ONCE,
+    )
+    async def look_into(self, call: SkillCall, carrier: str, surface: str) -> Outcome:
+        """Look into a carrier on a surface, giving up one unit of its room; `gone` names the carrier."""
+        await call.clock.sleep(self.parameters["looking"])
+        return outcome_of(self.world.look_into(call.action_id, carrier, surface))
+
+
+class Voice(TablePart):
+    """The loudspeaker."""
+
+    name = "voice"
+    declares: ClassVar[Mapping[str, Parameter]] = {
+        "pace": Parameter("number", default=15.0, least=1.0, most=100.0),  # characters a second
+    }
+
+    @skill(outcomes={"said": {"text": None}}, after_crash=ONCE)
+    async def say(self, call: SkillCall, text: str) -> Outcome:
+        """Tell the operator something."""
+        await call.clock.sleep(1.0 + len(text) / self.parameters["pace"])
+        return outcome_of(self.world.say(call.action_id, text))
+
+
+def again(action_id: str) -> str:
+    """The id of a second attempt within one call: what happens to it is another draw."""
+    return f"{action_id}/again"
+
+
+def outcome_of(result: Result) -> Outcome:
+    """What a skill ends with when the world has answered."""
+    attributes = {k: list(v) if isinstance(v, tuple) else v for k, v in result.attributes.items()}
+    return Outcome(result.outcome, attributes, learned(result))

@@ -1,0 +1,83 @@
+"""Looking ahead: a plan tried out on a copy of the world as the robot believes it to be, without faults (S1.10)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from domains.clean_up_table.items import CRISP_CAN, HAND, KINDS, ROOMS, Item, new_item
+from domains.clean_up_table.places import OPERATOR, SURFACES
+from domains.clean_up_table.table_world import TableWorld
+from planning.validation import Validation
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from domains.clean_up_table.results import Result
+    from knowledge_base.language.world import World as Belief
+    from planning.plan import Plan, PlanStep
+
+_VERBS: dict[str, Callable[[TableWorld, str, tuple[str, ...]], Result]] = {
+    "drive": lambda world, name, args: world.drive(name, args[1]),
+    "pick-up": lambda world, name, args: world.pick_up(name, args[0], args[1]),
+    "put-down": lambda world, name, args: world.put_down(name, args[0], args[1]),
+    "stack": lambda world, name, args: world.stack(name, args[0], args[1], args[4]),
+    "take-out": lambda world, name, args: world.take_out(name, args[0], args[1], args[4]),
+    "check-room": lambda world, name, args: world.look_into(name, args[0], args[3]),
+    "throw-away": lambda world, name, args: world.throw_away(name, args[0], args[1]),
+}
+"""What carries out a planning action, with the step's arguments in the order of `domain.pddl`."""
+
+_HOPED_FOR = frozenset({"arrived", "picked_up", "put_down", "stacked", "taken_out", "looked", "thrown_away"})
+
+
+class Physics:
+    """A `Foresight` that knows what really fits into what, and what is in the way."""
+
+    def foresee(self, plan: Plan, world: Belief) -> Validation:
+        """Whether every step would succeed if nothing went wrong by chance; `world` is left as it is."""
+        ahead = believed(world)
+        for number, step in enumerate(plan.steps):
+            result = self._tried(ahead, f"step {number}", step)
+            if result.outcome not in _HOPED_FOR:
+                why = result.attributes.get("reason", result.outcome)
+                return Validation(valid=False, failing_step=number, why=f"{step} ends in {result.outcome}: {why}")
+        return Validation(valid=True)
+
+    @staticmethod
+    def _tried(ahead: TableWorld, name: str, step: PlanStep) -> Result:
+        return _VERBS[step.action](ahead, name, step.args)
+
+
+def believed(belief: Belief) -> TableWorld:
+    """The world in which everything is so that the robot is right; items that are nowhere are left out."""
+    at = [str(place) for (place,) in belief.match("robot-at", (None,))]
+    return TableWorld(_items(belief), robot_at=at[0] if at else OPERATOR)
+
+
+def _items(belief: Belief) -> Iterator[Item]:
+    for kind in KINDS:
+        for name in belief.objects(kind):
+            where = _where(name, belief)
+            if where is not None:
+                yield _item(name, kind, where, belief)
+
+
+def _item(name: str, kind: str, where: str, belief: Belief) -> Item:
+    """What is in it and what still goes into it is all that it takes; no more than such an item takes can be right."""
+    inside = len(list(belief.match("inside", (None, name))))
+    room = max((ROOMS.index(str(room)) for _, room in belief.match("free-room", (name, None))), default=0)
+    item = new_item(kind, name, size="large" if kind == CRISP_CAN and inside + room > 1 else "small")
+    item.where = where
+    item.closed = max(0, item.capacity - inside - room)
+    item.seen = True
+    return item
+
+
+def _where(name: str, belief: Belief) -> str | None:
+    if belief.holds("holding", (name,)):
+        return HAND
+    for predicate in ("inside", "lies-at"):
+        for _, where in belief.match(predicate, (name, None)):
+            if predicate == "inside" or where in SURFACES:
+                return str(where)
+    return None

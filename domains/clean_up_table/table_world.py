@@ -1,0 +1,158 @@
+"""The simulated world of clean-up-table: what each of the robot's verbs really does (S0.15).
+
+Every verb takes the id of the action it executes. An id that was executed before gets its first result
+again and nothing happens twice, so that a run can be resumed after a crash. A call that is physically
+impossible ends in `not_possible` or `gone`; no verb raises and none claims what did not happen.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
+
+from domains.clean_up_table.places import DESTINATIONS, PLACES, SURFACES
+from domains.clean_up_table.results import Result, not_possible
+from domains.clean_up_table.robot import RobotBody
+from domains.clean_up_table.world_faults import ITEM_SLIPPED, NOTHING_FOUND
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_Arguments = ParamSpec("_Arguments")
+_World = TypeVar("_World", bound="TableWorld")
+
+
+def _verb(
+    body: Callable[Concatenate[_World, str, _Arguments], Result],
+) -> Callable[Concatenate[_World, str, _Arguments], Result]:
+    """Do an action once: the same id again gets the first result."""
+
+    @functools.wraps(body)
+    def once(world: _World, action_id: str, /, *args: _Arguments.args, **named: _Arguments.kwargs) -> Result:
+        world.catch_up()
+        if action_id not in world.done:
+            world.executed(action_id, body(world, action_id, *args, **named))
+        return world.done[action_id]
+
+    return once
+
+
+class TableWorld(RobotBody):
+    """The world that the robot's skills act on, one method per skill."""
+
+    @_verb
+    def drive(self, action_id: str, to: str) -> Result:
+        """Drive to a place: `arrived`, `no_path`, or `slipped` (the held item fell on the floor)."""
+        if to not in PLACES:
+            return not_possible(f"there is no place '{to}'")
+        if to in self.faults.unreachable:
+            return self._no_path(to)
+        if to != self.robot_at:
+            self.departure = action_id, self.robot_at
+        draw = self.faults.draw(action_id, self._drive_faults(to))
+        if draw is None:
+            return self._arrive(to)
+        held = self.items.held
+        if held and draw.kind == ITEM_SLIPPED:
+            return self._slip(draw, action_id, held, to)
+        return self._block(draw, action_id, to)
+
+    @_verb
+    def pick_up(self, action_id: str, item: str, surface: str) -> Result:
+        """Grasp an item that lies on a surface: `picked_up`, `grasp_failed`, `no_ik` or `gone`."""
+        refusal = self._not_at(surface, SURFACES) or self._hand_full()
+        if refusal:
+            return refusal
+        draw = self._meddle(action_id, self._grasp_faults(item, self._absent(item, surface)))
+        return self._absent(item, surface) or self._grasp(
+            draw, action_id, item, Result("picked_up", {"item": item, "surface": surface})
+        )
+
+    @_verb
+    def put_down(self, action_id: str, item: str, surface: str) -> Result:
+        """Put the held item on a surface: `put_down`."""
+        refusal = self._not_at(surface, SURFACES) or self._not_held(item)
+        if refusal:
+            return refusal
+        self._meddle(action_id, {})
+        self.items.move(self.items[item], surface)
+        return Result("put_down", {"item": item, "surface": surface})
+
+    @_verb
+    def stack(self, action_id: str, item: str, carrier: str, surface: str) -> Result:
+        """Put the held item into a carrier that lies on a surface: `stacked`, `stack_fell` or `gone`."""
+        refusal = (
+            self._not_at(surface, SURFACES)
+            or self._not_held(item)
+            or self._absent(carrier, surface)
+            or self._no_room(item, carrier)
+        )
+        if refusal:
+            return refusal
+        draw = self._meddle(action_id, self._stack_faults(carrier), keep=carrier)
+        if draw:
+            return self._fall(draw, action_id, item, carrier, surface)
+        return self._stack(item, carrier, surface)
+
+    @_verb
+    def take_out(self, action_id: str, item: str, carrier: str, surface: str) -> Result:
+        """Grasp an item directly inside a carrier: `taken_out`, `grasp_failed`, `no_ik` or `gone`."""
+        refusal = self._not_at(surface, SURFACES) or self._hand_full()
+        if refusal:
+            return refusal
+        draw = self._meddle(action_id, self._grasp_faults(item, self._not_inside(item, carrier, surface)))
+        attributes = {"item": item, "carrier": carrier, "surface": surface}
+        result = self._not_inside(item, carrier, surface) or self._grasp(
+            draw, action_id, item, Result("taken_out", attributes, apart=((item, carrier),))
+        )
+        return self._with_room(result, carrier) if result.outcome == "taken_out" else result
+
+    @_verb
+    def look_into(self, action_id: str, carrier: str, surface: str) -> Result:
+        """Look into a carrier, which gives up one unit of its free room: `looked` or `gone`."""
+        refusal = self._not_at(surface, SURFACES) or self._absent(carrier, surface)
+        if refusal:
+            return refusal
+        self._meddle(action_id, {}, keep=carrier)
+        looked = self.items[carrier]
+        looked.closed = min(looked.closed + 1, self.items.free_room(looked))
+        return self._with_room(Result("looked", {"carrier": carrier, "surface": surface}), carrier)
+
+    @_verb
+    def throw_away(self, action_id: str, item: str, destination: str) -> Result:
+        """Throw the held item, with everything in it, into its destination: `thrown_away`."""
+        refusal = self._not_at(destination, DESTINATIONS) or self._not_held(item)
+        if refusal:
+            return refusal
+        thrown = self.items[item]
+        if thrown.destination != destination:
+            return not_possible(f"a {thrown.kind} does not go to the {destination}")
+        self._meddle(action_id, {})
+        stack = self.items.stack(thrown)
+        sightings = tuple(self._sighting(each) for each in stack)
+        apart = tuple((each.name, each.where) for each in stack[1:])
+        for each in stack:
+            each.where = destination
+        self.trips += 1
+        return Result("thrown_away", {"item": item, "destination": destination}, sightings, apart)
+
+    @_verb
+    def recognise(self, action_id: str, surface: str) -> Result:
+        """Look at a surface: `recognised` with everything visible on it, or `nothing_found`."""
+        refusal = self._not_at(surface, SURFACES)
+        if refusal:
+            return refusal
+        visible = self._visible(surface)
+        bare = [item for item in visible if not self.items.contents(item)]
+        possible = {NOTHING_FOUND: bool(bare)} if visible and self.faults.may_fail("look", surface) else {}
+        draw = self.faults.draw(action_id, possible)
+        if draw:
+            return self._overlook(draw, action_id, surface, bare)
+        self.faults.passed("look", surface)
+        return self._see(surface, visible)
+
+    @_verb
+    def say(self, _action_id: str, text: str) -> Result:
+        """Tell the operator something: `said`."""
+        self.said.append(text)
+        return Result("said", {"text": text})

@@ -1,0 +1,286 @@
+"""Activation trees: a component is active while a state or an active component needs it (S1.9, S4.1)."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from dsc.components.abandonment import GRACE, give_up
+from dsc.components.component_registry import ComponentRegistry
+from dsc.components.endpoint import Endpoint
+from dsc.components.life_cycle import NEUTRAL, Life
+from dsc.components.supervisor import Supervisor
+from knowledge_base.errors import InputError
+
+if TYPE_CHECKING:
+    from dsc.components.component import Component
+
+
+class ComponentActivation:
+    """Sees to it that who is needed is kept going.
+
+    What a component does that takes no resources and needs nobody is no affair of ours, unless somebody needs it.
+
+    Args:
+        registry: who is there.
+        used: names of those that carry out something, or put things in order after it.
+    """
+
+    def __init__(self, registry: ComponentRegistry, used: Callable[[], Iterable[str]]) -> None:
+        self._registry = registry
+        self._used = used
+        self._concerned: set[str] = set()
+        self._in_mode: dict[str, None] = {}
+        self._kept: dict[str, Supervisor] = {}
+        self._let_go: dict[str, asyncio.Task[None]] = {}
+        self._listeners: set[Callable[[], None]] = set()
+        self._looking = False
+        self._closed = False
+        for component in registry.components.values():
+            self.deployed(component)
+
+    @property
+    def on(self) -> frozenset[str]:
+        """Names of those that are alive and switched on."""
+        return frozenset(supervisor.name for supervisor in self._kept.values() if supervisor.on)
+
+    def concerns(self, component: Component) -> bool:
+        """Whether it matters to anybody if this component is used."""
+        return component.name in self._concerned
+
+    def deployed(self, component: Component) -> None:
+        """A component is about to be there, maybe in place of another one."""
+        before = self._registry.components.get(component.name, component)
+        if before is not component:
+            before.life.leave(self._look)
+            if component.name in self._kept:
+                self._end(self._kept[component.name], ())
+                self._look()
+        if component.takes_part:
+            self._concerned.add(component.name)
+            component.life.listen(self._look)
+        else:
+            self._concerned.discard(component.name)
+
+    def look(self, name: str) -> None:
+        """A component is used, or is not any more; who is needed is seen to soon, once for all of one moment."""
+        if name in self._concerned:
+            self._look()
+
+    def switched(self, name: str, mode: str) -> None:
+        """A state puts a component in a mode."""
+        if mode in {NEUTRAL, Life.SHUTDOWN}:
+            self._in_mode.pop(name, None)
+        elif mode != Life.INIT:
+            self._in_mode[name] = None
+        self.look(name)
+
+    async def close(self) -> None:
+        """Switch everything off, and wait for that, though not for ever."""
+        self._closed = True
+        for component in self._registry.components.values():
+            component.life.leave(self._look)
+        self._keep_only({})
+        if self._let_go:
+            _, others = await asyncio.wait(self._let_go.values(), timeout=2 * GRACE)  # one after the other
+            for task in others:
+                task.cancel()
+                give_up(task)
+
+    # -- for skills and supervisors ---------------------------------------------------------------------------
+
+    def supervisor(self, component: Component) -> Supervisor:
+        """Who keeps a component going that is used; from now on, whom it needs is kept going, too."""
+        if self._looking or component.name not in self._kept:
+            self._see()
+        return self._kept[component.name]
+
+    def resting_on(self, component: Component) -> Iterator[Supervisor]:
+        """The supervisors of all that a component needs in its present mode, what these need before them; then its own.
+
+        Raises:
+            InputError: components need each other in a circle.
+        """
+        for name in self._closure(component.name, {}, ()):
+            if name in self._kept:
+                yield self._kept[name]
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call the listener whenever something about a component is different."""
+        self._listeners.add(listener)
+
+    def leave(self, listener: Callable[[], None]) -> None:
+        """Call it no longer."""
+        self._listeners.discard(listener)
+
+    def announce(self) -> None:
+        """Something about a component is different: who is needed is looked for, and who listens is told."""
+        self._look()
+        for listener in tuple(self._listeners):
+            listener()
+
+    async def until(self, holds: Callable[[], bool]) -> None:
+        """Wait until something holds that is asked anew whenever something about a component is different."""
+        changed = asyncio.Event()
+        self.listen(changed.set)
+        try:
+            while not holds():
+                changed.clear()
+                await changed.wait()
+        finally:
+            self.leave(changed.set)
+
+    async def find(self, name: str, needing: Component | None) -> Component:
+        """The component of that name, which may be deployed late."""
+        return self._registry.components[name] if needing is None else await self._registry.find(name, needing)
+
+    async def supported(self, component: Component) -> None:
+        """Wait until all that the component needs in its present mode is on."""
+        await self.until(lambda: all(name in self._kept and self._kept[name].on for name in component.needed()))
+
+    # -- who is needed ------------------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        if not self._looking and not self._closed:
+            self._looking = True
+            asyncio.get_running_loop().call_soon(self._see)
+
+    def _see(self) -> None:
+        self._looking = False
+        if self._closed:
+            return
+        needed: dict[str, Component | None] = {}
+        in_mode = [name for name in self._in_mode if self._registry.components[name].mode != NEUTRAL]
+        for name in (*sorted(self._used()), *in_mode):
+            if name in self._concerned:
+                self._add_needed(name, None, needed)
+        self._keep_only(needed)
+
+    def _add_needed(self, name: str, needing: Component | None, needed: dict[str, Component | None]) -> None:
+        """Who needs whom, those that need before those that are needed."""
+        if name not in needed:
+            needed[name] = needing
+            component = self._registry.known(name)
+            for other in () if component is None else component.needed():
+                self._add_needed(other, component, needed)
+
+    def _closure(self, name: str, found: dict[str, None], above: tuple[str, ...]) -> dict[str, None]:
+        if name in above:
+            raise InputError(f"components need each other in a circle: {' -> '.join((*above, name))}")
+        component = self._registry.known(name)
+        for other in () if component is None else component.needed():
+            self._closure(other, found, (*above, name))
+        found[name] = None
+        return found
+
+    def _keep_only(self, needed: dict[str, Component | None]) -> None:
+        ended: list[asyncio.Task[None]] = []
+        for supervisor in [one for one in self._kept.values() if one.name not in needed]:
+            ended.append(self._end(supervisor, tuple(ended)))
+        for name, needing in needed.items():
+            if name not in self._kept:
+                self._kept[name] = Supervisor(name, needing, self)
+                self._kept[name].begin(self._let_go.get(name))
+
+    def _end(self, supervisor: Supervisor, after: Collection[asyncio.Task[None]]) -> asyncio.Task[None]:
+        del self._kept[supervisor.name]
+        supervisor.let_go(after)
+        assert supervisor.task is not None  # noqa: S101
+        self._let_go[supervisor.name] = supervisor.task
+        supervisor.task.add_done_callback(lambda task: self._over(supervisor.name, task))
+        return supervisor.task
+
+    def _over(self, name: str, task: asyncio.Task[None]) -> None:
+        if self._let_go.get(name) is task:
+            del self._let_go[name]
+
+
+BEAT = 0.5
+"""Seconds between heartbeats."""
+SILENCE = 3.0
+"""Seconds without a heartbeat after which a component counts as gone: some may be lost."""
+
+Changed = Callable[[bool], Awaitable[None]]
+"""Is told that the component has become active, or inactive: to take its resources and to free them."""
+
+
+class Heartbeat:
+    """One component's part in the activation tree.
+
+    Args:
+        endpoint: its address.
+        needs: names of the components it needs at present; asked at each beat, so it may depend on its state.
+        changed: is told when it becomes active or inactive.
+        root: active without anybody needing it, as the sequencer is.
+    """
+
+    def __init__(
+        self, endpoint: Endpoint, needs: Callable[[], Collection[str]], changed: Changed, *, root: bool = False
+    ) -> None:
+        self._endpoint = endpoint
+        self._needs = needs
+        self._changed = changed
+        self._root = root
+        self._heard_at: dict[str, float] = {}
+        self._activators: set[str] = set()
+        self._stirred = asyncio.Event()
+        self.active = False
+        endpoint.hear("heartbeat", self._heard)
+
+    def alive(self, name: str) -> bool:
+        """Whether a component is active and was heard of lately."""
+        return _now() - self._heard_at.get(name, -math.inf) < SILENCE
+
+    @property
+    def activators(self) -> frozenset[str]:
+        """Who needs it at present."""
+        return frozenset(self._activators)
+
+    def stir(self) -> None:
+        """Beat at once: its needs have changed."""
+        self._stirred.set()
+
+    async def run(self) -> None:
+        """Beat until cancelled; then the component is inactive, and says so."""
+        try:
+            while True:
+                await self._beat()
+                self._stirred.clear()
+                with suppress(TimeoutError):
+                    async with asyncio.timeout(BEAT):
+                        await self._stirred.wait()
+        finally:
+            await self._become(active=False)
+
+    async def _beat(self) -> None:
+        self._heard_at = {name: at for name, at in self._heard_at.items() if _now() - at < SILENCE}
+        self._activators = {name for name in self._activators if self.alive(name)}
+        await self._become(active=self._root or bool(self._activators))
+        if self.active:
+            self._endpoint.broadcast("heartbeat", {"needs": sorted(self._needs())})
+
+    async def _become(self, *, active: bool) -> None:
+        if active == self.active:
+            return
+        self.active = active
+        if not active:  # who depends on us need not wait for our silence
+            self._endpoint.broadcast("heartbeat", {"needs": []})
+        await self._changed(active)
+
+    def need(self, sender: str) -> None:
+        """Somebody says, otherwise than by a heartbeat, that it is active and needs this component."""
+        self._heard(sender, {"needs": [self._endpoint.address]})
+
+    def _heard(self, sender: str, said: Any) -> None:
+        needed = self._endpoint.address in said["needs"]
+        self._heard_at[sender] = _now()
+        if needed != (sender in self._activators):
+            (self._activators.add if needed else self._activators.discard)(sender)
+            self.stir()
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()

@@ -1,0 +1,56 @@
+"""Whom components need, as they declare it: judged before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from dsc.components.life_cycle import NEUTRAL
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.inputs import shown
+
+if TYPE_CHECKING:
+    from dsc.components.component import Component
+
+ALWAYS = ""
+"""Stands for every mode in `Component.needs`."""
+
+
+def require_declared(component: Component) -> None:
+    """Raise an error unless a component's `needs` are names, for modes that it has.
+
+    Raises:
+        InputError: what is needed in a mode is no tuple of names, e.g. one name without the comma.
+        UnknownNameError: the component says which modes it has, and one is none.
+    """
+    name, needs = component.name, component.needs
+    if not isinstance(needs, Mapping):
+        raise InputError(f"what component '{name}' needs is said for each mode, as in {_EXAMPLE}, not {shown(needs)}")
+    modes = (NEUTRAL, *component.modes)
+    for mode, needed in needs.items():
+        if not isinstance(needed, tuple) or not all(isinstance(one, str) for one in needed):
+            when = f"in its mode '{mode}'" if mode else "always"
+            raise InputError(f"what component '{name}' needs {when} is a tuple, as in {_EXAMPLE}, not {shown(needed)}")
+        if mode != ALWAYS and component.modes and mode not in modes:
+            message = f"component '{name}' needs something in its mode '{mode}', which it does not have"
+            raise UnknownNameError(message, found=mode, valid=modes)
+
+
+def require_deployed(components: Collection[Component], besides: Iterable[str] = ()) -> None:
+    """Raise `UnknownNameError` for a component that another needs, in whatever mode, and that is not deployed.
+
+    Args:
+        components: all that there will be; who can reach others elsewhere is believed.
+        besides: names of others that there will be.
+    """
+    deployed = {*(component.name for component in components), *besides}
+    for component in components:
+        if component.reaches_others:
+            continue
+        for needed in (*component.needed(), *(name for names in component.needs.values() for name in names)):
+            if needed not in deployed:
+                message = f"component '{component.name}' needs a component '{needed}', and there is none"
+                raise UnknownNameError(message, found=needed, valid=deployed - {component.name})
+
+
+_EXAMPLE = "needs = {'scanning': ('power',)}"

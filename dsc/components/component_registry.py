@@ -1,0 +1,94 @@
+"""Who is deployed, and whether what a component needs is there: waited for, lost, started anew (S2.12)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable, MutableMapping
+
+from dsc.components.component import Component
+from dsc.components.component_dependencies import require_declared
+from dsc.components.hooks import contained
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.inputs import require_several, shown
+
+
+class NotAliveError(Exception):
+    """A component that is needed is not alive, and why."""
+
+
+class ComponentRegistry:
+    """Who is deployed, and who was reached elsewhere because these need them.
+
+    Attributes:
+        components: the deployed ones, by name.
+    """
+
+    def __init__(self, components: MutableMapping[str, Component]) -> None:
+        self.components = components
+        self._reached: dict[str, Component] = {}
+        self._deployed = asyncio.Event()
+
+    def deploy(self, component: Component) -> None:
+        """Add a component, maybe late; it replaces one of the same name."""
+        self.components[component.name] = component
+        self._deployed.set()
+
+    def known(self, name: str) -> Component | None:
+        """The component of that name, if it is here or has been reached."""
+        return self.components.get(name) or self._reached.get(name)
+
+    async def find(self, name: str, needing: Component) -> Component:
+        """The component of that name: deployed here, maybe late, or where the one who needs it can reach it."""
+        found = self.known(name)
+        if found is not None:
+            return found
+        loop = asyncio.get_running_loop()
+        here, there = loop.create_task(self._until_deployed(name)), loop.create_task(_reached(needing, name))
+        try:
+            await asyncio.wait((here, there), return_when=asyncio.FIRST_COMPLETED)
+            if there.done():
+                self._reached[name] = there.result()
+        finally:
+            here.cancel()
+            there.cancel()
+        return self.components.get(name) or self._reached[name]
+
+    async def _until_deployed(self, name: str) -> None:
+        while name not in self.components:
+            self._deployed.clear()
+            await self._deployed.wait()
+
+    def state_of(self, name: str) -> str:
+        """How a component is, in words."""
+        component = self.known(name)
+        if component is None:
+            return str(UnknownNameError(f"component '{name}', which is not there", found=name, valid=self.components))
+        why = f": {component.life.reason}" if component.life.reason else ""
+        return f"component '{name}', which is in '{component.life.state}'{why}"
+
+
+async def _reached(needing: Component, name: str) -> Component:
+    with contained():
+        return await needing.reach(name)
+
+
+def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
+    """All of them, if these are components, each with a name of its own.
+
+    Raises:
+        InputError: it is no list of them, something in it is none, e.g. a class instead of its instance, or what one
+            needs is not said rightly.
+        SchemaError: two have one name.
+    """
+    require_several(components, "components")
+    components = tuple(components)
+    names = set()
+    for one in components:
+        if not isinstance(one, Component):
+            hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
+            raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
+        if one.name in names:
+            raise SchemaError(f"two components are named '{one.name}'", found=one.name)
+        require_declared(one)
+        names.add(one.name)
+    return components

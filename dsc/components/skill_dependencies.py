@@ -1,0 +1,107 @@
+"""What one skill rests on: its component, and all that this needs, as long as the skill goes on (S2.12)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable
+from contextlib import suppress
+from typing import TYPE_CHECKING, TypeVar
+
+from dsc.components.activation import ComponentActivation
+from dsc.components.component_registry import ComponentRegistry, NotAliveError
+from dsc.components.life_cycle import Life
+from knowledge_base.errors import InputError
+
+if TYPE_CHECKING:
+    from dsc.components.component import Component
+
+_Result = TypeVar("_Result")
+
+
+class SkillDependencies:
+    """For one skill of a component, which counts as used."""
+
+    def __init__(self, registry: ComponentRegistry, activity: ComponentActivation, component: Component) -> None:
+        self._registry = registry
+        self._activity = activity
+        self._component = component
+        self._concerned = activity.concerns(component)
+        self._waits = False
+
+    @property
+    def missing(self) -> str:
+        """What is being waited for, in words; empty if nothing is."""
+        if not self._waits:
+            return ""
+        name = next((one.name for one in self._activity.resting_on(self._component) if not one.on), "")
+        return name and self._registry.state_of(name)
+
+    async def ready(self) -> None:
+        """Wait until all that the component needs in its present mode is alive and switched on, and it is itself.
+
+        What it needs is started, and started anew after a crash; so is the component, once.
+
+        Raises:
+            NotAliveError: the component itself cannot start, or is in Shutdown; what it needs is waited for instead.
+            InputError: components need each other in a circle.
+        """
+        if self._concerned:
+            await self._kept()
+        elif self._component.life.state is not Life.ALIVE:
+            await self._component.come_alive()
+        if self._component.life.state is not Life.ALIVE:
+            raise NotAliveError(self._registry.state_of(self._component.name))
+
+    async def _kept(self) -> None:
+        supervisor = self._activity.supervisor(self._component)
+        before = supervisor.failures
+
+        def settled() -> bool:
+            supervisors = list(self._activity.resting_on(self._component))
+            for one in supervisors:
+                if one.problem is not None:
+                    raise one.problem
+            return all(one.on for one in supervisors) or supervisor.failures > before
+
+        self._waits = True
+        await self._activity.until(settled)
+        self._waits = False
+
+    async def carrying(self, work: Awaitable[_Result]) -> _Result:
+        """Do the skill's work as long as everything is alive that it rests on, in whatever mode it is.
+
+        Raises:
+            NotAliveError: something was lost; the work has been cancelled.
+        """
+        me = asyncio.current_task()
+        lost: list[str] = []
+
+        def look() -> None:
+            name = self._lost()
+            if name is not None and not lost and me is not None:
+                said = self._registry.state_of(name)  # as it is now: it may be started anew before we are heard
+                lost.append(said if name == self._component.name else f"it needs {said}")
+                me.cancel()
+
+        self._component.life.listen(look)
+        if self._concerned:
+            self._activity.listen(look)
+        look()
+        try:
+            return await work
+        except asyncio.CancelledError:
+            if not lost or me is None or me.uncancel() > 0:  # or the state was left, too
+                raise
+            raise NotAliveError(lost[0]) from None
+        finally:
+            self._component.life.leave(look)
+            self._activity.leave(look)
+
+    def _lost(self) -> str | None:
+        if self._component.life.state is not Life.ALIVE:
+            return self._component.name
+        if not self._concerned:
+            return None
+        with suppress(InputError):  # of a mode that makes a circle, the next skill hears
+            return next((one.name for one in self._activity.resting_on(self._component) if one.lost), None)
+        return None

@@ -1,0 +1,227 @@
+"""What is written at edges and in states: triggers, guards and actions in short and in full."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from dsc.drawing.layout import TextStyle
+from dsc.drawing.measure import pack
+from dsc.events import TIMERS
+from dsc.model.actions import (
+    Assign,
+    Block,
+    Choose,
+    Configure,
+    Emit,
+    ExternalAction,
+    Internal,
+    Log,
+    Send,
+    Switch,
+    Tell,
+    Trigger,
+    Withdraw,
+)
+from dsc.model.connectors import CHOICE, SelectState, case_value
+from dsc.model.states import State
+from dsc.model.transitions import TimedTransition, Transition, TransitionSource
+from knowledge_base.language.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
+from knowledge_base.language.printer import to_text
+from knowledge_base.spelling import value_text
+
+WIDTH = 190.0
+"""Of one line at an edge."""
+ALWAYS = "always"
+COUNTER_PREFIX = "tries_"
+"""Of the variables in which expanded rules count how often they answered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Caption:
+    """One or more triggers with the same guard and actions: short lines, and all of it in one."""
+
+    lines: tuple[str, ...]
+    full: str
+    rule: bool
+
+    @property
+    def style(self) -> TextStyle:
+        """How it is written."""
+        return TextStyle.RULE if self.rule else TextStyle.LABEL
+
+
+@dataclass(frozen=True, slots=True)
+class Labelled:
+    """A transition, its trigger in words, and whether another one with the same trigger is tried before."""
+
+    trigger: str
+    transition: Transition
+    otherwise: bool
+
+
+def labelled(source: TransitionSource) -> list[Labelled]:
+    """The transitions of a state or connector in the order in which they are tried."""
+    seen: set[str] = set()
+    result = []
+    for event, transition in source.transitions():
+        result.append(Labelled(_trigger(event, transition), transition, event in seen and event not in TIMERS))
+        seen.add(event)
+    return result
+
+
+def labelled_by_value(source: TransitionSource) -> list[Labelled]:
+    """As `labelled`, with the cases of a selection by their values alone, for where it says what it selects."""
+    if not isinstance(source, SelectState):
+        return labelled(source)
+    cases = [Labelled(value_text(case_value(key)), case, otherwise=False) for key, case in source.cases.items()]
+    return [*cases, Labelled("", source.otherwise, otherwise=True)]
+
+
+def _trigger(event: str, transition: Transition) -> str:
+    if isinstance(transition, TimedTransition):
+        return f"{event} {seconds_text(transition.seconds)}"
+    return "" if event in {ALWAYS, CHOICE} else event
+
+
+def seconds_text(seconds: Term) -> str:
+    """A duration: `0.5 s`, `(* 2 ?n) s`."""
+    match seconds:
+        case Constant(int() | float() as value):
+            return f"{value:g} s"
+        case other:
+            return f"{to_text(other)} s"
+
+
+def captions(transitions: Iterable[Labelled], *, terse: bool = False) -> list[Caption]:
+    """The captions of one edge; triggers that share all the rest share a caption.
+
+    If `terse`, assignments and `[else]` are only in the full text, as suits plots made by machines.
+    """
+    groups: dict[tuple[object, ...], list[Labelled]] = {}
+    for one in transitions:
+        groups.setdefault(_rest(one, terse=terse), []).append(one)
+    return [caption for group in groups.values() if (caption := _caption(group, terse=terse)).full]
+
+
+def _rest(one: Labelled, *, terse: bool) -> tuple[object, ...]:
+    """What a caption says besides the trigger."""
+    return _guard(one, terse=terse), one.transition.rule, one.transition.internal, _brief(one.transition, terse=terse)
+
+
+def _guard(one: Labelled, *, terse: bool) -> str:
+    guard = one.transition.guard
+    if guard is not None and guard != TRUE:
+        return f"[{to_text(guard)}]"
+    return "[else]" if one.otherwise and not (terse and one.trigger) else ""
+
+
+def _brief(transition: Transition, *, terse: bool) -> tuple[str, ...]:
+    shown = [action for action in transition.effect if not (terse and isinstance(action, Assign))]
+    return (*(action_text(action, brief=True) for action in shown), *_handed(transition, brief=True))
+
+
+def _handed(transition: Transition, *, brief: bool = False) -> list[str]:
+    """What a transition passes to the plot of its target, and which histories it clears."""
+    passed = ", ".join(name if brief else f"{name} = {to_text(value)}" for name, value in transition.passed.items())
+    cleared = ", ".join(transition.clear)
+    return [f"{word} {what}" for word, what in (("pass", passed), ("clear", cleared)) if what]
+
+
+def _caption(group: list[Labelled], *, terse: bool) -> Caption:
+    first = group[0]
+    rule = first.transition.rule
+    if rule is not None:
+        words = [*rule.split(" "), _rule_guard(first.transition.guard)]
+    else:
+        triggers = list(dict.fromkeys(one.trigger for one in group if one.trigger))
+        actions = _brief(first.transition, terse=terse)
+        kind = _kind(first.transition)
+        words = [*_enumerated(triggers), _guard(first, terse=terse), kind, *_enumerated(actions, ";", "/ ")]
+    lines = pack([word for word in words if word], TextStyle.LABEL, WIDTH)
+    return Caption(tuple(lines), "\n".join(filter(None, map(full_text, group))), rule is not None)
+
+
+def full_text(one: Labelled, *, trigger: bool = True) -> str:
+    """A transition with nothing left out; `trigger` can be."""
+    effects = "; ".join([*map(action_text, one.transition.effect), *_handed(one.transition)])
+    rule = one.transition.rule
+    parts = [
+        one.trigger if trigger else "",
+        _guard(one, terse=False),
+        _kind(one.transition),
+        f"/ {effects}" if effects else "",
+        f"(rule: {rule})" if rule else "",
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def _kind(transition: Transition) -> str:
+    """As UML writes it: the state it leads away from is not left."""
+    return "{internal}" if transition.internal and transition.target is not None else ""
+
+
+def _enumerated(words: Sequence[str], separator: str = ",", before: str = "") -> list[str]:
+    if not words:
+        return []
+    return (before + f"{separator}\n".join(words)).split("\n")
+
+
+def _rule_guard(guard: Expression | None) -> str:
+    """A rule's guard with its count of tries in words."""
+    parts = guard.parts if isinstance(guard, And) else () if guard is None else (guard,)
+    words: list[str] = []
+    for part in parts:
+        match part:
+            case Comparison("<", Variable(name), Constant(limit)) if name.startswith(COUNTER_PREFIX):
+                words.insert(0, f"at most {limit} times")
+            case _:
+                words.append(to_text(part))
+    return f"[{', '.join(words)}]" if words else ""
+
+
+def block_texts(state: State) -> list[str]:
+    """The actions of a state, one a line: `entry / arm.grasp(?item)`."""
+    words = {"entry": "entry", "exit": "exit", "on_break": "break"}
+    return [f"{words[key]} / {action_text(action)}" for key, actions in state.blocks() for action in actions]
+
+
+def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> str:  # noqa: PLR0911  # a table by kind
+    """An action in the notation of state charts: `^event`, `name := value`, `component.skill(…)`.
+
+    If `brief`, the attributes of fired events are left out.
+    """
+    match action:
+        case Emit(emit=event, arguments=arguments):
+            later = "" if action.delay is None else f" after {to_text(action.delay)} s"
+            return f"^{event}" + (_values(arguments) if arguments and not brief else "") + later
+        case Assign(assign=values):
+            return ", ".join(f"{name} := {to_text(value)}" for name, value in values.items())
+        case Tell(tell=effect):
+            return f"tell {to_text(effect)}"
+        case Trigger(trigger=skill, arguments=arguments, within=within):
+            return f"{skill}{_values(arguments)}" + (f" within {within:g} s" if within is not None else "")
+        case Configure(set=parameter, to=value):
+            return f"{parameter} := {to_text(value)}"
+        case Send(send=port, arguments=arguments):
+            return f"{port}!{_values(arguments)}"
+        case Switch(switch=component, to=mode):
+            return f"{component} → {mode}"
+        case Withdraw(withdraw=sent):
+            return f"withdraw {to_text(sent)}"
+        case Log(log=parts):
+            return f"log {' '.join(map(to_text, parts))}"
+        case Choose(condition=condition, then=then, otherwise=otherwise):
+            branches = [", ".join(map(action_text, branch)) for branch in (then, otherwise)]
+            return f"if {to_text(condition)} {{{branches[0]}}} else {{{branches[1]}}}"
+        case Block(block=inside):
+            return f"{{{', '.join(map(action_text, inside))}}}"
+
+
+def _values(arguments: Mapping[str, Term]) -> str:
+    return "(" + ", ".join(to_text(value) for value in arguments.values()) + ")"
+
+
+def content_text(use: str, arguments: Mapping[str, Term]) -> str:
+    """A used plot with its arguments."""
+    return use + (_values(arguments) if arguments else "")

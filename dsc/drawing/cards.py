@@ -1,0 +1,204 @@
+"""One state as a box: its name and, below, what it does; sizes follow from the texts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from dsc.drawing.captions import action_text, block_texts, captions, content_text, labelled, seconds_text
+from dsc.drawing.layout import Box, BoxKind, Text, TextStyle
+from dsc.drawing.measure import LINE_HEIGHT, shorten, text_width
+from dsc.dynamic.library import Library
+from dsc.model.connectors import Connector, SelectState
+from dsc.model.plot import ActionPlot
+from dsc.model.states import DynamicState, FinalState, HistoryState, State, SubmachineState
+from knowledge_base.language.expression import Term
+from knowledge_base.language.printer import to_text
+
+DETAIL_WIDTH = 260.0
+SIDE = 12.0
+"""Free space left and right of texts."""
+NAME_HEIGHT = 30.0
+MARK = 24.0
+"""Room beside the name for the mark of submachine and dynamic states."""
+LEAST_WIDTH = 76.0
+FINAL_SIZE = 20.0
+DIAMOND_HEIGHT = 44.0
+"""With one line in it."""
+DOT_SIZE = 14.0
+CIRCLE_SIZE = 24.0
+
+
+@dataclass(frozen=True, slots=True)
+class CardRow:
+    """A line of text in a box, and what it says in full."""
+
+    text: str
+    style: TextStyle = TextStyle.DETAIL
+    full: str = ""
+
+
+def dot() -> Box:
+    """The initial pseudo-state."""
+    return Box(BoxKind.INITIAL, "", 0, 0, DOT_SIZE, DOT_SIZE)
+
+
+def card(
+    kind: BoxKind, name: str, rows: Sequence[CardRow], *, about: str = "", rule: bool = False, mark: bool = False
+) -> Box:
+    """A box with a name and rows of text."""
+    title_room = text_width(name, TextStyle.NAME) + 2 * SIDE + 2 * MARK * mark
+    width = max(LEAST_WIDTH, title_room, *(text_width(row.text, row.style) + 2 * SIDE for row in rows))
+    texts = [Text(width / 2, 20.0, name, TextStyle.NAME, centred=True)]
+    texts += [
+        Text(SIDE, NAME_HEIGHT + 2 + LINE_HEIGHT * number, row.text, row.style)
+        for number, row in enumerate(rows, start=1)
+    ]
+    height = NAME_HEIGHT + (LINE_HEIGHT * len(rows) + 9 if rows else 2)
+    title = "\n".join(filter(None, [name, about, *(row.full for row in rows)]))
+    lines = (NAME_HEIGHT,) if rows else ()
+    return Box(kind, name, 0, 0, width, height, tuple(texts), lines, title, rule)
+
+
+def final_card(name: str, state: FinalState) -> Box:
+    """A final state: the bullseye, its name and the outcome it fires below."""
+    rows = [(name, TextStyle.NAME)]
+    if state.emit is not None:
+        rows.append((f"^{state.emit}", TextStyle.DETAIL))
+    width = max(FINAL_SIZE, *(text_width(*row) for row in rows))
+    texts = tuple(
+        Text(width / 2, FINAL_SIZE + LINE_HEIGHT * number, *row, centred=True)
+        for number, row in enumerate(rows, start=1)
+    )
+    fired = f"^{content_text(state.emit, state.arguments)}" if state.emit is not None else ""
+    title = "\n".join(filter(None, [name, state.about, fired]))
+    eye = Box(BoxKind.BULLSEYE, "", (width - FINAL_SIZE) / 2, 0, FINAL_SIZE, FINAL_SIZE)
+    height = FINAL_SIZE + 4 + LINE_HEIGHT * len(rows)
+    return Box(BoxKind.FINAL, name, 0, 0, width, height, texts, title=title, boxes=(eye,))
+
+
+def history_card(name: str, state: HistoryState) -> Box:
+    """A history: a circle with H or H*, as UML writes it; beside it its name and what it does when it is empty."""
+    done = "; ".join(map(action_text, state.do))
+    rows = [CardRow(name, TextStyle.NAME, name), *([_row(f"/ {done}")] if done else [])]
+    aside = CIRCLE_SIZE / 2 + 7
+    half = aside + max(text_width(row.text, row.style) for row in rows)
+    height = max(CIRCLE_SIZE, LINE_HEIGHT * len(rows))
+    top = (height - LINE_HEIGHT * len(rows)) / 2 + 11.5
+    texts = tuple(
+        Text(half + aside, top + LINE_HEIGHT * number, row.text, row.style) for number, row in enumerate(rows)
+    )
+    mark = "H*" if state.history == "deep" else "H"
+    letter = Text(CIRCLE_SIZE / 2, CIRCLE_SIZE / 2 + 4, mark, TextStyle.DETAIL, centred=True)
+    circle = Box(BoxKind.CIRCLE, "", 0, 0, CIRCLE_SIZE, CIRCLE_SIZE, (letter,))
+    title = "\n".join(filter(None, [name, state.about, *(row.full for row in rows[1:])]))
+    # The circle is in the middle, since that is where edges meet it.
+    circle = circle.moved(half - CIRCLE_SIZE / 2, (height - CIRCLE_SIZE) / 2)
+    return Box(BoxKind.HISTORY, name, 0, 0, 2 * half, height, texts, title=title, boxes=(circle,))
+
+
+def name_below(history: Box) -> Box:
+    """A history with its texts below the circle, for edges that come from the left."""
+    width = max(CIRCLE_SIZE, *(text_width(text.text, text.style) for text in history.texts))
+    below = LINE_HEIGHT * len(history.texts)
+    texts = tuple(
+        replace(text, x=width / 2, y=below + CIRCLE_SIZE + 12 + LINE_HEIGHT * number, centred=True)
+        for number, text in enumerate(history.texts)
+    )
+    (circle,) = history.boxes
+    circle = circle.moved((width - CIRCLE_SIZE) / 2 - circle.x, below - circle.y)
+    return replace(history, width=width, height=CIRCLE_SIZE + 2 * below, texts=texts, boxes=(circle,))
+
+
+def diamond(name: str, connector: Connector) -> Box:
+    """A choice or selection: a flat diamond around its name and what it selects by."""
+    rows = [CardRow(name, TextStyle.NAME, name)]
+    if isinstance(connector, SelectState):
+        rows.append(_row(to_text(connector.select)))
+    block = LINE_HEIGHT * len(rows)
+    height = DIAMOND_HEIGHT + 2 * LINE_HEIGHT * (len(rows) - 1)
+    # A text fits where its share of the width and the lines' share of the height are 1 together.
+    width = (max(text_width(row.text, row.style) for row in rows) + SIDE) / (1 - block / height)
+    first = (height - block) / 2 + 11.5
+    texts = tuple(
+        Text(width / 2, first + LINE_HEIGHT * number, row.text, row.style, centred=True)
+        for number, row in enumerate(rows)
+    )
+    title = "\n".join(filter(None, [name, connector.about, *(row.full for row in rows[1:])]))
+    return Box(BoxKind.CHOICE, name, 0, 0, width, height, texts, title=title)
+
+
+def name_beside(final: Box) -> Box:
+    """A final state with its texts right of the bullseye, for edges that come from the left."""
+    height = max(FINAL_SIZE, LINE_HEIGHT * len(final.texts))
+    top = (height - LINE_HEIGHT * len(final.texts)) / 2
+    texts = tuple(
+        replace(text, x=FINAL_SIZE + 7, y=top + 12 + LINE_HEIGHT * number, centred=False)
+        for number, text in enumerate(final.texts)
+    )
+    eye = replace(final.boxes[0], x=0.0, y=(height - FINAL_SIZE) / 2)
+    width = FINAL_SIZE + 7 + max(text_width(text.text, text.style) for text in texts)
+    return replace(final, width=width, height=height, texts=texts, boxes=(eye,))
+
+
+def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, told: bool) -> Box:
+    """A state without states of its own: simple, submachine or dynamic.
+
+    Args:
+        name: its name.
+        state: the state.
+        library: to say more about the plots it uses.
+        rule: whether a rule put it there.
+        told: whether to write down what it is about; otherwise only the tooltip says it.
+    """
+    rows = [_row(state.about, TextStyle.ABOUT)] if told and state.about and not rule else []
+    kind, about = BoxKind.SIMPLE, [state.about or ""]
+    if isinstance(state, SubmachineState):
+        kind = BoxKind.SUBMACHINE
+        rows.append(_row(content_text(state.use, state.arguments)))
+        about.append(_about(state.use, library))
+    elif isinstance(state, DynamicState):
+        kind = BoxKind.DYNAMIC
+        rows += _choices(state, library)
+    rows += action_rows(state)
+    mark = kind is not BoxKind.SIMPLE
+    return card(kind, name, rows, about="\n".join(filter(None, about)), rule=rule, mark=mark)
+
+
+def action_rows(state: State) -> list[CardRow]:
+    """How long a state lasts at least, what it does on entry, on exit, and on events that do not leave it."""
+    rows = [] if state.at_least is None else [_row(f"≥ {seconds_text(state.at_least)}")]
+    rows += [_row(text) for text in block_texts(state)]
+    for caption in captions(one for one in labelled(state) if one.transition.target is None):
+        rows += [CardRow(line, caption.style, caption.full) for line in caption.lines[:1]]
+        rows += [CardRow(line, caption.style) for line in caption.lines[1:]]
+    return rows
+
+
+def _choices(state: DynamicState, library: Library | None) -> list[CardRow]:
+    rows = []
+    for name in state.dynamic:
+        plot = _known(name, library)
+        condition = f" [{to_text(plot.when)}]" if plot is not None and plot.when is not None else ""
+        rows.append(_row(f"◇ {content_text(name, _taken(state, plot))}{condition}"))
+    if state.goal is not None:
+        rows.append(_row(f"plan for {to_text(state.goal)}"))
+    return rows
+
+
+def _taken(state: DynamicState, plot: ActionPlot | None) -> dict[str, Term]:
+    """The arguments that a candidate takes; all if it is not known."""
+    return {k: v for k, v in state.arguments.items() if plot is None or k in plot.parameters}
+
+
+def _known(name: str, library: Library | None) -> ActionPlot | None:
+    return library.plot(name) if library is not None and name in library else None
+
+
+def _about(name: str, library: Library | None) -> str:
+    plot = _known(name, library)
+    return plot.about or "" if plot is not None else ""
+
+
+def _row(text: str, style: TextStyle = TextStyle.DETAIL) -> CardRow:
+    return CardRow(shorten(text, style, DETAIL_WIDTH), style, text)

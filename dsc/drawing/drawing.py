@@ -1,0 +1,230 @@
+"""Drawing of a plot: every state a box, every scope a layered drawing inside the box of its state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Literal
+
+from dsc.drawing.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card
+from dsc.drawing.crossing import join, way_to
+from dsc.drawing.edges import EdgeBundle, bundles, initial_bundle
+from dsc.drawing.header import handler_text, header, rule_text, rules_note
+from dsc.drawing.layout import Box, BoxKind, Text, TextStyle
+from dsc.drawing.scopes import Inside, ScopeNesting, ScopeSpan, arranged, widened
+from dsc.drawing.svg import NO_MARKS, to_svg
+from dsc.dynamic.library import Library
+from dsc.model.connectors import Connector
+from dsc.model.plot import ActionPlot, Path, Scope, initial_of
+from dsc.model.states import (
+    AnyState,
+    CompositeState,
+    DynamicState,
+    FinalState,
+    HistoryState,
+    OrthogonalState,
+    Region,
+    State,
+)
+from knowledge_base.errors import UnknownNameError
+
+PAD = 16.0
+REGION_TITLE = 22.0
+HULLS = frozenset({BoxKind.COMPOSITE, BoxKind.ORTHOGONAL})
+
+
+def build(plot: ActionPlot, library: Library | None, *, rules: bool, sideways: bool) -> Box:
+    """The drawing of a plot.
+
+    Args:
+        plot: what to draw.
+        library: where the plots it uses are found; without one, less is said about them.
+        rules: whether to carry the plot's rules out, which needs the library; otherwise they are listed.
+        sideways: from left to right instead of from top to bottom.
+
+    Raises:
+        UnknownNameError: a transition leads nowhere, or a rule or state names a plot that is not there.
+    """
+    expanded = library.expanded(plot) if library is not None and rules else plot
+    added = {name for name, _, _ in expanded.walk()} - {name for name, _, _ in plot.walk()}
+    inside = _Builder(expanded, library, frozenset(added), sideways=sideways).scope(expanded, ())
+    notes = _notes(plot, shown=library is not None and rules)
+    return _frame(plot, inside, notes)
+
+
+def _notes(plot: ActionPlot, *, shown: bool) -> Box | None:
+    """The rules that no edge shows: all that were not carried out, and those for what will be planned."""
+    planned = any(isinstance(state, DynamicState) and state.goal is not None for _, state, _ in plot.walk())
+    rows = [rule_text(rule) for rule in plot.rules] if planned or not shown else []
+    rows += [handler_text(handler) for handler in plot.handlers] if not shown else []
+    about = "rules and handlers" if plot.handlers and not shown else "rules"
+    about += ", also for the steps of plans" if planned and plot.rules else ""
+    return rules_note(rows, about) if rows else None
+
+
+def _frame(plot: ActionPlot, inside: Inside, notes: Box | None) -> Box:
+    room = max(inside.width, notes.width if notes is not None else 0.0)
+    top = header(plot, room)
+    width = max(room + 2 * PAD, top.width)
+    content = _wrapped(inside).moved((width - inside.width) / 2, top.height + PAD)
+    boxes, height = content.boxes, top.height + PAD + inside.height + PAD
+    if notes is not None:
+        boxes, height = (*boxes, notes.moved(PAD, height)), height + notes.height + PAD
+    kind = BoxKind.GENERATED if plot.generated else BoxKind.PLOT
+    frame = Box(kind, plot.name, 0, 0, width, height, top.texts, (top.height,), top.title)
+    return replace(frame, boxes=boxes, edges=content.edges)
+
+
+def _wrapped(inside: Inside) -> Box:
+    return Box(BoxKind.REGION, "", 0, 0, inside.width, inside.height, boxes=inside.boxes, edges=inside.edges)
+
+
+class _Builder:
+    def __init__(self, plot: ActionPlot, library: Library | None, added: frozenset[str], *, sideways: bool) -> None:
+        self._plot, self._library = plot, library
+        self._added, self._sideways = added, sideways
+        self._nesting = ScopeNesting(plot)
+        self._bundles = self._by_scope()
+
+    def _by_scope(self) -> dict[Path, list[EdgeBundle]]:
+        """The edges of the whole plot, each in the innermost scope that holds all of its ends."""
+        states = {name: state for name, state, _ in self._plot.walk()}
+        paths = {name: path for name, _, path in self._plot.walk()}
+        among_regions = {name for name, path in paths.items() if path[-2] == "connectors"}
+        scopes: dict[Path, list[EdgeBundle]] = {}
+        for one in bundles(states, self._added, terse=self._plot.generated):
+            for target in one.targets:
+                self._known(target, list(states), paths[one.source])
+            if one.source in among_regions:
+                continue
+            scopes.setdefault(self._nesting.common_scope((one.source, *one.targets)), []).append(one)
+        return scopes
+
+    def scope(self, scope: Scope, path: Path) -> Inside:
+        """The states of a scope with their edges, laid out."""
+        initial = initial_of(scope)
+        self._known(initial, self._nesting.inside(path), (*path, "initial"))
+        boxes = {"": dot(), **{name: self._state(name, state, path) for name, state in scope.states.items()}}
+        edges = (initial_bundle(initial), *self._bundles.get(path, ()))
+        spans = [span for one in edges for span in self._spans(path, one)]
+        if not any(box.kind in HULLS for box in boxes.values()):
+            return arranged(boxes, spans, sideways=self._sideways).finished()
+        # Around large boxes, the direction in which the whole is closer to a square reads better.
+        both = [arranged(boxes, spans, sideways=sideways) for sideways in (self._sideways, not self._sideways)]
+        return min(both, key=lambda draft: max(draft.width, draft.height)).finished()
+
+    def _spans(self, scope: Path, bundle: EdgeBundle) -> Iterator[ScopeSpan]:
+        """One for all targets, unless the plot is wrong and they are not together in a state."""
+        holder = self._nesting.holder
+        start, end = holder(scope, bundle.source), holder(scope, bundle.target)
+        also = tuple(target for target in bundle.also if holder(scope, target) == end)
+        yield ScopeSpan(replace(bundle, also=also), start, end)
+        for target in bundle.also:
+            if target not in also:
+                yield ScopeSpan(EdgeBundle(bundle.source, target, (), bundle.rule), start, holder(scope, target))
+
+    def _known(self, target: str, valid: list[str], path: Path) -> None:
+        if target not in valid:
+            raise UnknownNameError(
+                f"there is no state '{target}' here", place=self._plot.place(path), found=target, valid=valid
+            )
+
+    def _state(self, name: str, state: AnyState, path: Path) -> Box:
+        here = (*path, "states", name)
+        if isinstance(state, FinalState):
+            return final_card(name, state)
+        if isinstance(state, HistoryState):
+            return history_card(name, state)
+        if isinstance(state, CompositeState):
+            return self._hull(BoxKind.COMPOSITE, name, state, self.scope(state, here))
+        if isinstance(state, OrthogonalState):
+            regions = [self._region(key, one, (*here, "regions", key)) for key, one in state.regions.items()]
+            inside = _below([history_card(*one) for one in state.connectors.items()], _side_by_side(regions))
+            hull = self._hull(BoxKind.ORTHOGONAL, name, state, inside)
+            joins = [join(hull, each, one.target) for each, one in state.connectors.items() if way_to(hull, one.target)]
+            return replace(hull, edges=tuple(joins))
+        if isinstance(state, Connector):
+            return diamond(name, state)
+        return leaf_card(name, state, self._library, rule=name in self._added, told=self._plot.generated)
+
+    def _hull(self, kind: BoxKind, name: str, state: State, inside: Inside) -> Box:
+        """A state around an inside; regions reach up to its border, states do not."""
+        pad = 0.0 if kind is BoxKind.ORTHOGONAL else PAD
+        head = card(kind, name, action_rows(state), about=state.about or "")
+        width = max(head.width, inside.width + 2 * pad)
+        moved = _wrapped(inside).moved((width - inside.width) / 2, head.height + pad)
+        return replace(
+            widened(head, width, head.height + inside.height + 2 * pad),
+            lines=(*head.lines, head.height),
+            boxes=moved.boxes,
+            edges=moved.edges,
+        )
+
+    def _region(self, name: str, region: Region, path: Path) -> Box:
+        inside = self.scope(region, path)
+        title = Text(10.0, 16.0, name, TextStyle.ABOUT)
+        hull = _wrapped(inside).moved(PAD, REGION_TITLE + 4)
+        width, height = inside.width + 2 * PAD, inside.height + REGION_TITLE + 4 + PAD
+        return replace(hull, name=name, x=0, y=0, width=width, height=height, texts=(title,))
+
+
+def _side_by_side(regions: list[Box]) -> Inside:
+    """Regions in a row or in a column, whichever is closer to a square; all reach from border to border."""
+    widths, heights = [one.width for one in regions], [one.height for one in regions]
+    in_row = max(sum(widths), *heights) <= max(*widths, sum(heights))
+    width = sum(widths) if in_row else max(widths)
+    height = max(heights) if in_row else sum(heights)
+    boxes, x, y = [], 0.0, 0.0
+    for one in regions:
+        full = replace(one, height=height) if in_row else replace(one, width=width)
+        boxes.append(full.moved(x, y))
+        x, y = (x + one.width, y) if in_row else (x, y + one.height)
+    return Inside(width, height, tuple(boxes))
+
+
+def _below(histories: Sequence[Box], regions: Inside) -> Inside:
+    """Regions below the histories of the whole."""
+    if not histories:
+        return regions
+    boxes, x = [], PAD
+    for one in histories:
+        boxes.append(one.moved(x, PAD))
+        x += one.width + PAD
+    top = max(one.height for one in histories) + 2 * PAD
+    stretch = max(x / regions.width, 1.0)
+    boxes += [replace(one, width=one.width * stretch).moved(one.x * (stretch - 1), top) for one in regions.boxes]
+    return Inside(regions.width * stretch, regions.height + top, tuple(boxes))
+
+
+Direction = Literal["down", "right"]
+
+
+def draw(
+    plot: ActionPlot,
+    library: Library | None = None,
+    *,
+    rules: bool = True,
+    direction: Direction = "down",
+    marks: Mapping[str, str] = NO_MARKS,
+) -> str:
+    """The plot as SVG; the same plot gives the same text.
+
+    Args:
+        plot: what to draw.
+        library: where the plots it uses are found. With it, rules are carried out and drawn as the states and
+            transitions they become, and dynamic states say when each candidate fits.
+        rules: `False` only lists the rules.
+        direction: where the flow goes.
+        marks: what is said of states beyond what they are, by name: `active`, `added`, `removed`, `changed`.
+
+    Raises:
+        UnknownNameError: a transition leads nowhere, or a rule or state names a plot that is not there.
+    """
+    return to_svg(lay_out(plot, library, rules=rules, direction=direction), marks)
+
+
+def lay_out(
+    plot: ActionPlot, library: Library | None = None, *, rules: bool = True, direction: Direction = "down"
+) -> Box:
+    """The drawing as values, for other renderers; arguments and errors as for `draw`."""
+    return build(plot, library, rules=rules, sideways=direction == "right")

@@ -1,0 +1,135 @@
+"""From nodes and links to places and routes: layers, order, columns, tracks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from dsc.drawing.layered.columns import place_cells, straighten
+from dsc.drawing.layered.graph import Arrangement, Grid, LayerLink, LayerNode, Point, Route, build_grid, effort
+from dsc.drawing.layered.ordering import order_cells
+from dsc.drawing.layered.port_assignment import Ports, assign_ports
+from dsc.drawing.layered.tracks import Net, assign_tracks
+
+TRACK_GAP = 10.0
+AT_NODES = 13.0
+"""Straight end of a line at a node, so that an arrowhead has room."""
+AT_LABELS = 4.0
+
+
+def arrange(nodes: Sequence[LayerNode], links: Sequence[LayerLink], *, sideways: bool = False) -> Arrangement:
+    """Draw a graph in layers from top to bottom, or from left to right if `sideways`.
+
+    Nodes that come first stand further up; links from later to earlier ones lead upwards. No node or label
+    overlaps another. The same input gives the same output.
+    """
+    if sideways:
+        turned = [replace(node, width=node.height, height=node.width) for node in nodes]
+        return _turned(arrange(turned, [replace(k, width=k.height, height=k.width) for k in links]))
+    grid = build_grid(nodes, links)
+    order_cells(grid)
+    axes = place_cells(grid)
+    for _ in range(min(effort(grid), 3)):
+        straighten(grid, axes, assign_ports(nodes, grid, axes))
+    left = min((axis - cell.left for axis, cell in zip(axes, grid.cells, strict=True)), default=0.0)
+    axes = [round(axis - left, 1) for axis in axes]
+    ports = assign_ports(nodes, grid, axes)
+    return _Levels(nodes, grid, axes, ports).arrangement(links)
+
+
+def _turned(drawing: Arrangement) -> Arrangement:
+    def turn(point: Point) -> Point:
+        return point[1], point[0]
+
+    routes = (Route(tuple(map(turn, route.points)), turn(route.label)) for route in drawing.routes)
+    return Arrangement(drawing.height, drawing.width, tuple(map(turn, drawing.corners)), tuple(routes))
+
+
+class _Levels:
+    """Heights of the layers and of the tracks between them."""
+
+    def __init__(self, nodes: Sequence[LayerNode], grid: Grid, axes: list[float], ports: Ports) -> None:
+        self._nodes = nodes
+        self._grid, self._axes, self._ports = grid, axes, ports
+        self._tracks: dict[tuple[int, int], float] = {}
+        self._middles: list[float] = []
+        y = 0.0
+        for number, layer in enumerate(grid.layers):
+            height = max((grid.cells[cell].height for cell in layer), default=0.0)
+            self._middles.append(y + height / 2)
+            y += height
+            if number + 1 < len(grid.layers):
+                y += self._gap(number, y)
+        self.height = y
+
+    def _gap(self, upper: int, top: float) -> float:
+        """Lay the tracks below a layer; returns the height they need."""
+        above, below = (AT_NODES, AT_LABELS) if upper % 2 == 0 else (AT_LABELS, AT_NODES)
+        members = self._nets(self._grid.layers[upper])
+        nets = [
+            Net(
+                tuple(self._ports[one, other] for one, other in pairs),
+                tuple(self._ports[other, one] for one, other in pairs),
+            )
+            for pairs in members
+        ]
+        tracks = assign_tracks(nets)
+        for pairs, track in zip(members, tracks, strict=True):
+            self._tracks.update(dict.fromkeys(pairs, top + above + track * TRACK_GAP))
+        return above + max(tracks, default=0) * TRACK_GAP + below
+
+    def _nets(self, layer: list[int]) -> list[list[tuple[int, int]]]:
+        """The connections below a layer, those that meet in a trunk together."""
+        cells = self._grid.cells
+        nets: dict[tuple[int, int], list[tuple[int, int]]] = {}
+        for upper in layer:
+            for lower in cells[upper].down:
+                if cells[lower].bend and len(cells[lower].up) > 1:
+                    key = (-1, lower)
+                elif cells[upper].bend and len(cells[upper].down) > 1:
+                    key = (upper, -1)
+                else:
+                    key = (upper, lower)
+                nets.setdefault(key, []).append((upper, lower))
+        return list(nets.values())
+
+    def arrangement(self, links: Sequence[LayerLink]) -> Arrangement:
+        """The finished drawing."""
+        cells, axes = self._grid.cells, self._axes
+        nodes = [(axes[n], cell) for n, cell in enumerate(cells) if cell.is_node]
+        corners = [(axis - cell.left, self._middles[cell.layer] - cell.height / 2) for axis, cell in nodes]
+        routes = [self._route(chain, link) for chain, link in zip(self._grid.chains, links, strict=True)]
+        right = max((axis + cell.right for axis, cell in zip(axes, cells, strict=True)), default=0.0)
+        return Arrangement(right, self.height, tuple(corners), tuple(routes))
+
+    def _route(self, chain: list[int], link: LayerLink) -> Route:
+        points: list[Point] = [self._end(chain[0], chain[1])]
+        for one, other in pairwise(chain):
+            track = self._tracks[(one, other) if (one, other) in self._tracks else (other, one)]
+            points += [(self._ports[one, other], track), (self._ports[other, one], track)]
+        points.append(self._end(chain[-1], chain[-2]))
+        label = chain[1]
+        middle = self._middles[self._grid.cells[label].layer]
+        return Route(without_detours(points), (self._axes[label], middle) if link.height else points[0])
+
+    def _end(self, node: int, neighbour: int) -> Point:
+        cell = self._grid.cells[node]
+        half = cell.height / 2 if neighbour in cell.down else -cell.height / 2
+        across = self._ports[node, neighbour]
+        if self._nodes[node].diamond:
+            half *= 1 - abs(across - self._axes[node]) / cell.left
+        return across, self._middles[cell.layer] + half
+
+
+def without_detours(points: Sequence[Point]) -> tuple[Point, ...]:
+    """Without points that lie on the straight line between their neighbours."""
+    kept: list[Point] = []
+    for point in points:
+        if kept and point == kept[-1]:
+            continue
+        if len(kept) > 1 and any(kept[-2][axis] == kept[-1][axis] == point[axis] for axis in (0, 1)):
+            kept[-1] = point
+        else:
+            kept.append(point)
+    return tuple(kept)

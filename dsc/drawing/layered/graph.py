@@ -1,0 +1,193 @@
+"""Graph and grid of a layered drawing: nodes in layers, links in cells; lengths in pixels, y grows down."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class LayerNode:
+    """A box to be placed.
+
+    Attributes:
+        width, height: its size.
+        beside: room to keep free on its right, e.g. for a loop.
+        pointed: all links meet it in the middle of its side, not spread along it.
+        diamond: it is pointed and only its corners reach its sides; links against the order meet it beside them.
+        last: no link may lead upwards to it.
+    """
+
+    width: float
+    height: float
+    beside: float = 0.0
+    pointed: bool = False
+    diamond: bool = False
+    last: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LayerLink:
+    """An edge between two different nodes.
+
+    Attributes:
+        source, target: positions of the nodes in the input.
+        width, height: size of its label; 0 if it has none.
+        weight: how much it matters that it is straight.
+        meant: what inside the target it leads to; links to the same share a line.
+    """
+
+    source: int
+    target: int
+    width: float = 0.0
+    height: float = 0.0
+    weight: float = 1.0
+    meant: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """How a link runs from its source to its target, and the middle of its label."""
+
+    points: tuple[Point, ...]
+    label: Point
+
+
+@dataclass(frozen=True, slots=True)
+class Arrangement:
+    """A finished drawing: the nodes' upper left corners and the links' routes, in the order of the input."""
+
+    width: float
+    height: float
+    corners: tuple[Point, ...]
+    routes: tuple[Route, ...]
+
+
+LABEL_GAP = 4.0
+"""Free space around a label's text."""
+
+_Trunk = tuple[int, str, int, int]
+"""What links to one target share in a layer: the target, what is meant inside it, the direction, the layer."""
+
+
+@dataclass(slots=True)
+class Cell:
+    """Something with a place in a layer: a node, a label, or a line that passes.
+
+    Attributes:
+        layer: its layer, counted from the top.
+        left, right: how far it reaches from its axis.
+        height: how high it is.
+        is_node, bend: a node; or only a line.
+        up, down: the cells it is connected with in the layers above and below, and how much it matters
+            that the connection is straight.
+    """
+
+    layer: int
+    left: float
+    right: float
+    height: float
+    is_node: bool = False
+    bend: bool = False
+    up: dict[int, float] = field(default_factory=dict)
+    down: dict[int, float] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class Grid:
+    """The cells (the nodes come first), the chain of cells of each link, and the order in each layer."""
+
+    cells: list[Cell]
+    chains: list[list[int]]
+    layers: list[list[int]]
+
+
+def effort(grid: Grid) -> int:
+    """How many rounds of improvement a drawing of that size gets, so that none takes more than seconds."""
+    size = len(grid.cells)
+    return 8 if size < 3_000 else 4 if size < 20_000 else 1
+
+
+def build_grid(nodes: Sequence[LayerNode], links: Sequence[LayerLink]) -> Grid:
+    """Put nodes into layers and break links into chains of cells."""
+    rank = {node: place for place, node in enumerate(sorted(range(len(nodes)), key=lambda i: nodes[i].last))}
+    layers = _layers(rank, links)
+    cells = [
+        Cell(layer, node.width / 2, node.width / 2 + node.beside, node.height, is_node=True)
+        for node, layer in zip(nodes, layers, strict=True)
+    ]
+    trunks: dict[_Trunk, int] = {}
+    chains = [_chain(link, cells, trunks) for link in links]
+    return Grid(cells, chains, _in_order_of_visit(cells))
+
+
+def _layers(rank: dict[int, int], links: Sequence[LayerLink]) -> list[int]:
+    """Every node as high as its links allow, then down where its links get shorter; lone ones last."""
+    above: dict[int, set[int]] = {node: set() for node in rank}
+    below: dict[int, set[int]] = {node: set() for node in rank}
+    for link in links:
+        upper, lower = sorted((link.source, link.target), key=rank.__getitem__)
+        above[lower].add(upper)
+        below[upper].add(lower)
+    order = sorted(rank, key=rank.__getitem__)
+    layer = [0] * len(rank)
+    for node in order:
+        layer[node] = max((layer[other] + 2 for other in above[node]), default=0)
+    for node in reversed(order):
+        if not below[node] and not above[node]:
+            layer[node] = max(layer)
+        elif len(below[node]) > len(above[node]):
+            layer[node] = min(layer[other] for other in below[node]) - 2
+    return layer
+
+
+def _chain(link: LayerLink, cells: list[Cell], trunks: dict[_Trunk, int]) -> list[int]:
+    start, end = cells[link.source].layer, cells[link.target].layer
+    step = 1 if end > start else -1
+    chain = [link.source]
+    for layer in range(start + step, end, step):
+        labelled = layer == start + step and link.height > 0
+        chain.append(_label(link, layer, cells) if labelled else _bend(link, step, layer, cells, trunks))
+    chain.append(link.target)
+    short = abs(end - start) == 2
+    for one, other in pairwise(chain):
+        _connect(cells, one, other, step, link.weight * (1.0 if not short else 4.0 if step > 0 else 2.0))
+    return chain
+
+
+def _label(link: LayerLink, layer: int, cells: list[Cell]) -> int:
+    half = link.width / 2 + LABEL_GAP
+    cells.append(Cell(layer, half, half, link.height))
+    return len(cells) - 1
+
+
+def _bend(link: LayerLink, step: int, layer: int, cells: list[Cell], trunks: dict[_Trunk, int]) -> int:
+    key = (link.target, link.meant, step, layer)
+    if key not in trunks:
+        trunks[key] = len(cells)
+        cells.append(Cell(layer, 0.0, 0.0, 0.0, bend=True))
+    return trunks[key]
+
+
+def _connect(cells: list[Cell], one: int, other: int, step: int, weight: float) -> None:
+    upper, lower = (one, other) if step > 0 else (other, one)
+    lines = cells[one].bend + cells[other].bend
+    cells[upper].down[lower] = cells[lower].up[upper] = weight * (1.0, 2.0, 8.0)[lines]
+
+
+def _in_order_of_visit(cells: list[Cell]) -> list[list[int]]:
+    """The layers in the order in which a walk along the connections, from the first node on, meets the cells."""
+    layers: list[list[int]] = [[] for _ in range(1 + max((cell.layer for cell in cells), default=-1))]
+    seen: set[int] = set()
+    for root in range(len(cells)):
+        stack = [root]
+        while stack:
+            here = stack.pop()
+            if here not in seen:
+                seen.add(here)
+                layers[cells[here].layer].append(here)
+                stack.extend(reversed([*cells[here].down, *cells[here].up]))
+    return layers

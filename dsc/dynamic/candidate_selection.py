@@ -1,0 +1,79 @@
+"""Choosing the content of a dynamic state: top-down the candidates, bottom-up their conditions (S0.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from dsc.dynamic.plot_outcomes import Plots
+from dsc.engine.situation import Decision, Verdict
+from dsc.model.plot import ActionPlot
+from dsc.model.states import DynamicState
+from knowledge_base.facts import Content
+from knowledge_base.language.evaluation import World, evaluate_term, explain, holds
+from knowledge_base.language.expression import Constant, substitute
+from knowledge_base.language.printer import to_text
+
+ACHIEVE = "achieve"
+"""The plot of the library that stands in when no designed candidate fits: plan, execute, replan."""
+
+
+def choose(
+    state: DynamicState, holder: str, bindings: Mapping[str, Any], world: World, plots: Plots, version: int
+) -> Decision:
+    """The decision record for entering `state` in the plot named `holder`.
+
+    A goal that holds already needs no content. Otherwise the first candidate whose condition holds is
+    chosen; with a goal and no such candidate, `achieve`.
+
+    Raises:
+        UnknownNameError: a candidate is not in the library, or a variable has no value.
+    """
+    goal = None if state.goal is None else substitute(state.goal, scalars(bindings))
+    if goal is not None and holds(goal, world, {}):
+        return Decision(None, satisfied=True, version=version)
+    arguments = {name: plain(evaluate_term(term, world, bindings)) for name, term in state.arguments.items()}
+    chosen: str | None = None
+    chosen_arguments: dict[str, Any] = {}
+    verdicts = []
+    for name in state.dynamic:
+        plot = plots.plot(name)
+        own = {key: value for key, value in arguments.items() if key in plot.parameters}
+        verdict = judge(plot, own, world)
+        verdicts.append(verdict)
+        if verdict.fits and chosen is None:
+            chosen, chosen_arguments = name, own
+    if chosen is None and goal is not None:
+        chosen = ACHIEVE
+        budget = state.budget
+        chosen_arguments = {
+            "goal": to_text(goal), "holder": holder, "replans": budget.replans, "seconds": budget.seconds,
+        }  # fmt: skip
+    return Decision(chosen, chosen_arguments, verdicts=tuple(verdicts), version=version)
+
+
+def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdict:
+    """Whether a candidate's condition holds for these arguments, and the leaf that decides."""
+    if plot.when is None:
+        return Verdict(plot.name, fits=True, reason="no condition")
+    bindings = {**_defaults(plot), **arguments}
+    why = explain(plot.when, world, scalars(bindings))
+    return Verdict(plot.name, fits=why.truth, reason=str(why.deciding), explanation=why.to_json())
+
+
+def _defaults(plot: ActionPlot) -> dict[str, Any]:
+    return {
+        name: parameter.default.value
+        for name, parameter in plot.parameters.items()
+        if isinstance(parameter.default, Constant)
+    }
+
+
+def plain(content: Content) -> Any:
+    """What a chart's variable may hold of it: plain JSON, so a geometry is a list of numbers."""
+    return list(content) if isinstance(content, tuple) else content
+
+
+def scalars(bindings: Mapping[str, Any]) -> dict[str, Any]:
+    """The bindings a condition can speak about; plots and other structures held in variables are not."""
+    return {name: value for name, value in bindings.items() if isinstance(value, str | int | float | bool)}

@@ -1,0 +1,164 @@
+r"""Event handlers as states and transitions (S1.14).
+
+A handler that interrupts adds to every state that can rest a way to a state for what it does, and from there back.
+The others stand in regions of their own beside the whole plot, one for each event:
+
+    active { plot: ... ended_reached | low_bat: awaited <-> handled }  --> ended
+
+What a handler listens to is activated when that whole is entered, and never again: an activation that is made while its
+condition holds would bring the event at once. The whole says inside what it has heard, by an event of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from dsc.dynamic.fresh_names import FreshNames
+from dsc.dynamic.plot_outcomes import Plots
+from dsc.dynamic.redirection import Way, redirected
+from dsc.dynamic.step_references import mentioned_in
+from dsc.events import DONE, FAILURES
+from dsc.model.actions import Emit, Internal, Tell
+from dsc.model.plot import ActionPlot, initial_of
+from dsc.model.rules import Handler
+from dsc.model.states import AnyState, CompositeState, FinalState, OrthogonalState, Region, State, SubmachineState
+from dsc.model.transitions import Transition
+from knowledge_base.language.expression import Variable
+
+States = dict[str, AnyState]
+_EVENT = "event."
+BESIDE = "active"
+"""Name of the state that holds the plot and its handlers side by side, as long as none of its own is called so."""
+
+
+def with_handlers(
+    plot: ActionPlot, written: ActionPlot, plots: Plots, added: FreshNames, entrances: Mapping[str, str]
+) -> ActionPlot:
+    """The plot with the handlers that were `written`.
+
+    Args:
+        plot: its rules are carried out.
+        written: the plot as people wrote it.
+        plots: where the plots are found that handlers use.
+        added: gives names to what is added.
+        entrances: states that are entered by way of another one.
+
+    Raises:
+        UnknownNameError: a handler uses a plot that is not there.
+    """
+    interrupting = [one for one in written.handlers if one.interrupt]
+    listening = {one.on: added.event(f"{one.on}_heard") for one in written.handlers if one.listen is not None}
+    handling = _Handling(plots, added, listening)
+    if interrupting:
+        states = handling.interrupted(plot.states, interrupting, entrances)
+        plot = plot.model_copy(update={"states": states})
+    if listening or len(interrupting) < len(written.handlers):
+        return handling.around(plot, written.handlers)
+    return plot
+
+
+class _Handling:
+    def __init__(self, plots: Plots, added: FreshNames, listening: Mapping[str, str]) -> None:
+        self._plots = plots
+        self._added = added
+        self._listening = listening
+
+    def interrupted(
+        self, states: Mapping[str, AnyState], handlers: list[Handler], entrances: Mapping[str, str]
+    ) -> States:
+        """The states of a scope, each with a way to every handler and back; regions are interrupted as one."""
+        result: States = {}
+        for name, state in states.items():
+            if isinstance(state, CompositeState):
+                inside = self.interrupted(state.states, handlers, entrances)
+                result[name] = state.model_copy(update={"states": inside})
+            elif isinstance(state, State):
+                result.update(self._interrupted(name, state, handlers, entrances.get(name, name)))
+            else:
+                result[name] = state
+        return result
+
+    def _interrupted(self, name: str, state: State, handlers: list[Handler], back: str) -> States:
+        on, more = dict(state.on), dict[str, AnyState]()
+        for handler in handlers:
+            handled = self._added.state(f"{name}_{handler.on}_handled")
+            more[handled] = self._handled(handler, back)
+            heard = self._heard(handler.on)
+            on[heard] = (*on.get(heard, ()), _way(handler, handled))
+        return {name: state.model_copy(update={"on": on}), **more}
+
+    def around(self, plot: ActionPlot, handlers: Iterable[Handler]) -> ActionPlot:
+        """The plot as one region, and one for each event that is handled beside it; the whole listens."""
+        handlers = list(handlers)
+        beside = [handler for handler in handlers if not handler.interrupt]
+        reached = {name: self._added.state(f"{name}_reached") for name in _ends(plot)}
+        first = initial_of(plot)
+        regions = {"plot": Region(states=_inside(plot, reached), initial=reached.get(first, first))}
+        for event in dict.fromkeys(handler.on for handler in beside):
+            mine = [handler for handler in beside if handler.on == event]
+            regions[f"on_{event}"] = Region(states=self._awaiting(event, mine))
+        over = {name: _told_its_attributes(end) for name, end in _ends(plot).items()}
+        on = {reached[name]: (Transition(target=name),) for name in over}
+        for event, heard in self._listening.items():
+            mentioned = [mentioned_in(handler) for handler in handlers if handler.on == event]
+            on[event] = (_passed_on(heard, frozenset().union(*mentioned)),)
+        entry = tuple([handler.listen for handler in handlers if handler.listen is not None])
+        around = OrthogonalState(regions=regions, entry=entry, on=on)
+        return plot.model_copy(update={"states": {self._added.state(BESIDE): around, **over}, "initial": None})
+
+    def _awaiting(self, event: str, handlers: list[Handler]) -> States:
+        awaited = self._added.state(f"{event}_awaited")
+        ways, more = [], dict[str, AnyState]()
+        for handler in handlers:
+            handled = None
+            if handler.do.acts:
+                handled = self._added.state(f"{event}_handled")
+                more[handled] = self._handled(handler, awaited)
+            ways.append(_way(handler, handled))
+        return {awaited: State(on={self._heard(event): tuple(ways)}), **more}
+
+    def _heard(self, event: str) -> str:
+        return self._listening.get(event, event)
+
+    def _handled(self, handler: Handler, back: str) -> AnyState:
+        do, onward = handler.do, (Transition(target=back),)
+        if do.use is None:
+            return State(entry=do.command, on={DONE: onward}, about=handler.label)
+        ends = (DONE, *self._plots.plot(do.use).emits, *sorted(FAILURES))
+        on = dict.fromkeys(ends, onward)
+        return SubmachineState(use=do.use, arguments=do.arguments, entry=do.command, on=on, about=handler.label)
+
+
+def _ends(plot: ActionPlot) -> dict[str, FinalState]:
+    return {name: state for name, state in plot.states.items() if isinstance(state, FinalState)}
+
+
+def _inside(plot: ActionPlot, reached: Mapping[str, str]) -> States:
+    """The plot's states as those of a region: its ends are reached there first, and say so."""
+
+    def to_region(way: Way) -> Way:
+        return way.model_copy(update={"target": reached.get(way.target or "", way.target)})
+
+    inside: States = {}
+    for name, state in plot.states.items():
+        if isinstance(state, FinalState):
+            inside[reached[name]] = FinalState(final=True, emit=reached[name], arguments=state.arguments)
+        else:
+            inside[name] = redirected(state, to_region)
+    return inside
+
+
+def _told_its_attributes(end: FinalState) -> FinalState:
+    """An end of the plot that hears from the region what it hands on."""
+    return end.model_copy(update={"arguments": {key: Variable(_EVENT + key) for key in end.arguments}})
+
+
+def _passed_on(heard: str, mentioned: Iterable[str]) -> Transition:
+    """Says inside that the event has come, with those of its attributes that handlers want to know."""
+    known = sorted(name.removeprefix(_EVENT) for name in mentioned if name.startswith(_EVENT))
+    return Transition(target=None, do=(Emit(emit=heard, arguments={key: Variable(_EVENT + key) for key in known}),))
+
+
+def _way(handler: Handler, target: str | None) -> Transition:
+    told: tuple[Internal, ...] = () if handler.do.tell is None else (Tell(tell=handler.do.tell),)
+    return Transition(target=target, guard=handler.when, do=told, rule=handler.label)

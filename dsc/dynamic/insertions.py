@@ -1,0 +1,165 @@
+r"""What rules insert before a step and after it, or have left out, as connectors and states (S1.4).
+
+    -> <clean?> -> look            before: look
+          \-> wipe -/
+
+Each rule is asked once whenever the step is entered, however that comes about, or has been done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from dsc.dynamic.fresh_names import FreshNames
+from dsc.dynamic.plot_outcomes import Plots
+from dsc.dynamic.redirection import Redirect, Way, redirected
+from dsc.dynamic.responses import Responses, States
+from dsc.dynamic.step_references import Step, about_step, concerns
+from dsc.events import DONE
+from dsc.model.actions import Assign
+from dsc.model.connectors import ChoiceState
+from dsc.model.plot import ActionPlot
+from dsc.model.rules import CONTINUE, ENTER, Rule
+from dsc.model.states import AnyState, DynamicState, SubmachineState
+from dsc.model.transitions import Transition
+from knowledge_base.errors import SchemaError
+from knowledge_base.language.expression import Term
+
+
+class Insertions:
+    """The ways that lead through the insertions of one plot.
+
+    Attributes:
+        entrances: step -> the connector in front of it, for those that have one.
+    """
+
+    def __init__(self, plot: ActionPlot, plots: Plots, added: FreshNames, responses: Responses) -> None:
+        self._plot, self._plots = plot, plots
+        self._added, self._responses = added, responses
+        self._steps: dict[str, Step] = {}
+        self._before: dict[str, list[tuple[int, Rule]]] = {}
+        self._leading: dict[str, str] = {}  # what was added in front of a step -> the step
+        self.entrances: dict[str, str] = {}
+        self._placed = [(number, rule) for number, rule in enumerate(plot.rules) if rule.on is None]
+
+    def through(self, states: Mapping[str, AnyState], written: Iterable[str]) -> States:
+        """The states of one scope with all insertions.
+
+        Args:
+            states: those written, and those that the rules for outcomes have added.
+            written: the names of the first.
+        """
+        if not self._placed:
+            return dict(states)
+        result = dict(states)
+        for name in written:
+            state = states[name]
+            if isinstance(state, SubmachineState | DynamicState):
+                self._before[name] = self._of(name, state, "before")
+                self._steps[name] = state
+                result.update(self._after(name, state))
+        for name in [name for name, rules in self._before.items() if rules and name in states]:
+            self.entrances[name] = self._in_front_of(name, {}, result)
+        waiting = list(result)
+        while waiting:
+            name = waiting.pop()
+            more: States = {}
+            result[name] = redirected(result[name], self._redirection(name, more))
+            result.update(more)
+            waiting += more
+        return _in_order(result, states)
+
+    def _of(self, name: str, state: Step, place: str) -> list[tuple[int, Rule]]:
+        placed = [(n, one) for n, one in self._placed if one.place == place]
+        found = [(n, one) for n, one in placed if concerns(one, name, state, self._plots)]
+        return [(n, about_step(one, state, self._plot)) for n, one in found]
+
+    def _after(self, name: str, state: Step) -> States:
+        """The state, whose ways out when it is done lead through what is inserted after it."""
+        rules = self._of(name, state, "after")
+        if not rules or DONE not in state.on:
+            return {name: state}
+        more: States = {}
+        ways = []
+        for number, way in enumerate(state.on[DONE]):
+            mark = f"{name}_after" + (f"_{number}" if number else "")
+            ways.append(way if way.target is None else self._way(way, mark, name, state, rules, CONTINUE, more))
+        return {name: state.model_copy(update={"on": {**state.on, DONE: tuple(ways)}}), **more}
+
+    def _in_front_of(self, name: str, passed: Mapping[str, Term], states: States) -> str:
+        """The first of the connectors in front of a step."""
+        more: States = {}
+        last = Transition(target=name, passed=dict(passed))
+        first = self._chain(f"{name}_before", name, self._steps[name], self._before[name], ENTER, last, more)
+        self._leading.update(dict.fromkeys(more, name))
+        states.update(more)
+        return str(first.target)
+
+    def _redirection(self, source: str, more: States) -> Redirect:
+        def redirect(way: Way) -> Way:
+            target = way.target
+            if target not in self.entrances or self._leading.get(source) == target:
+                return way
+            if not way.passed:
+                return way.model_copy(update={"target": self.entrances[target]})
+            kept: dict[str, Term] = {}
+            passed = self._responses.remembered(way.passed, target, kept)
+            return _handing_over(way, self._in_front_of(target, passed, more), kept)
+
+        return redirect
+
+    def _way(
+        self, way: Transition, mark: str, name: str, state: Step, rules: list[tuple[int, Rule]], by_default: str,
+        states: States,
+    ) -> Transition:  # fmt: skip
+        """A transition that leads through insertions to where it led before."""
+        kept: dict[str, Term] = {}
+        last = Transition(target=way.target, passed=self._responses.remembered(way.passed, mark, kept))
+        first = self._chain(mark, name, state, rules, by_default, last, states)
+        return _handing_over(way, str(first.target), kept)
+
+    def _chain(
+        self, mark: str, name: str, state: Step, rules: list[tuple[int, Rule]], by_default: str, last: Transition,
+        states: States,
+    ) -> Transition:  # fmt: skip
+        """One connector after the other, and behind them `last`."""
+        following = last
+        for number, rule in reversed(rules):
+            key = f"{mark}_{number}"
+            if rule.then != by_default:
+                onward = self._responses.onward(rule, number, name, state)
+            elif rule.do.passed:  # they go with the last stretch of the way
+                onward = [last.model_copy(update={"passed": {**last.passed, **rule.do.passed}})]
+            else:
+                onward = [following]
+            self._leads_on(rule, number, name, onward)
+            connector = self._added.state(key)
+            made: States = {}
+            branches = self._responses.carried_out(rule, key, onward, made)
+            if branches[-1].guard is not None:
+                branches.append(following)
+            states[connector] = ChoiceState(choice=tuple(branches))
+            states.update(made)
+            following = Transition(target=connector)
+        return following
+
+    def _leads_on(self, rule: Rule, number: int, name: str, onward: list[Transition]) -> None:
+        if any(way.target is None for way in onward):
+            raise SchemaError(
+                f"a rule cannot '{rule.then}' at state '{name}', which stays where it is then",
+                place=self._plot.place(("rules", number, "do")),
+            )
+
+
+def _handing_over(way: Way, target: str, kept: Mapping[str, Term]) -> Way:
+    """The transition to another target, which keeps in variables what it would have passed."""
+    if not kept:
+        return way.model_copy(update={"target": target})
+    own = (Assign(assign=way.assign),) if way.assign else ()
+    do = (*way.do, *own, Assign(assign=dict(kept)))
+    return way.model_copy(update={"target": target, "passed": {}, "assign": {}, "do": do})
+
+
+def _in_order(result: States, states: Mapping[str, AnyState]) -> States:
+    """The states as they were, then what was added."""
+    return {**{name: result[name] for name in states}, **result}

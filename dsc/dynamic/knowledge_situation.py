@@ -1,0 +1,51 @@
+"""The engine's window on a knowledge base: one version plus what the macrostep told."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dsc.dynamic.candidate_selection import choose, plain, scalars
+from dsc.dynamic.library import Library
+from dsc.engine.situation import Bindings, Decision
+from dsc.model.states import DynamicState
+from knowledge_base.facts import Delta
+from knowledge_base.language.effect import Effect
+from knowledge_base.language.evaluation import apply_effect, evaluate_term, holds
+from knowledge_base.language.expression import Expression, Term
+from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.overlay import Overlay
+
+
+class KnowledgeSituation:
+    """A `Situation` for one macrostep; the knowledge base itself is not touched."""
+
+    def __init__(self, knowledge: KnowledgeBase, library: Library) -> None:
+        self._version = knowledge.version
+        self._knowledge = knowledge
+        self._library = library
+        self._pending: Overlay | None = None
+
+    @property
+    def _world(self) -> Overlay:
+        """What is known and what was told; most steps ask nothing and tell nothing."""
+        if self._pending is None:
+            self._pending = self._knowledge.overlay()
+        return self._pending
+
+    def holds(self, expression: Expression, bindings: Bindings) -> bool:
+        """See `Situation`."""
+        return holds(expression, self._world, bindings)
+
+    def value(self, term: Term, bindings: Bindings) -> Any:
+        """See `Situation`."""
+        return plain(evaluate_term(term, self._world, bindings))
+
+    def tell(self, effect: Effect, bindings: Bindings) -> Delta:
+        """See `Situation`."""
+        delta = apply_effect(effect, self._world, scalars(bindings))
+        self._world.apply(delta)
+        return delta
+
+    def choose(self, state: DynamicState, holder: str, bindings: Bindings) -> Decision:
+        """See `Situation`."""
+        return choose(state, holder, bindings, self._world, self._library, self._version)

@@ -1,0 +1,166 @@
+"""Rules and handlers become ordinary states and transitions, visible in every drawing (S1.4, S1.14)."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Mapping, MutableMapping, Sequence
+
+from dsc.dynamic.event_handlers import with_handlers
+from dsc.dynamic.fresh_names import FreshNames
+from dsc.dynamic.insertions import Insertions
+from dsc.dynamic.plot_outcomes import Plots, answerable
+from dsc.dynamic.responses import Responses, States, because, reason_of
+from dsc.dynamic.step_references import Step, about_step, answers_in_plans, concerns
+from dsc.events import DONE, GAVE_UP, NO_CANDIDATE
+from dsc.model.actions import Assign, Emit
+from dsc.model.plot import ActionPlot, Scope, initial_of
+from dsc.model.rules import REPLAN, Rule
+from dsc.model.states import AnyState, CompositeState, DynamicState, OrthogonalState, SubmachineState
+from dsc.model.transitions import Transition
+from knowledge_base.language.expression import Arithmetic, Comparison, Constant, Variable
+
+
+def expand(plot: ActionPlot, plots: Plots) -> ActionPlot:
+    """The plot with its rules and handlers turned into states and transitions.
+
+    Raises:
+        UnknownNameError: a rule or state names a plot that is not there.
+        SchemaError: a rule cannot be carried out at a state.
+    """
+    if not plot.rules and not plot.handlers and not plot.generated:
+        return plot
+    expansion = _Expansion(plot, plots)
+    added = expansion.added
+    expanded = plot.model_copy(update={**expansion.scope(plot), "rules": (), "handlers": ()})
+    if plot.handlers:
+        expanded = with_handlers(expanded, plot, plots, added, expansion.detours.entrances)
+    return expanded.model_copy(update={"variables": {**plot.variables, **added.variables}})
+
+
+class _Expansion:
+    def __init__(self, plot: ActionPlot, plots: Plots) -> None:
+        self._plot, self._plots = plot, plots
+        self.added = FreshNames(plot)
+        self._responses = Responses(plot, plots, self.added)
+        self._in_plans = [rule for rule in plot.rules if rule.leads_away and answers_in_plans(rule, plots)]
+        self._given_up: dict[str, str] = {}  # by what states say so inside, and why
+        self.detours = Insertions(plot, plots, self.added, self._responses)
+
+    def scope(self, scope: Scope) -> dict[str, object]:
+        """What changes in a scope: its states, and the one to begin with if there is something before that."""
+        states = self.detours.through(self._states(scope.states), scope.states)
+        entrance = self.detours.entrances.get(initial_of(scope))
+        return {"states": states} if entrance is None else {"states": states, "initial": entrance}
+
+    def _states(self, states: Mapping[str, AnyState]) -> States:
+        """The states of one scope, each followed by the recoveries its rules need."""
+        result: States = {}
+        for name, state in states.items():
+            if isinstance(state, CompositeState | OrthogonalState):
+                result[name] = self._around(state)
+            elif isinstance(state, SubmachineState | DynamicState):
+                result.update(self._with_rules(name, state, states))
+            else:
+                result[name] = state
+        return result
+
+    def _around(self, state: CompositeState | OrthogonalState) -> AnyState:
+        """A state that contains others."""
+        before, self._given_up = self._given_up, {}
+        if isinstance(state, CompositeState):
+            inside = self.scope(state)
+        else:
+            inside = {"regions": {key: one.model_copy(update=self.scope(one)) for key, one in state.regions.items()}}
+        on = answered(state.on, self._given_up)
+        self._given_up = {**before, **self._given_up}
+        return state.model_copy(update={**inside, "on": on})
+
+    def _with_rules(self, name: str, state: Step, beside: Mapping[str, AnyState]) -> States:
+        on = dict(state.on)
+        recoveries: States = {}
+        for event in answerable(state, self._plots):
+            own = list(on.get(event, ()))
+            if own and own[-1].guard is None:
+                continue
+            for number, rule in enumerate(self._plot.rules):
+                if rule.on == event and concerns(rule, name, state, self._plots):
+                    about = about_step(rule, state, self._plot)
+                    onward = self._responses.onward(about, number, name, state)
+                    own += self._responses.carried_out(about, f"{name}_{event}_{number}", onward, recoveries)
+            if self._plot.generated:
+                reason = "no candidate fits" if event == NO_CANDIDATE else reason_of(event)
+                own.append(self._responses.ending(name, REPLAN, reason))
+            if own:
+                on[event] = tuple(own)
+        if isinstance(state, DynamicState) and state.goal is not None:
+            on = dict(led_away(name, state, on, beside, self._in_plans, self.added, self._given_up))
+        return {name: state.model_copy(update={"on": on}), **recoveries}
+
+
+Ways = Mapping[str, tuple[Transition, ...]]
+"""Event -> transitions, tried in order."""
+
+
+def led_away(
+    name: str,
+    state: DynamicState,
+    on: Ways,
+    beside: Container[str],
+    rules: Iterable[Rule],
+    added: FreshNames,
+    given_up: MutableMapping[str, str],
+) -> Ways:
+    """The ways out of a state with a goal, with those of rules that leave its plans.
+
+    Args:
+        name: the state's name.
+        state: has the budget.
+        on: its ways out so far.
+        beside: the states of its scope.
+        rules: those that may answer for steps of plans.
+        added: gives names to what is added.
+        given_up: is told the events by which the state makes known that it has given up, and why; for `answered`.
+    """
+    leading = {rule.outcome: rule for rule in rules if rule.leads_away and rule.then in beside}
+    if not leading:
+        return on
+    counter = added.variable(f"left_{name}", "number", 0)
+    ways = {**on, DONE: tuple(_counting_anew(way, counter) for way in on.get(DONE, ()))}
+    own = on.get(GAVE_UP, ())
+    for event, rule in leading.items():
+        most = state.budget.replans
+        reason = f"the budget of {most} new plans is used up: rules have led to '{rule.then}' once more"
+        ways[event] = (_way(rule, counter, most), *(because(reason, way) for way in own))
+        if not _settles(own):
+            said = added.event(f"{GAVE_UP}_{name}_{rule.then}")
+            given_up[said] = reason
+            ways[event] += (Transition(do=(Emit(emit=said),)),)
+    return ways
+
+
+def answered(on: Ways, given_up: MutableMapping[str, str]) -> Ways:
+    """The ways out of a state, with those for what states inside it make known; what it settles is taken away."""
+    own = on.get(GAVE_UP, ())
+    if not (own and given_up):
+        return on
+    ways = {**on, **{said: tuple(because(reason, way) for way in own) for said, reason in given_up.items()}}
+    if _settles(own):
+        given_up.clear()
+    return ways
+
+
+def _settles(ways: Sequence[Transition]) -> bool:
+    return bool(ways) and ways[-1].guard is None
+
+
+def _way(rule: Rule, counter: str, most: int) -> Transition:
+    left = Variable(counter)
+    return Transition(
+        target=rule.then,
+        guard=Comparison("<=", left, Constant(most)),
+        do=(Assign(assign={counter: Arithmetic("+", (left, Constant(1)))}),),
+        passed={name: Variable(f"event.{name}") for name in rule.do.passed},
+    )
+
+
+def _counting_anew(way: Transition, counter: str) -> Transition:
+    return way.model_copy(update={"do": (Assign(assign={counter: Constant(0)}), *way.do)})

@@ -1,0 +1,138 @@
+"""What rules call a step, and its arguments in what a rule says: `?step.item` (S1.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from dsc.dynamic.plot_outcomes import Plots
+from dsc.events import FAILURES
+from dsc.model.actions import Configure, Send, Switch
+from dsc.model.plot import ActionPlot
+from dsc.model.rules import STEP, Command, Handler, Response, Rule
+from dsc.model.states import DynamicState, SubmachineState
+from knowledge_base.errors import SchemaError
+from knowledge_base.language.effect import mentioned, quantified_in, substitute_effect
+from knowledge_base.language.expression import Term, free_variables, quantified, substitute, substitute_term
+
+Step = SubmachineState | DynamicState
+"""A state that holds another plot."""
+Terms = Mapping[str, Term]
+
+
+def contents_of(step: Step, plots: Plots) -> list[ActionPlot]:
+    """The plots that may become the content of a step, as far as that is known.
+
+    Raises:
+        UnknownNameError: it names a plot that is not there.
+    """
+    if isinstance(step, DynamicState):
+        return [plots.plot(name) for name in step.dynamic]
+    return [] if step.use.startswith("?") else [plots.plot(step.use)]
+
+
+def action_of(step: Step, plots: Plots) -> str | None:
+    """The planning action that all plots implement which the step may hold; `None` if there is no such action."""
+    if isinstance(step, DynamicState) and step.goal is not None:
+        return None
+    actions = {plot.implements for plot in contents_of(step, plots)}
+    return actions.pop() if len(actions) == 1 else None
+
+
+def concerns(rule: Rule, name: str, step: Step, plots: Plots) -> bool:
+    """Whether a rule is for that step, as far as steps are named in it."""
+    return not rule.steps or name in rule.steps or action_of(step, plots) in rule.steps
+
+
+def answers_in_plans(rule: Rule, plots: Plots) -> bool:
+    """Whether a rule may answer for steps of plans: those that carry out planning actions, if it names any, theirs."""
+    return any(True for _ in _answered_in_plans(rule, plots))
+
+
+def _answered_in_plans(rule: Rule, plots: Plots) -> Iterator[ActionPlot]:
+    carrying = (plot for plot in plots if plot.implements and (not rule.steps or plot.implements in rule.steps))
+    return (plot for plot in carrying if rule.on is None or rule.on in FAILURES or rule.on in plot.emits)
+
+
+def entered_by(rule: Rule, plot: ActionPlot, plots: Plots) -> Iterator[ActionPlot]:
+    """The plots that are handed what a rule of a plot passes, as far as they are known, each once."""
+    steps = {name: state for name, state, _ in plot.walk() if isinstance(state, Step)}
+    if rule.leads_away:
+        entered = [steps[rule.then]] if rule.then in steps else []
+    else:
+        entered = [state for name, state in steps.items() if concerns(rule, name, state, plots)]
+    found = {used.name: used for state in entered for used in contents_of(state, plots)}
+    planned = any(isinstance(state, DynamicState) and state.goal is not None for state in steps.values())
+    if planned and not rule.leads_away:
+        found.update({used.name: used for used in _answered_in_plans(rule, plots)})
+    yield from found.values()
+
+
+def mentioned_in(rule: Rule | Handler) -> frozenset[str]:
+    """The variables that the condition and response of a rule or handler read."""
+    do = rule.do
+    passed = do.passed.values() if isinstance(do, Response) else ()
+    terms = [*do.arguments.values(), *passed, *(term for c in do.command for term in terms_of(c).values())]
+    found = frozenset[str]().union(*map(free_variables, terms))
+    found |= frozenset() if rule.when is None else free_variables(rule.when)
+    return found if do.tell is None else found | mentioned(do.tell)
+
+
+def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
+    """The rule with the step's arguments in place of `?step.item`.
+
+    Raises:
+        SchemaError: an argument is a variable of the plot that the rule uses for something else.
+    """
+    read = mentioned_in(rule)
+    arguments = {STEP + name: term for name, term in step.arguments.items() if STEP + name in read}
+    if not arguments:
+        return rule
+    _refuse_capture(rule, arguments, plot)
+    do = rule.do
+    return rule.model_copy(update={
+        "when": None if rule.when is None else substitute(rule.when, arguments),
+        "do": do.model_copy(update={
+            "tell": None if do.tell is None else substitute_effect(do.tell, arguments),
+            "command": tuple(_command(one, arguments) for one in do.command),
+            "arguments": filled(do.arguments, arguments),
+            "passed": filled(do.passed, arguments),
+        }),
+    })  # fmt: skip
+
+
+def filled(terms: Terms, values: Mapping[str, Term]) -> dict[str, Term]:
+    """The terms with others in place of variables."""
+    return {name: substitute_term(term, values) for name, term in terms.items()}
+
+
+def terms_of(command: Command) -> Terms:
+    """The values that a command hands to its component."""
+    match command:
+        case Configure(to=value):
+            return {"to": value}
+        case Send(arguments=arguments):
+            return arguments
+        case Switch():
+            return {}
+
+
+def _command(command: Command, values: Mapping[str, Term]) -> Command:
+    match command:
+        case Configure(to=value):
+            return command.model_copy(update={"to": substitute_term(value, values)})
+        case Send(arguments=arguments):
+            return command.model_copy(update={"arguments": filled(arguments, values)})
+        case Switch():
+            return command
+
+
+def _refuse_capture(rule: Rule, arguments: Terms, plot: ActionPlot) -> None:
+    own = frozenset() if rule.when is None else quantified(rule.when)
+    own |= frozenset() if rule.do.tell is None else quantified_in(rule.do.tell)
+    for name, term in arguments.items():
+        for hidden in sorted(own & free_variables(term)):
+            number = plot.rules.index(rule)
+            raise SchemaError(
+                f"'?{name}' is the plot's '?{hidden}', and the rule means another '?{hidden}' by that name",
+                place=plot.place(("rules", number)), found=hidden,
+            )  # fmt: skip

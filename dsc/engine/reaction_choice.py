@@ -1,0 +1,110 @@
+"""Which reaction a configuration has to a trigger, found once for every outcome of the guards on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from dsc.engine.configuration import MOST_TRIGGERS, Configuration
+from dsc.engine.determinisation import reaction_of
+from dsc.engine.frames import Frame
+from dsc.engine.machine_state import NOTHING
+from dsc.engine.membership import FALSE, settle
+from dsc.engine.reaction import CompiledReaction
+from dsc.engine.tables import TransitionEdge
+from dsc.engine.transition_selection import Enabled, Trigger, edges_of, select
+from knowledge_base.language.expression import TRUE, Expression
+
+MOST_QUESTIONS = 1024
+"""Kept for one configuration: n guards that are asked in every case have 2**n outcomes."""
+
+
+@dataclass(slots=True, eq=False)
+class Question:
+    """A guard that has to be asked before more can be said; its answer leads on.
+
+    Attributes:
+        edge: the transition that is guarded.
+        condition: its guard; what it asks about active states is answered.
+    """
+
+    configuration: Configuration
+    trigger: Trigger
+    edge: TransitionEdge
+    condition: Expression
+    answers: Mapping[TransitionEdge, bool]
+    _branches: dict[bool, Choice] = field(default_factory=dict)
+
+    def follow(self, answer: bool) -> Choice:  # noqa: FBT001  # a truth value is what the question asks for
+        """What is known after the answer."""
+        found = self._branches.get(answer)
+        if found is None:
+            answers = {**self.answers, self.edge: answer}
+            found = self._branches[answer] = _work_out(self.configuration, self.trigger, answers)
+        return found
+
+
+Choice = CompiledReaction | Question
+"""What is known about a trigger: what happens, or what to ask next."""
+
+_UNKNOWN = object()
+
+
+def choice_of(configuration: Configuration, trigger: Trigger) -> Choice | None:
+    """What is known about a trigger in a configuration; `None` if no active state listens to it."""
+    found = configuration.choices.get(trigger, _UNKNOWN)
+    if found is _UNKNOWN:
+        if len(configuration.choices) >= MOST_TRIGGERS:
+            configuration.forget()
+        found = configuration.choices[trigger] = _first_choice(configuration, trigger)
+    return found  # type: ignore[no-any-return]
+
+
+def _first_choice(configuration: Configuration, trigger: Trigger) -> Choice | None:
+    if not any(edges_of(configuration.compiled, index, trigger) for index in configuration.active):
+        return None
+    return _work_out(configuration, trigger, {})
+
+
+def settled(guard: Expression, configuration: Configuration) -> Expression:
+    """A guard of the configuration's plot; what it asks about active states is answered."""
+    return settle(guard, configuration.is_active) if configuration.compiled.scxml else guard
+
+
+class _Open(Exception):  # noqa: N818  # no error: the search stops at a question
+    def __init__(self, edge: TransitionEdge, condition: Expression) -> None:
+        super().__init__()
+        self.edge = edge
+        self.condition = condition
+
+
+def _work_out(configuration: Configuration, trigger: Trigger, answers: Mapping[TransitionEdge, bool]) -> Choice:
+    def guard(_frame: Frame, edge: TransitionEdge) -> bool:
+        if edge.guard is None:
+            return True
+        condition = settled(edge.guard, configuration)
+        if condition in (TRUE, FALSE):
+            return condition == TRUE
+        if edge not in answers:
+            raise _Open(edge, condition)
+        return answers[edge]
+
+    try:
+        taken, late = select(Frame(0, configuration.compiled, configuration, NOTHING), trigger, guard)
+    except _Open as question:
+        return _ask(configuration, trigger, question, answers)
+    return reaction_of(configuration, tuple([one.edge for one in taken]), _keepers(late))
+
+
+def _ask(
+    configuration: Configuration, trigger: Trigger, open_: _Open, answers: Mapping[TransitionEdge, bool]
+) -> Question:
+    configuration.questions += 1
+    if configuration.questions > MOST_QUESTIONS:
+        configuration.forget()
+    return Question(configuration, trigger, open_.edge, open_.condition, answers)
+
+
+def _keepers(late: list[Enabled]) -> tuple[str, ...]:
+    names = [one.frame.compiled.nodes[one.edge.source].name for one in late]
+    return tuple(dict.fromkeys(names))

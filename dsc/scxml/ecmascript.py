@@ -1,0 +1,300 @@
+"""The ECMAScript expressions that the one language can say, translated into it; everything else is refused by name.
+
+Numbers, strings, truth values, variables, `_event.data.x`, `+ - * /`, `Math.pow` with a small whole exponent,
+comparisons, `&& || !` and `In()`. Where ECMAScript would convert a value, it is refused; the scope knows the kinds of
+values that there are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from dsc.engine.membership import IN_STATE
+from dsc.errors import NotExpressibleError
+from dsc.scxml.tokens import Token, tokens
+from dsc.scxml.value_kinds import ANY, BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, WHOLE, Scope
+from knowledge_base.errors import Place, UnknownNameError
+from knowledge_base.language.expression import (
+    TRUE,
+    And,
+    Arithmetic,
+    Atom,
+    Comparison,
+    Constant,
+    Expression,
+    Not,
+    Or,
+    Term,
+    Variable,
+)
+
+Names = Mapping[str, str] | Scope
+"""The chart's data by their own spelling -> the name of the variable; alone, nothing is known about their kinds."""
+
+_COMPARE = {"===": "=", "==": "=", "!==": "!=", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
+_FALSE = {BOOLEAN: Constant(False), NUMBER: Constant(0), TEXT: Constant("", quoted=True), UNDEFINED: NO_VALUE}  # noqa: FBT003
+"""The values that count as false; NaN is none of ours."""
+MAX_WHOLE = 2**53
+"""Whole numbers up to it are the same in ECMAScript, which rounds larger ones."""
+MAX_EXPONENT = 8
+MAX_NESTING = 50
+MAX_OPERATIONS = 100
+"""Of a term, counted after `Math.pow` is written out: `a + b - c` nests, and what follows recurses."""
+
+
+def condition(text: str, names: Names, place: Place | None = None) -> Expression:
+    """A `cond` as a condition.
+
+    Args:
+        text: the expression.
+        names: what it can name.
+        place: for errors.
+
+    Raises:
+        NotExpressibleError: it uses something that conditions cannot say, or relies on a conversion.
+        UnknownNameError: it uses data that the chart does not declare.
+    """
+    return _Parser(text, names, place).whole_condition()
+
+
+def term(text: str, names: Names, place: Place | None = None) -> Term:
+    """An `expr` as a term; see `condition`."""
+    return _Parser(text, names, place).whole_term()
+
+
+def joined(text: str, names: Names, place: Place | None = None) -> list[Term]:
+    """What a `log` shows: the terms that `+` joins, from the first string on; before it, numbers are added."""
+    return _Parser(text, names, place).whole_join()
+
+
+class _Parser:
+    def __init__(self, text: str, names: Names, place: Place | None) -> None:
+        self._text, self._place = text, place
+        self._scope = names if isinstance(names, Scope) else Scope(names)
+        self._tokens = tokens(text, place)
+        self._at = 0
+        self._depth = 0
+
+    def whole_condition(self) -> Expression:
+        found = self._condition(self._or())
+        self._end()
+        return found
+
+    def whole_term(self) -> Term:
+        found = self._as_term(self._or())
+        self._end()
+        return found
+
+    def whole_join(self) -> list[Term]:
+        parts = [self._as_term(self._product())]
+        while sign := self._take("+", "-"):
+            following = self._as_term(self._product())
+            if sign == "+" and (len(parts) > 1 or self._is_text(parts[0]) or self._is_text(following)):
+                parts.append(following)
+            elif len(parts) > 1:
+                raise self._refused("text cannot be computed with")
+            else:
+                parts = [self._arithmetic(sign, parts[0], following)]
+        self._end()
+        return parts
+
+    # -- words -------------------------------------------------------------------------------------------
+
+    def _next(self) -> Token:
+        token = self._tokens[self._at]
+        self._at += token.kind != "end"
+        return token
+
+    def _take(self, *signs: str) -> str | None:
+        token = self._tokens[self._at]
+        if token.kind == "sign" and token.text in signs:
+            self._at += 1
+            return token.text
+        return None
+
+    def _end(self) -> None:
+        if self._tokens[self._at].kind != "end":
+            raise self._refused(f"'{self._tokens[self._at].text}' does not belong there")
+
+    def _refused(self, why: str) -> NotExpressibleError:
+        return NotExpressibleError("expression", f"{why} in '{self._text}'", place=self._place)
+
+    # -- grammar, loosest first ------------------------------------------------------------------------------
+
+    def _or(self) -> Expression | Term:
+        parts = [self._and()]
+        while self._take("||"):
+            parts.append(self._and())
+        return parts[0] if len(parts) == 1 else Or(tuple(map(self._condition, parts)))
+
+    def _and(self) -> Expression | Term:
+        parts = [self._comparison()]
+        while self._take("&&"):
+            parts.append(self._comparison())
+        return parts[0] if len(parts) == 1 else And(tuple(map(self._condition, parts)))
+
+    def _comparison(self) -> Expression | Term:
+        left = self._sum()
+        sign = self._take(*_COMPARE)
+        if sign is None:
+            return left
+        first, second = self._as_term(left), self._as_term(self._sum())
+        self._check_comparison(sign, first, second)
+        return Comparison(_COMPARE[sign], first, second)
+
+    def _sum(self) -> Expression | Term:
+        left = self._product()
+        while sign := self._take("+", "-"):
+            left = self._arithmetic(sign, left, self._product())
+        return left
+
+    def _product(self) -> Expression | Term:
+        left = self._unary()
+        while sign := self._take("*", "/"):
+            left = self._arithmetic(sign, left, self._unary())
+        return left
+
+    def _unary(self) -> Expression | Term:
+        self._depth += 1
+        if self._depth > MAX_NESTING:
+            raise self._refused("nested too deeply")
+        found = self._prefixed()
+        self._depth -= 1
+        return found
+
+    def _prefixed(self) -> Expression | Term:
+        if self._take("!"):
+            return Not(self._condition(self._unary()))
+        if self._take("-"):
+            inner = self._number(self._unary())
+            return Constant(-inner.value) if isinstance(inner, Constant) else Arithmetic("-", (inner,))  # type: ignore[operator]
+        if self._take("("):
+            inner_part = self._or()
+            self._close()
+            return inner_part
+        return self._simple(self._next())
+
+    def _simple(self, token: Token) -> Expression | Term:
+        if token.kind == "number":
+            number = float(token.text)
+            if not math.isfinite(number):
+                raise self._refused("a number is too large")
+            if token.text[:1] == "0" and token.text[1:2].isdigit():
+                raise self._refused(f"'{token.text}' is octal, or an error,")
+            return Constant(int(number) if number.is_integer() and number <= MAX_WHOLE else number)
+        if token.kind == "text":
+            if token.text == NO_VALUE.value:
+                raise self._refused("the text 'undefined' stands for no value")
+            return Constant(token.text, quoted=True)
+        if token.kind != "name":
+            raise self._refused(f"'{token.text or 'the end'}' does not belong there")
+        if token.text in {"true", "false"}:
+            return Constant(token.text == "true")
+        if token.text == NO_VALUE.value and token.text not in self._scope.names:
+            return NO_VALUE
+        if self._take("("):
+            return self._call(token.text)
+        return Variable(self._variable(token.text))
+
+    def _call(self, function: str) -> Expression | Term:
+        if function == "In":
+            state = self._next()
+            self._close()
+            if state.kind != "text":
+                raise self._refused("In() takes the name of a state in quotes,")
+            return Atom(IN_STATE, (Constant(state.text, quoted=True),))
+        if function == "Math.pow":
+            base = self._number(self._sum())
+            exponent = self._as_term(self._sum()) if self._take(",") else None
+            self._close()
+            if isinstance(exponent, Constant) and _is_number(exponent) and exponent.value in range(2, MAX_EXPONENT + 1):
+                return self._bounded(Arithmetic("*", (base,) * int(exponent.value)))
+        raise self._refused(f"the function {function}() cannot be called")
+
+    def _close(self) -> None:
+        if not self._take(")"):
+            raise self._refused("a bracket is not closed")
+
+    def _variable(self, name: str) -> str:
+        if name in self._scope.names:
+            return self._scope.names[name]
+        if name == "_event.data" or name.startswith("_event.data."):
+            attribute = name.removeprefix("_event.data").removeprefix(".")
+            if "." not in attribute:
+                self._scope.check_read(attribute or WHOLE, self._place)
+                return f"event.{attribute.lower() or 'data'}"
+        if name.startswith("_") or "." in name or name in {"null", "typeof", "function", "new"}:
+            raise self._refused(f"'{name}' has no counterpart")
+        raise UnknownNameError(f"there is no data '{name}'", place=self._place, found=name, valid=self._scope.names)
+
+    # -- kinds -------------------------------------------------------------------------------------------
+
+    def _arithmetic(self, sign: str, left: Expression | Term, right: Expression | Term) -> Term:
+        sides = (self._number(left), self._number(right))
+        if sign == "/" and not (isinstance(sides[1], Constant) and sides[1].value):
+            raise self._refused("only a number other than 0 divides: 1 / 0 is Infinity")
+        return self._bounded(Arithmetic(sign, sides))
+
+    def _number(self, part: Expression | Term) -> Term:
+        """A side of what is computed or ordered."""
+        found = self._as_term(part)
+        if isinstance(found, Constant) and not _is_number(found):
+            raise self._refused("text cannot be computed with")
+        if not self._scope.want(found, NUMBER):
+            raise self._refused(f"{self._written(found)} need not be a number, and would be converted,")
+        return found
+
+    def _is_text(self, found: Term) -> bool:
+        return self._scope.kinds_of(found) == {TEXT}
+
+    def _written(self, found: Term) -> str:
+        kinds = " or ".join(sorted(self._scope.kinds_of(found)))
+        return f"'{found.name}' ({kinds})" if isinstance(found, Variable) else f"a value ({kinds})"
+
+    def _check_comparison(self, sign: str, left: Term, right: Term) -> None:
+        """Refuse what ECMAScript would convert: `==` between kinds, and the order of what is no number."""
+        if sign not in {"===", "!==", "==", "!="}:
+            self._number(left), self._number(right)
+            return
+        kinds = self._scope.kinds_of(left), self._scope.kinds_of(right)
+        for one, known in ((left, kinds[1] - {UNDEFINED}), (right, kinds[0] - {UNDEFINED})):
+            if ANY not in known and len(known) == 1 and self._scope.want(one, *known):
+                return
+        pairs = {(a, b) for a in kinds[0] for b in kinds[1] if a != b or a == ANY}
+        if sign in {"==", "!="} and any(UNDEFINED not in pair for pair in pairs) and self._scope.data.kinds is not None:
+            found = f"{self._written(left)} and {self._written(right)}"
+            raise self._refused(f"'{sign}' may convert {found}; '{sign}=' does not,")
+
+    def _bounded(self, term: Arithmetic) -> Term:
+        if _operations(term) > MAX_OPERATIONS:
+            raise self._refused(f"more than {MAX_OPERATIONS} operations")
+        return term
+
+    def _condition(self, part: Expression | Term) -> Expression:
+        if isinstance(part, Constant):
+            return TRUE if part.value and part != NO_VALUE else Or(())
+        return self._truth(part) if isinstance(part, Term) else part
+
+    def _truth(self, value: Term) -> Expression:
+        """Whether a value counts as true: it is none of those that count as false."""
+        kinds = self._scope.kinds_of(value)
+        if kinds <= {BOOLEAN, UNDEFINED} or self._scope.want(value, BOOLEAN):
+            return Comparison("=", value, Constant(True))  # noqa: FBT003  # a value to compare with
+        if ANY in kinds:
+            raise self._refused(f"{self._written(value)} would be converted to a truth value")
+        parts = [Comparison("!=", value, _FALSE[kind]) for kind in sorted(kinds)]
+        return parts[0] if len(parts) == 1 else And(tuple(parts))
+
+    def _as_term(self, part: Expression | Term) -> Term:
+        if not isinstance(part, Term):
+            raise self._refused("a condition is no value")
+        return part
+
+
+def _operations(term: Term) -> int:
+    return len(term.args) - 1 + sum(map(_operations, term.args)) if isinstance(term, Arithmetic) else 0
+
+
+def _is_number(constant: Constant) -> bool:
+    return isinstance(constant.value, int | float) and not isinstance(constant.value, bool)

@@ -1,0 +1,203 @@
+"""The kinds of values that a chart's data and events have: what ECMAScript converts is translated rightly or refused.
+
+The kinds follow from the document alone: from what `data`, `assign` and `send` give. An event that the chart does not
+fire itself comes from outside; its attributes are declared under `receives`, with the type that the chart needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from dsc.engine.transition_selection import matches
+from dsc.errors import NotExpressibleError
+from knowledge_base.errors import Place
+from knowledge_base.language.expression import Arithmetic, Constant, Term, Variable
+
+NUMBER, TEXT, BOOLEAN = "number", "text", "boolean"
+UNDEFINED = "undefined"
+ANY = "any"
+NO_VALUE = Constant("undefined", quoted=True)
+"""ECMAScript's `undefined`, which is none of our values: no other text of an imported chart is spelt so."""
+Kinds = frozenset[str]
+WHOLE = ""
+"""The key of `_event.data` itself, beside those of its properties."""
+_EVENT = "event."
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """An event that the chart fires.
+
+    Attributes:
+        event: its name.
+        carries: what it carries, by the spelling in the document; `None` if it has no data.
+        scope: where its terms stand.
+    """
+
+    event: str
+    carries: Mapping[str, Term] | None
+    scope: Scope
+
+
+@dataclass(slots=True)
+class Data:
+    """What the whole chart knows about its data.
+
+    Attributes:
+        kinds: variable -> kinds of its values; `None` while they are worked out: nothing is checked then.
+        sent: the events that the chart fires.
+        received: events from outside -> attributes that the chart reads, in lower case -> their types.
+        spelt: those attributes -> their spelling.
+    """
+
+    kinds: dict[str, Kinds] | None = None
+    sent: list[Sent] = field(default_factory=list)
+    received: dict[str, dict[str, str]] = field(default_factory=dict)
+    spelt: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """What an expression can name.
+
+    Attributes:
+        names: the chart's data by their own spelling -> the name of the plot's variable.
+        data: what is known about them.
+        events: descriptors of the events of which one is `_event`; `None` if it can be any.
+    """
+
+    names: Mapping[str, str]
+    data: Data = field(default_factory=Data)
+    events: tuple[str, ...] | None = None
+
+    def on(self, events: Iterable[str]) -> Scope:
+        """The scope of a transition with these descriptors; of one without, any event may have been the last."""
+        return replace(self, events=tuple(events) or None)
+
+    def kinds_of(self, term: Term) -> Kinds:
+        """The kinds of values that a term has."""
+        if isinstance(term, Constant):
+            return frozenset({_kind(term.value)})
+        if isinstance(term, Arithmetic):
+            return frozenset({NUMBER})
+        if not isinstance(term, Variable) or self.data.kinds is None:
+            return frozenset({ANY})
+        if not term.name.startswith(_EVENT):
+            return self.data.kinds.get(term.name, frozenset({UNDEFINED}))
+        return self._kinds_of_attribute(term.name.removeprefix(_EVENT))
+
+    def check_read(self, attribute: str, place: Place | None) -> None:
+        """Refuse `_event.data.ATTRIBUTE` (or `_event.data`, for `WHOLE`) where ECMAScript would find something else.
+
+        Raises:
+            NotExpressibleError: an event that may be the last one has other data, or spells it otherwise.
+        """
+        if self.data.kinds is None:
+            return
+        what = f"_event.data.{attribute}" if attribute else "_event.data"
+        if not attribute and (self._outside() or self._has_platforms()):
+            raise _refused(f"'{what}' of an event that is not sent with <content> has no counterpart", place)
+        for sent in self._candidates():
+            if sent.carries is None:
+                if not attribute:
+                    raise _refused(f"'{what}' is undefined for the event '{sent.event}'", place)
+            elif attribute not in sent.carries:
+                raise _refused(f"'{what}' is undefined for the event '{sent.event}', which has other data", place)
+        for event in self._outside():
+            known = self.data.spelt.setdefault(attribute.lower(), attribute)
+            if known != attribute:
+                raise _refused(f"'{what}' is spelt '{known}' elsewhere, and names are folded to lower case", place)
+            self.data.received[event].setdefault(attribute.lower(), "")
+
+    def want(self, term: Term, kind: str) -> bool:
+        """Whether a term has this kind; an attribute from outside is declared to have it."""
+        kinds = self.kinds_of(term)
+        if self.data.kinds is None:
+            return True
+        if kinds - {ANY} not in ({kind}, frozenset()) or not kinds:
+            return False
+        if ANY not in kinds:
+            return True
+        if not isinstance(term, Variable) or not term.name.startswith(_EVENT):
+            return False
+        return self._declare(term.name.removeprefix(_EVENT), kind)
+
+    def _declare(self, attribute: str, kind: str) -> bool:
+        events = self._outside()
+        if self.events is None or "*" in self.events:  # which event it is, nobody knows
+            return False
+        for event in events:
+            declared = self.data.received[event]
+            if declared.get(attribute, "") not in {"", kind}:
+                return False
+            declared[attribute] = kind
+        return bool(events)
+
+    def _kinds_of_attribute(self, attribute: str) -> Kinds:
+        found = {kind for sent in self._candidates() for kind in _carried(sent, attribute)}
+        return frozenset(found | ({ANY} if self._outside() else set()))
+
+    def _candidates(self) -> list[Sent]:
+        return [one for one in self.data.sent if self.events is None or any(matches(d, one.event) for d in self.events)]
+
+    def _outside(self) -> list[str]:
+        """The events from outside that may be the last one."""
+        if self.events is None:
+            return [*self.data.received]
+        return [event for event in self.data.received if any(matches(d, event) for d in self.events)]
+
+    def _has_platforms(self) -> bool:
+        """Whether an event of the interpreter itself, which has no data, may be the last one."""
+        return self.events is None or any(d.startswith(("done.", "error.", "*")) for d in self.events)
+
+
+def _carried(sent: Sent, attribute: str) -> Iterable[str]:
+    for name, term in (sent.carries or {}).items():
+        if (name.lower() or "data") == attribute:
+            yield from sent.scope.kinds_of(term)
+
+
+def _kind(value: object) -> str:
+    if isinstance(value, bool):
+        return BOOLEAN
+    if value == NO_VALUE.value:
+        return UNDEFINED
+    return NUMBER if isinstance(value, int | float) else TEXT
+
+
+def _refused(why: str, place: Place | None) -> NotExpressibleError:
+    return NotExpressibleError("expression", why, place=place)
+
+
+def work_out(data: Data, given: Iterable[tuple[str, Term | None, Scope]]) -> None:
+    """Work out the kinds of all variables.
+
+    Args:
+        data: where they are put down.
+        given: what gives a variable a value, with the scope of the term; `None` leaves it undefined.
+    """
+    listed = list(given)
+    data.kinds = {name: frozenset() for name, _, _ in listed}
+    _spread(data.kinds, listed, frozenset({ANY}))
+    for name, term, scope in listed:
+        if term is not None and ANY in scope.kinds_of(term):
+            known = data.kinds[name] - {UNDEFINED}
+            if len(known) != 1 or not scope.want(term, *known):
+                data.kinds[name] |= {ANY}
+    _spread(data.kinds, [one for one in listed if not _is_attribute(one[1])], frozenset())
+
+
+def _spread(kinds: dict[str, Kinds], given: list[tuple[str, Term | None, Scope]], without: Kinds) -> None:
+    changed = True
+    while changed:
+        changed = False
+        for name, term, scope in given:
+            more = frozenset({UNDEFINED}) if term is None else scope.kinds_of(term) - without
+            if not more <= kinds[name]:
+                kinds[name] |= more
+                changed = True
+
+
+def _is_attribute(term: Term | None) -> bool:
+    return isinstance(term, Variable) and term.name.startswith(_EVENT)

@@ -1,5 +1,0 @@
-"""Pictures of plots: a neutral layout in `layout`, drawn as SVG by `svg`; begin with `drawing.draw`."""
-
-from dsc.text.diagram.drawing import draw, lay_out
-
-__all__ = ["draw", "lay_out"]

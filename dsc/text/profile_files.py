@@ -1,0 +1,55 @@
+"""Profile files: YAML, read as plots are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from dsc.model.profile import Profile
+from dsc.text.form import read_model
+from dsc.text.text_files import read_file
+from dsc.text.yaml import dump, load_document
+from knowledge_base.errors import InputError
+
+
+def parse_profile(text: str, source: str | None = None) -> Profile:
+    """Read a profile from YAML text.
+
+    Raises:
+        InputError: it is none; the message has the place and the nearest valid key.
+    """
+    document = load_document(text, source)
+    return read_model(Profile, document).written_at(document.places)
+
+
+def load_profile(path: Path | str) -> Profile:
+    """Read a profile file; see `parse_profile`."""
+    return parse_profile(read_file(path), str(path))
+
+
+def profile_to_yaml(profile: Profile) -> str:
+    """The profile as YAML; reading it gives the same profile."""
+    return dump(profile.model_dump(mode="json", by_alias=True, exclude_defaults=True))
+
+
+def find_profile(name: str, folder: Path) -> Profile:
+    """The profile of that name in a folder, or else in the file of that path.
+
+    Raises:
+        InputError: there is neither, or it is no profile; the message has the nearest name.
+    """
+    known = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+    if name in known:
+        return load_profile(known[name])
+    if Path(name).suffix in {".yaml", ".yml"}:
+        return load_profile(name)
+    raise InputError(f"there is no profile '{name}', nor a file (*.yaml) of that name", found=name, valid=known)
+
+
+def profile_schema() -> dict[str, Any]:
+    """The JSON Schema of profile files, for editors."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "profile",
+        **Profile.model_json_schema(by_alias=True),
+    }

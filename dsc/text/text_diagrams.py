@@ -1,0 +1,122 @@
+"""Plots in the text forms of Mermaid (stateDiagram-v2) and PlantUML, which agree in nearly everything."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from dsc.drawing.captions import block_texts, full_text, labelled, seconds_text
+from dsc.model.connectors import Connector
+from dsc.model.plot import ActionPlot, Scope, initial_of
+from dsc.model.states import (
+    AnyState,
+    CompositeState,
+    DynamicState,
+    FinalState,
+    HistoryState,
+    OrthogonalState,
+    State,
+    SubmachineState,
+)
+from dsc.model.transitions import TransitionSource
+from dsc.text.targets import require_targets
+
+
+def to_mermaid(plot: ActionPlot) -> str:
+    """The plot as a Mermaid state diagram; raises `UnknownNameError` if it leads to a state that it has not."""
+    return "\n".join(["stateDiagram-v2", *_Writer(plot, hulls_have_rows=False).lines()]) + "\n"
+
+
+def to_plantuml(plot: ActionPlot) -> str:
+    """The plot as a PlantUML state diagram; errors as for `to_mermaid`."""
+    lines = _Writer(plot, hulls_have_rows=True).lines()
+    return "\n".join(["@startuml", f"title {plot.name}", *lines, "@enduml"]) + "\n"
+
+
+class _Writer:
+    """States get short names of their own, since theirs may hold anything.
+
+    Mermaid refuses rows of text in states with states inside (`hulls_have_rows`); their titles say it then.
+    """
+
+    def __init__(self, plot: ActionPlot, *, hulls_have_rows: bool) -> None:
+        require_targets(plot)
+        self._plot, self._hulls_have_rows = plot, hulls_have_rows
+        self._alias = {name: f"s{number}" for number, (name, _, _) in enumerate(plot.walk(), start=1)}
+
+    def lines(self) -> Iterator[str]:
+        yield from self._scope(self._plot, "  ")
+        for name, state, _ in self._plot.walk():
+            yield from self._edges(name, state)
+
+    def _scope(self, scope: Scope, indent: str) -> Iterator[str]:
+        yield from self._states(scope.states, indent)
+        yield f"{indent}[*] --> {self._alias[initial_of(scope)]}"
+
+    def _states(self, states: Mapping[str, AnyState], indent: str) -> Iterator[str]:
+        for name, state in states.items():
+            if isinstance(state, Connector):  # a choice has no title in these forms
+                yield f"{indent}state {self._alias[name]} <<choice>>"
+                continue
+            rows = [_safe(text) for text in _rows(state)]
+            in_title = isinstance(state, CompositeState | OrthogonalState) and not self._hulls_have_rows
+            title = "<br/>".join([_safe(_title(name, state)), *(rows if in_title else ())])
+            yield f'{indent}state "{title}" as {self._alias[name]}'
+            if isinstance(state, CompositeState | OrthogonalState):
+                yield f"{indent}state {self._alias[name]} {{"
+                yield from self._inside(state, indent + "  ")
+                yield f"{indent}}}"
+            if isinstance(state, FinalState):
+                yield f"{indent}{self._alias[name]} --> [*]"
+            if not in_title:
+                yield from (f"{indent}{self._alias[name]} : {text}" for text in rows)
+
+    def _inside(self, state: CompositeState | OrthogonalState, indent: str) -> Iterator[str]:
+        if isinstance(state, CompositeState):
+            yield from self._scope(state, indent)
+            return
+        for number, region in enumerate(state.regions.values()):
+            if number:
+                yield f"{indent}--"
+            else:
+                yield from self._states(state.connectors, indent)
+            yield from self._scope(region, indent)
+
+    def _edges(self, name: str, state: AnyState) -> Iterator[str]:
+        if isinstance(state, HistoryState):
+            yield f"  {self._alias[name]} --> {self._alias[state.target]}"
+        if not isinstance(state, TransitionSource):
+            return
+        for one in labelled(state):
+            text = _safe(full_text(one))
+            label = f" : {text}" if text else ""
+            for target in one.transition.targets:
+                yield f"  {self._alias[name]} --> {self._alias[target]}{label}"
+
+
+def _rows(state: AnyState) -> Iterator[str]:
+    """What a state says besides its name: how long it lasts, its actions, the events that do not leave it."""
+    if not isinstance(state, State):
+        return
+    if state.at_least is not None:
+        yield f"at least {seconds_text(state.at_least)}"
+    yield from block_texts(state)
+    yield from (full_text(one) for one in labelled(state) if one.transition.target is None)
+
+
+def _title(name: str, state: AnyState) -> str:
+    match state:
+        case HistoryState(history=depth):
+            return f"{name} (H{'*' if depth == 'deep' else ''})"
+        case FinalState(emit=str(event)):
+            return f"{name} ^{event}"
+        case SubmachineState(use=use):
+            return f"{name} = {use}"
+        case DynamicState(dynamic=candidates):
+            return f"{name} = one of {', '.join(candidates) or 'what is planned'}"
+        case _:
+            return name
+
+
+def _safe(text: str) -> str:
+    """What means something in these forms, spelled so that it does not: quotes, colons, line ends."""
+    return " ".join(text.split()).replace('"', "'").replace(":=", "=").replace(":", ".").replace(";", ",")

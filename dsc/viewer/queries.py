@@ -1,0 +1,211 @@
+"""Queries of the page: the knowledge of a moment, replayed from records with checkpoints, within bounds."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from threading import Lock
+from typing import Any, Generic, TypeVar
+
+from dsc.viewer.records import RecordLog
+from knowledge_base.errors import InputError, OutOfBoundsError, UnknownNameError
+from knowledge_base.exchange.json_forms import delta_of, schema_of, world_of
+from knowledge_base.facts import Fact
+from knowledge_base.language.explanation import Explanation
+from knowledge_base.language.expression import Expression, variables_in_order
+from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.printer import to_text
+from knowledge_base.language.question_bounds import Bounds
+from knowledge_base.view import View
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
+
+CHECKPOINT_EVERY = 500
+"""Records that are replayed at most to get to a moment."""
+
+_TYPE = re.compile(r'"type": "([^"]*)"')
+_S = TypeVar("_S")
+
+
+class RecordReplay(Generic[_S]):
+    """A state that records make, at any of them.
+
+    Args:
+        log: the records.
+        types: which of them matter.
+        begin: the state before the first record.
+        copy: an independent state that says the same.
+        advance: the state after a record, made from the one before, which it may change.
+    """
+
+    def __init__(
+        self,
+        log: RecordLog,
+        types: frozenset[str],
+        begin: _S,
+        copy: Callable[[_S], _S],
+        advance: Callable[[_S, Mapping[str, Any]], _S],
+    ) -> None:
+        self._log, self._types, self._copy, self._advance = log, types, copy, advance
+        self._seqs: list[int] = []
+        self._scanned = 0
+        self._checkpoints: list[_S] = [begin]
+        self._lock = Lock()
+
+    def at(self, seq: int) -> _S:
+        """The state after the record with that number.
+
+        Raises:
+            InputError: there is no such record.
+        """
+        if not 0 <= seq <= len(self._log):
+            raise InputError(f"there is no record {seq}; the last one is {len(self._log)}")
+        with self._lock:
+            self._scan(seq)
+            count = bisect_right(self._seqs, seq)
+            start = min(count // CHECKPOINT_EVERY, len(self._checkpoints) - 1)
+            state = self._copy(self._checkpoints[start])
+            for number in range(start * CHECKPOINT_EVERY, count):
+                state = self._advanced(state, self._seqs[number])
+                if (number + 1) % CHECKPOINT_EVERY == 0 and (number + 1) // CHECKPOINT_EVERY == len(self._checkpoints):
+                    self._checkpoints.append(self._copy(state))
+            return state
+
+    def _advanced(self, state: _S, seq: int) -> _S:
+        try:
+            return self._advance(state, self._log.record(seq))
+        except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+            raise InputError(f"record {seq} is damaged, and what follows from it is not known: {error!r}") from None
+
+    def _scan(self, seq: int) -> None:
+        """Find the records that matter, up to `seq`; their type stands at the beginning of the line."""
+        while self._scanned < seq:
+            self._scanned += 1
+            found = _TYPE.search(self._log.line(self._scanned), 0, 120)
+            if found is not None and found[1] in self._types:
+                self._seqs.append(self._scanned)
+
+
+@dataclass(slots=True)
+class Known:
+    """A world with its version."""
+
+    state: WorldState
+    version: int
+
+
+def knowledge(log: RecordLog) -> RecordReplay[Known]:
+    """The knowledge at any record."""
+    begin = Known(WorldState(Schema()), 0)
+    return RecordReplay(
+        log, frozenset({"world", "knowledge"}), begin, lambda k: Known(k.state.copy(), k.version), _known
+    )
+
+
+def _known(before: Known, record: Mapping[str, Any]) -> Known:
+    said = dict(record)
+    if record["type"] == "world":
+        return Known(world_of(said, schema_of(said["schema"])), record["version"])
+    before.state.commit(delta_of(said))
+    before.version = record["version"]
+    return before
+
+
+Form = Mapping[str, Any]
+Left = Callable[[], bool]
+"""Whether whoever asked is gone."""
+
+MOST_TEXT = 10_000
+"""Characters of an expression or statement from a browser."""
+MOST_SECONDS = 5.0
+"""Of an answer to a browser; behind it the question is given up."""
+MOST_ANSWERS = 10_000
+"""Answers, facts and numbers that a browser gets at once; `more` says that there are others."""
+MOST_EXPLAINED = 1.0
+"""Seconds to find out why an answer is what it is, which is left out otherwise."""
+
+
+def _still_there() -> bool:
+    return False
+
+
+class PageQueries:
+    """Answers to one page's questions, each a JSON value; a question that makes no sense is an `InputError`.
+
+    A question takes `MOST_SECONDS` at most, and ends when `left` says that whoever asked is gone.
+    """
+
+    def __init__(self, log: RecordLog) -> None:
+        self._log = log
+        self._knowledge = knowledge(log)
+
+    def query(self, asked: Form, left: Left = _still_there) -> dict[str, Any]:
+        """Who makes the expression true, or whether it is true and why."""
+        view = self._view(asked)
+        params = asked.get("params") or {}
+        condition = parse_condition(_text(asked, "expression"), "EXPR")
+        variables = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
+        bounds = Bounds(seconds=MOST_SECONDS, cancelled=left)
+        answers = view.query(condition, params, MOST_ANSWERS + 1, bounds)
+        said = {"variables": variables, "holds": bool(answers), "answers": answers, "version": view.version}
+        if len(answers) > MOST_ANSWERS:
+            return {**said, "answers": answers[:MOST_ANSWERS], "more": True}
+        return said if variables else {**said, "why": _why(view, condition, params, left, holds=bool(answers))}
+
+    def facts(self, asked: Form, left: Left = _still_there) -> dict[str, Any]:  # noqa: ARG002  it takes a moment
+        """All that is known, or all that is known about one thing."""
+        view, about = self._view(asked), asked.get("about")
+        things, facts, values = view.nodes(), view.facts(), view.values()
+        if about is not None:
+            if about not in things:
+                raise UnknownNameError(f"there is no object '{about}'", found=str(about), valid=things)
+            facts = [fact for fact in facts if about in fact.args]
+            values = {fluent: value for fluent, value in values.items() if about in fluent.args}
+            near = {arg for fact in (*facts, *values) for arg in fact.args} | {about}
+            things = {name: kind for name, kind in things.items() if name in near}
+        said = {
+            "version": view.version,
+            "things": dict(islice(things.items(), MOST_ANSWERS)),
+            "facts": [_listed(fact) for fact in facts[:MOST_ANSWERS]],
+            "values": [[*_listed(fluent), value] for fluent, value in islice(values.items(), MOST_ANSWERS)],
+        }
+        return {**said, "more": True} if max(map(len, (things, facts, values))) > MOST_ANSWERS else said
+
+    def _view(self, asked: Form) -> View:
+        known = self._knowledge.at(_seq(asked))
+        return View(known.state, known.version)
+
+
+def _why(view: View, condition: Expression, params: Mapping[str, Any], left: Left, *, holds: bool) -> dict[str, Any]:
+    try:
+        return view.explain(condition, params, bounds=Bounds(seconds=MOST_EXPLAINED, cancelled=left)).to_json()
+    except OutOfBoundsError as error:
+        return Explanation(to_text(condition), holds, detail=str(error)).to_json()
+
+
+def _listed(fact: Fact) -> list[Any]:
+    return [fact.predicate, *fact.args]
+
+
+def _seq(asked: Form) -> int:
+    seq = asked.get("seq")
+    if isinstance(seq, bool) or not isinstance(seq, int):
+        raise InputError("'seq' is the number of a record")
+    return seq
+
+
+def _text(asked: Form, name: str) -> str:
+    said = asked.get(name)
+    if not isinstance(said, str):
+        raise InputError(f"'{name}' is a text")
+    require_short(said, name)
+    return said
+
+
+def require_short(text: str, name: str) -> None:
+    """Raise `InputError` for a text from a browser that is longer than `MOST_TEXT`."""
+    if len(text) > MOST_TEXT:
+        raise InputError(f"'{name}' has {len(text)} characters; a browser may send {MOST_TEXT}")

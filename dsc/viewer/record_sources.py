@@ -1,0 +1,137 @@
+"""Record sources of the page: a trace, a kept run, or a knowledge store, read while a writer appends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from threading import Event, Thread
+from typing import TYPE_CHECKING
+
+from dsc.sequencer.run_tables import archive, has_run
+from dsc.trace import Record, header
+from dsc.viewer.records import RecordLog, read_trace
+from knowledge_base.errors import HistoryError, Place, StoreError
+from knowledge_base.exchange.json_forms import delta_form, schema_form, world_form
+from knowledge_base.journal.sidecar_files import is_database
+from knowledge_base.store import KnowledgeBase
+
+if TYPE_CHECKING:
+    from dsc.viewer.records import RecordLog
+    from knowledge_base.facts import Change
+
+
+LOOK_EVERY_S = 0.2
+
+
+@contextmanager
+def followed(log: RecordLog, look: Callable[[], bool]) -> Iterator[RecordLog]:
+    """The log, which `look` adds to while the block lasts, until it says that there will be no more or cannot go on."""
+    over = Event()
+
+    def looking() -> None:
+        while not over.wait(LOOK_EVERY_S):
+            try:
+                if not look():
+                    break
+            except (HistoryError, StoreError):
+                break
+        log.end()
+
+    thread = Thread(target=looking, daemon=True)
+    thread.start()
+    try:
+        yield log
+    finally:
+        over.set()
+        thread.join()
+
+
+@contextmanager
+def following_run(path: Path) -> Iterator[RecordLog]:
+    """The records of the last run in a store; while the block lasts, those that it goes on to make as well.
+
+    Raises:
+        StoreError: the file is not there, not a store, has no run, or cannot be read.
+    """
+    with archive(path) as runs:
+        run = runs.run()
+    log = RecordLog(header(**run.header), live=True)
+    place = 0
+
+    def look() -> bool:
+        nonlocal place
+        with archive(path, again=True) as runs:
+            for here, line in runs.lines(run.number, place):
+                if (record := _record(line, len(log), path)).seq > len(log):  # a macrostep may get more at its end
+                    log.hear(record)
+                place = here
+            return runs.run(run.number).ended is None
+
+    if look():
+        with followed(log, look):
+            yield log
+    else:
+        log.end()
+        yield log
+
+
+def _record(line: str, last: int, path: Path) -> Record:
+    try:
+        return Record.from_line(line)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise StoreError(f"a record after record {last} is damaged: {error!r}", place=Place(str(path))) from None
+
+
+@contextmanager
+def following_store(path: Path) -> Iterator[RecordLog]:
+    """The records of a store; while the block lasts, those of changes that others make as well.
+
+    Time begins with the first change that is still kept. Changes are followed until the store is compacted beyond
+    what was taken in, or its schema grows; then the log ends.
+
+    Raises:
+        StoreError: it is not there, is no store, or cannot be read.
+    """
+    with KnowledgeBase.open(None, path, read_only=True) as kb:
+        changes = kb.changes(kb.oldest)
+        log = RecordLog(_header(path, changes), live=True)
+        start = changes[0].time if changes else None
+        first = kb.at(version=kb.oldest)
+        log.hear(Record(1, 0.0, "world", None, {
+            "version": first.version, "schema": schema_form(first.schema), **world_form(first.snapshot()),
+        }))  # fmt: skip
+
+        def hear(change: Change) -> None:
+            nonlocal start
+            start = change.time if start is None else start
+            said = {"version": change.version, "author": change.author, **delta_form(change.delta)}
+            log.hear(Record(len(log) + 1, change.time - start, "knowledge", None, said))
+
+        for change in changes:
+            hear(change)
+        kb.subscribe(hear)
+        with followed(log, lambda: kb.refresh() >= 0):
+            yield log
+
+
+def _header(path: Path, changes: list[Change]) -> str:
+    began = {"began": datetime.fromtimestamp(changes[0].time, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")} if changes else {}
+    return header(run=path.name, store=True, **began)
+
+
+@contextmanager
+def records_of(path: Path) -> Iterator[RecordLog]:
+    """The records in a file, by what the file is; of a store, also those that come while the block lasts.
+
+    Of a store with runs in it, those of its last run; of another one, the changes of what is known.
+
+    Raises:
+        InputError: there is no such file, or it is neither a trace nor a store.
+    """
+    if is_database(path):
+        with (following_run if has_run(path) else following_store)(path) as log:
+            yield log
+    else:
+        yield read_trace(path)

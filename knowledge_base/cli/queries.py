@@ -1,0 +1,186 @@
+"""Commands that look at a world as it is, or as it was."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from knowledge_base.cli.inputs import Domain, Json, Source, Store, opened, opened_store
+from knowledge_base.cli.printing import print_json, print_json_list, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from knowledge_base.exchange.pddl import ProblemText
+    from knowledge_base.facts import Value
+    from knowledge_base.language.expression import Expression
+    from knowledge_base.view import View
+
+Expr = Annotated[str, typer.Argument(metavar="EXPR", help="A condition; ?x is asked for.")]
+Question = Annotated[str, typer.Argument(metavar="EXPR", help="A condition without open variables.")]
+Params = Annotated[
+    list[str] | None, typer.Option("--param", "-p", metavar="x=VALUE", help="A value for ?x; may be repeated.")
+]
+Explain = Annotated[bool, typer.Option("--explain", help="Show how the query will be looked up.")]
+Why = Annotated[bool, typer.Option("--why", help="Show each part with its truth, and what decides.")]
+Limit = Annotated[int | None, typer.Option("--limit", min=1, help="Give so many answers at most, and look no further.")]
+Seconds = Annotated[float | None, typer.Option("--seconds", min=0.0, help="Give the question up after so long.")]
+NO = 1
+"""Exit status of an answer `no`; 2 is a mistake, as for every command."""
+
+
+def query(
+    source: Source,
+    expression: Expr,
+    domain: Domain = None,
+    param: Params = None,
+    explain: Explain = False,
+    limit: Limit = None,
+    seconds: Seconds = None,
+    json: Json = False,
+) -> None:
+    """List the values of EXPR's variables that make it true, e.g. '(and (on ?o table1) (cup ?o))'."""
+    with opened(source, domain) as (kb, _):
+        if not explain:
+            _answer(kb, expression, _params(param), limit, seconds, as_json=json)
+            return
+        plan = kb.explain_query(_parsed(expression), _params(param))
+    if json:
+        print_json(asdict(plan))
+    else:
+        typer.echo(str(plan))
+
+
+def ask(
+    source: Source,
+    expression: Question,
+    domain: Domain = None,
+    param: Params = None,
+    why: Why = False,
+    seconds: Seconds = None,
+    json: Json = False,
+) -> None:
+    """Say whether EXPR is true. Exit status: 0 yes, 1 no."""
+    from knowledge_base.cli.printing import explanation_lines
+    from knowledge_base.language.question_bounds import Bounds
+
+    with opened(source, domain) as (kb, _):
+        explanation = kb.explain(_parsed(expression), _params(param), bounds=Bounds(seconds=seconds))
+    if json:
+        print_json({"holds": explanation.truth, "why": explanation.to_json()})
+    else:
+        typer.echo("yes" if explanation.truth else "no")
+        if why:
+            typer.echo("\n".join(explanation_lines(explanation)))
+    raise typer.Exit(0 if explanation.truth else NO)
+
+
+def show(
+    source: Source,
+    thing: Annotated[str | None, typer.Argument(metavar="[THING]", help="Only what is about this thing.")] = None,
+    domain: Domain = None,
+    json: Json = False,
+) -> None:
+    """Show a world's things, facts and what functions are worth, and a problem's goal; or all that is about THING."""
+    with opened(source, domain) as (kb, problem):
+        _show(kb, problem, thing, as_json=json)
+
+
+def at(
+    store: Store,
+    when: Annotated[str, typer.Argument(metavar="WHEN", help="A version, or a time such as 2026-11-21T16:40.")],
+    expression: Annotated[str | None, typer.Argument(metavar="[EXPR]", help="Ask this instead of showing all.")] = None,
+    param: Params = None,
+    limit: Limit = None,
+    seconds: Seconds = None,
+    json: Json = False,
+) -> None:
+    """Show a store's world of then, or ask it."""
+    from knowledge_base.cli.versions import moment
+
+    with opened_store(store) as kb:
+        then = kb.at(**moment(when))
+        if expression is None:
+            _show(then, None, None, as_json=json)
+        else:
+            _answer(then, expression, _params(param), limit, seconds, as_json=json)
+
+
+def _answer(
+    world: View,
+    expression: str,
+    params: Mapping[str, Value],
+    limit: int | None,
+    seconds: float | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Print the answers as they are found; nobody has them all in memory."""
+    from itertools import chain, islice
+
+    from knowledge_base.language.expression import variables_in_order
+    from knowledge_base.language.question_bounds import Bounds
+
+    condition = _parsed(expression)
+    answers = world.stream(condition, params, bounds=Bounds(seconds=seconds))
+    answers = islice(answers, limit)
+    names = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
+    first = list(islice(answers, 1))  # what is wrong with the question comes before anything is printed
+    answers = chain(first, answers)
+    if as_json:
+        print_json_list(answers, {"variables": names, "holds": bool(first)}, "answers")
+    elif names:
+        print_table([f"?{n}" for n in names], ([answer[n] for n in names] for answer in answers))
+    else:
+        typer.echo("yes" if first else "no")
+
+
+def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_json: bool) -> None:
+    from knowledge_base.errors import UnknownNameError
+    from knowledge_base.language.printer import to_text
+    from knowledge_base.spelling import value_text
+
+    things, facts, values = world.nodes(), world.facts(), world.values()
+    if thing is not None:
+        if thing not in things:
+            raise UnknownNameError(f"there is no object '{thing}'", found=thing, valid=things)
+        facts = [fact for fact in facts if thing in fact.args]
+        values = {fluent: number for fluent, number in values.items() if thing in fluent.args}
+        others = {arg for fact in (*facts, *values) for arg in fact.args}
+        things = {name: own for name, own in things.items() if name == thing or name in others}
+    if as_json:
+        said: dict[str, Any] = {"version": world.version}
+        if problem is not None:
+            said = {"problem": problem.name, "domain": problem.domain, "goal": to_text(problem.goal)}
+        contents = {str(fluent): content for fluent, content in values.items()}
+        print_json({**said, "objects": things, "facts": [str(f) for f in facts], "values": contents})
+        return
+    print_table(["thing", "type"], list(things.items()))
+    print_table(["fact"], [[f] for f in facts])
+    if values:
+        print_table(["function", "value"], [[f, value_text(v, quoted=isinstance(v, str))] for f, v in values.items()])
+    typer.echo(f"version {world.version}" if problem is None else f"goal: {to_text(problem.goal)}")
+
+
+def _parsed(expression: str) -> Expression:
+    from knowledge_base.language.parser import parse_condition
+
+    return parse_condition(expression, source="EXPR")
+
+
+def _params(said: list[str] | None) -> dict[str, Value]:
+    """`x=VALUE` as bindings; values are written as in the language."""
+    from knowledge_base.errors import InputError
+    from knowledge_base.language.expression import Constant
+    from knowledge_base.language.parser import parse_term
+
+    found: dict[str, Value] = {}
+    for one in said or ():
+        name, sign, text = one.partition("=")
+        value = parse_term(text, source=f"--param {name}") if sign and text else None
+        if not isinstance(value, Constant):
+            raise InputError(f"a parameter is written x=VALUE, not '{one}'")
+        found[name.removeprefix("?")] = value.value
+    return found

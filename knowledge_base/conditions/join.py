@@ -1,0 +1,299 @@
+"""Join of the installed conditions of one shape, kept up to date by what changes (Rete, Forgy 1982)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property, lru_cache
+
+from knowledge_base.conditions.alpha_index import (
+    ROWS,
+    AlphaIndex,
+    ConditionRow,
+    RowsWorld,
+    picker,
+    row_fact,
+    schema_with_rows,
+)
+from knowledge_base.conditions.condition_shape import Args, Shape
+from knowledge_base.conditions.dependencies import Occurrence, occurrences
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Value
+from knowledge_base.language.compiler import compile_query, compile_test
+from knowledge_base.language.expression import And, Atom, Expression, Variable, free_variables
+from knowledge_base.language.generated_code import test_source
+from knowledge_base.language.joins import conjuncts
+from knowledge_base.language.lookups import Search
+from knowledge_base.language.terms import Bindings
+from knowledge_base.world.index import FactIndex
+from knowledge_base.world.state import WorldState
+
+_source = lru_cache(maxsize=1024)(test_source)
+"""Written once for conditions that are installed again and again."""
+
+
+class DeltaJoin:
+    """An occurrence in a shape; it puts the shape's rows and witnesses where a change finds them.
+
+    Attributes:
+        relation: the shape with its rows.
+        readers: all who read what it is about.
+        covers: whether a change determines all parameters.
+        finds: whether a change determines some of the answers.
+        leaves_open: whether it leaves some of them open.
+    """
+
+    def __init__(self, occurrence: Occurrence, relation: Join, readers: AlphaIndex) -> None:
+        shape = relation.shape
+        positions = dict(occurrence.bound)
+        columns = {name: i for i, name in enumerate((*shape.params, *shape.answers))}
+        params = sorted((positions[name], columns[name]) for name in shape.params if name in positions)
+        everything = sorted((position, columns[name]) for name, position in positions.items())
+        self.relation = relation
+        self.readers = readers
+        self.covers = positions.keys() >= set(shape.params)
+        self.finds = any(name in positions for name in shape.answers)
+        self.leaves_open = not all(name in positions for name in shape.answers)
+        self._occurrence = occurrence
+        self._relying = readers.relying_at(occurrence.polarity, tuple(position for position, _ in everything))
+        self._relied_on = picker(tuple(column for _, column in everything))
+        self._open = readers.open_at(occurrence.polarity, tuple(position for position, _ in params))
+        self._known = picker(tuple(column for _, column in params))
+
+    def bindings(self, args: Args) -> dict[str, Value]:
+        """The values of the parameters and answers that the change determines."""
+        return {name: args[i] for name, i in self._occurrence.bound}
+
+    def lean(self, row: ConditionRow, witness: Args) -> None:
+        """The witness is kept and has to be looked at when what it relies on changes."""
+        self._relying.setdefault(self._relied_on((*row.key, *witness)), {})[row, witness] = None
+
+    def let_go(self, row: ConditionRow, witness: Args) -> None:
+        """The witness is not kept any more."""
+        values = self._relied_on((*row.key, *witness))
+        leaning = self._relying.get(values)
+        if leaning is not None:  # two occurrences may rely on the same fact
+            leaning.pop((row, witness), None)
+            if not leaning:
+                del self._relying[values]
+
+    def open(self, row: ConditionRow) -> None:
+        """Another witness of the row would make a difference."""
+        self._open.setdefault(self._known(row.key), {}).setdefault(self, {})[row] = None
+
+    def close(self, row: ConditionRow) -> None:
+        """It would make none any more."""
+        values = self._known(row.key)
+        rows = self._open[values][self]
+        del rows[row]
+        if not rows:
+            del self._open[values][self]
+            if not self._open[values]:
+                del self._open[values]
+
+    @cached_property
+    def admits(self) -> Callable[..., bool]:
+        """Whether a change with these arguments fits, and what it alone settles of the condition is true.
+
+        Most changes end here. What cannot be computed is left to who looks at the whole condition.
+        """
+        names = {position: name for name, position in self._occurrence.bound}
+        said = Atom(self._occurrence.name, tuple(Variable(names[i]) for i in sorted(names)))  # true by the change
+        settled = set(names.values())
+        rest = (part for part in conjuncts(self.relation.shape.body) if part != said)
+        parts = [part for part in rest if free_variables(part) <= settled]
+        test = self._settling(And(tuple(parts)), names)
+        equal = self._occurrence.equal
+        return test if not equal else lambda *args: all(args[i] == args[j] for i, j in equal) and test(*args)
+
+    def _settling(self, e: Expression, names: Mapping[int, str]) -> Callable[..., bool]:
+        """`e` as a function of a change's arguments; `names` are its variables by the positions of these."""
+        world, schema = self.relation.world, self.relation.world.schema
+        arguments = tuple([names.get(i, f"argument {i}") for i in range(max(names, default=-1) + 1)])
+        source = _source(e, schema, arguments)
+        if source is not None:
+            return source.bound(world)
+        holds = compile_test(e, schema)
+
+        def test(*args: Value) -> bool:
+            try:
+                return holds(world, self.bindings(args))
+            except InputError:
+                return True
+
+        return test
+
+    @cached_property
+    def search(self) -> Search:
+        """Completes what the change and the row's parameters say to witnesses."""
+        bound = frozenset(self.relation.shape.params).union(name for name, _ in self._occurrence.bound)
+        return compile_query(self.relation.shape.body, self.relation.world.schema, bound)
+
+    @cached_property
+    def join(self) -> Search:
+        """Completes what the change says to open rows with witnesses: to be run on a `RowsWorld`."""
+        shape, schema = self.relation.shape, self.relation.world.schema
+        row = Atom(ROWS, tuple(map(Variable, shape.params)))
+        bound = frozenset(name for name, _ in self._occurrence.bound)
+        return compile_query(And((row, shape.body)), schema_with_rows(schema, shape.params), bound)
+
+
+class Join:
+    """A shape with its rows.
+
+    Args:
+        shape: the conditions without their values.
+        world: what they are about; it has a change already when it is told here.
+        readers: all who read what an occurrence is about.
+        changed: gets the rows whose witnesses become others.
+    """
+
+    def __init__(
+        self,
+        shape: Shape,
+        world: WorldState,
+        readers: Callable[[Occurrence], AlphaIndex],
+        changed: dict[ConditionRow, None],
+    ) -> None:
+        schema = world.schema
+        self.shape = shape
+        self.rows: dict[Args, ConditionRow] = {}
+        self.world = world
+        self._triggers = tuple(DeltaJoin(o, self, readers(o)) for o in occurrences(shape.body, schema))
+        self._test = compile_test(shape.body, schema)
+        self._search = compile_query(shape.body, schema, frozenset(shape.params))
+        self._joins = not all(t.covers for t in self._triggers)
+        self._open = FactIndex()
+        self._rows_world = RowsWorld(world, self._open)
+        self._failed: dict[ConditionRow, InputError] = {}
+        self._changed = changed
+
+    def row(self, key: Args) -> ConditionRow:
+        """The row for these values, evaluated when it is new."""
+        row = self.rows.get(key)
+        if row is None:
+            row = self.rows[key] = ConditionRow(self, key)
+            self.renew(row)
+        return row
+
+    def want_all(self, row: ConditionRow) -> None:
+        """From now on every change of the row's set of witnesses counts."""
+        if not row.wants_all:
+            row.wants_all = True
+            self.renew(row)
+
+    def drop(self, row: ConditionRow) -> None:
+        """Forget the row."""
+        for witness in tuple(row.witnesses):
+            self._remove(row, witness)
+        self._mend(row)
+        self._list(row, is_open=False)
+        del self.rows[row.key]
+
+    def error(self, row: ConditionRow) -> InputError | None:
+        """Why the row cannot be computed, if so."""
+        return self._failed.get(row)
+
+    @property
+    def failed(self) -> list[ConditionRow]:
+        """The rows that cannot be computed."""
+        return list(self._failed)
+
+    def loses(self, row: ConditionRow, witness: Args) -> bool:
+        """Drop a witness that is none any more; whether the row has to be searched then."""
+        try:
+            if self._test(self.world, {**row.bindings, **dict(zip(self.shape.answers, witness, strict=True))}):
+                return False
+        except InputError as error:
+            self._fail(row, error)
+        self._remove(row, witness)
+        return not row.witnesses and not row.wants_all
+
+    def make(self, trigger: DeltaJoin, args: Args, rows: dict[ConditionRow, None]) -> None:
+        """Find what a change that the trigger admits makes true of open rows that agree with it in their parameters."""
+        bindings = trigger.bindings(args)
+        try:
+            if len(rows) == 1 or not trigger.finds:
+                for row in tuple(rows):
+                    self._complete(row, trigger, bindings)
+            else:
+                for found in list(trigger.join(self._rows_world, bindings)):
+                    self._add(self.rows[tuple([found[name] for name in self.shape.params])], self._witness(found))
+        except InputError:  # some row of those reached cannot be computed; which one shows one by one
+            for row in tuple(rows):
+                self.renew(row)
+
+    def renew(self, row: ConditionRow) -> None:
+        """Search the row as if it were new."""
+        try:
+            found = dict.fromkeys(self._witness(b) for b in self._few(row, self._search(self.world, row.bindings)))
+            self._mend(row)
+        except InputError as error:
+            found = {}
+            self._fail(row, error)
+        for witness in [w for w in row.witnesses if w not in found]:
+            self._remove(row, witness)
+        for witness in found:
+            self._add(row, witness)
+        self._list(row, is_open=row.is_open)
+
+    def _complete(self, row: ConditionRow, trigger: DeltaJoin, bindings: Bindings) -> None:
+        """Find what the change makes a witness of the row."""
+        together = {**row.bindings, **bindings}
+        if not trigger.leaves_open:
+            if self._test(self.world, together):
+                self._add(row, self._witness(together))
+            return
+        for found in self._few(row, trigger.search(self.world, together)):
+            self._add(row, self._witness(found))
+
+    def _few(self, row: ConditionRow, found: Iterator[Bindings]) -> list[Bindings]:
+        if row.wants_all:
+            return list(found)
+        first = next(found, None)
+        return [] if first is None else [first]
+
+    def _witness(self, bindings: Bindings) -> Args:
+        return tuple([bindings[name] for name in self.shape.answers])
+
+    def _add(self, row: ConditionRow, witness: Args) -> None:
+        if witness in row.witnesses or not row.is_open or row in self._failed:
+            return
+        row.witnesses[witness] = None
+        for trigger in self._triggers:
+            trigger.lean(row, witness)
+        self._has_changed(row)
+
+    def _remove(self, row: ConditionRow, witness: Args) -> None:
+        del row.witnesses[witness]
+        for trigger in self._triggers:
+            trigger.let_go(row, witness)
+        self._has_changed(row)
+
+    def _has_changed(self, row: ConditionRow) -> None:
+        self._changed[row] = None
+        self._list(row, is_open=row.is_open)
+
+    def _list(self, row: ConditionRow, *, is_open: bool) -> None:
+        """Only open rows are found by what can make them true and take part in joins."""
+        if row.is_listed is is_open:
+            return
+        row.is_listed = is_open
+        for trigger in self._triggers:
+            if is_open:
+                trigger.open(row)
+            else:
+                trigger.close(row)
+        if self._joins and is_open:
+            self._open.add(row_fact(row))
+        elif self._joins:
+            self._open.discard(row_fact(row))
+
+    def _fail(self, row: ConditionRow, error: InputError) -> None:
+        self._failed[row] = error
+        for trigger in self._triggers:
+            trigger.readers.failing[self] = None
+
+    def _mend(self, row: ConditionRow) -> None:
+        if self._failed.pop(row, None) is not None and not self._failed:
+            for trigger in self._triggers:
+                trigger.readers.failing.pop(self, None)

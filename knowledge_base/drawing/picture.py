@@ -1,0 +1,133 @@
+"""What a picture of a world shows: which things, what is said of each, what joins them; without any positions."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from knowledge_base.errors import UnknownNameError
+from knowledge_base.facts import Content, Fact
+from knowledge_base.spelling import value_text
+from knowledge_base.view import View
+
+MOST_LINES = 12
+"""What is said on one card at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """A thing, or a fact about several things at once.
+
+    Attributes:
+        key: by which links name it.
+        title: its name, or the fact's predicate.
+        kind: its type; empty for a fact.
+        lines: what is said of it alone.
+        middle: whether the picture is about it.
+    """
+
+    key: str
+    title: str
+    kind: str
+    lines: tuple[str, ...] = ()
+    middle: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """An arrow between two cards, with what it says."""
+
+    source: str
+    target: str
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Cards and links; `left_out` counts the things that there was no room for."""
+
+    cards: tuple[Card, ...]
+    links: tuple[Arrow, ...]
+    left_out: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Said:
+    """A fact or fluent: the things in it, in order, and how it reads without them."""
+
+    things: tuple[str, ...]
+    predicate: str
+    rest: str
+
+
+def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
+    """What to draw of the world, or of what is around a thing; at most so many things, the nearest first.
+
+    Raises:
+        UnknownNameError: there is no such thing.
+    """
+    types = world.nodes()
+    said = [_said(fact, types) for fact in world.facts()]
+    said += [_said(fluent, types, f"= {_content(content)}") for fluent, content in world.values().items()]
+    if thing is None:
+        wanted = list(types)
+    elif thing in types:
+        wanted = list(_around(thing, said, hops))
+    else:
+        raise UnknownNameError(f"there is no object '{thing}'", found=thing, valid=types)
+    shown = dict.fromkeys(wanted[:most])
+    inside = [one for one in said if one.things and all(name in shown for name in one.things)]
+    own = {name: [one for one in inside if set(one.things) == {name}] for name in shown}
+    cards = [Card(name, name, types[name], tuple(_lines(own[name])), name == thing) for name in shown]
+    links, relations = _links(one for one in inside if len(set(one.things)) > 1)
+    return Picture((*cards, *relations), links, len(wanted) - len(shown))
+
+
+def _said(fact: Fact, types: dict[str, str], value: str = "") -> _Said:
+    things = tuple(arg for arg in fact.args if isinstance(arg, str) and arg in types)
+    rest = [value_text(arg) for arg in fact.args if not (isinstance(arg, str) and arg in types)]
+    return _Said(things, fact.predicate, " ".join((*rest, value)).strip())
+
+
+def _content(content: Content) -> str:
+    return f"{content:g}" if isinstance(content, float) else value_text(content, quoted=isinstance(content, str))
+
+
+def _around(thing: str, said: Iterable[_Said], hops: int) -> Iterator[str]:
+    """The things that so many facts lead to, the nearest first."""
+    beside: dict[str, dict[str, None]] = {}
+    for one in said:
+        for name in one.things:
+            beside.setdefault(name, {}).update(dict.fromkeys(one.things))
+    distance, waiting = {thing: 0}, deque([thing])
+    while waiting:
+        here = waiting.popleft()
+        yield here
+        if distance[here] < hops:
+            fresh = [name for name in beside.get(here, ()) if name not in distance]
+            distance.update(dict.fromkeys(fresh, distance[here] + 1))
+            waiting.extend(fresh)
+
+
+def _lines(said: list[_Said]) -> Iterator[str]:
+    for one in said[:MOST_LINES]:
+        yield f"{one.predicate} {one.rest}".strip()
+    if len(said) > MOST_LINES:
+        yield f"and {len(said) - MOST_LINES} more"
+
+
+def _links(said: Iterable[_Said]) -> tuple[tuple[Arrow, ...], list[Card]]:
+    """Facts about two things as arrows, those from one thing to the same other as one; the others as cards."""
+    labels: dict[tuple[str, str], list[str]] = {}
+    links: list[Arrow] = []
+    relations: list[Card] = []
+    for one in said:
+        if len(one.things) == 2:
+            labels.setdefault((one.things[0], one.things[1]), []).append(f"{one.predicate} {one.rest}".strip())
+            continue
+        key = f"fact {len(relations)}"  # with a blank, which no drawn thing's key can be mistaken for
+        relations.append(Card(key, f"{one.predicate} {one.rest}".strip(), ""))
+        links += [Arrow(key, name, str(number)) for number, name in enumerate(one.things, 1)]
+    joined = [Arrow(source, target, ", ".join(label)) for (source, target), label in labels.items()]
+    return (*joined, *links), relations

@@ -1,0 +1,157 @@
+"""SQLite transactions of a store's writer: all that is written in a block, or nothing.
+
+They are classes and no generators, since every change and every macrostep of a kept run passes here.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+from knowledge_base.errors import Place, StoreError
+from knowledge_base.journal.checkpoints import CHECKPOINTS
+from knowledge_base.journal.file import Durability, reported
+from knowledge_base.journal.integrity import mark_open
+
+TIDY_UP_AFTER = 500
+"""Commits after which the file is tidied up; SQLite itself would after a thousand pages, and they take one or two."""
+
+
+class WriteTransaction:
+    """A context manager that is used again and again, for one transaction after the other.
+
+    Args:
+        connection: that of the one who writes.
+        path: the store.
+        durability: what a commit outlives.
+        token: of this writer, with which its first commit says that the store is open.
+
+    Attributes:
+        marked: whether it has said so.
+
+    Raises:
+        StoreError: on entering or leaving, it cannot be written; nothing of the block is.
+    """
+
+    def __init__(self, connection: sqlite3.Connection, path: Path, durability: Durability, token: bytes) -> None:
+        self.marked = False
+        self._token = token
+        self._connection = connection
+        self._path = path
+        self._durability = durability
+        self._name = str(path)  # a `Path` takes longer
+        self._file = os.stat(self._name)  # noqa: PTH116
+        self._commits = 0
+        self._rows = 0  # ever written, when it began
+
+    def __enter__(self) -> sqlite3.Connection:
+        self._rows = self._connection.total_changes
+        if not self.is_in_place():
+            raise StoreError("the store was moved or deleted while it is open", place=Place(self._name))
+        try:
+            self._connection.execute("BEGIN IMMEDIATE")
+        except BaseException as error:
+            self._roll_back(error)
+            raise
+        return self._connection
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if error is not None:
+            self._roll_back(error)
+            return
+        try:
+            self._commit()
+        except BaseException as failed:
+            self._roll_back(failed)
+            raise
+
+    def is_in_place(self) -> bool:
+        """Whether the file that is written still has its name; without it a restart finds nothing of a commit."""
+        try:
+            return os.path.samestat(os.stat(self._name), self._file)  # noqa: PTH116
+        except OSError:
+            return False
+
+    def _roll_back(self, error: BaseException) -> None:
+        with reported(self._path, "write"):
+            if self._connection.in_transaction:  # SQLite ends it by itself when the disk is full
+                self._connection.execute("ROLLBACK")
+            if isinstance(error, sqlite3.Error):
+                raise error
+
+    def _commit(self) -> None:
+        connection = self._connection
+        changed = connection.total_changes != self._rows
+        self._commits += changed
+        if changed and not self.marked:
+            mark_open(connection, self._token)
+        if self._durability == "power" or not changed or self._commits % TIDY_UP_AFTER:
+            connection.execute("COMMIT")
+        elif not CHECKPOINTS.is_behind(self._path):
+            with CHECKPOINTS.asking(self._path):
+                connection.execute("COMMIT")
+        else:
+            connection.execute("COMMIT")
+            CHECKPOINTS.leave(self._path)
+            with suppress(sqlite3.Error):  # it is committed; what cannot be tidied up now is later
+                connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+        self.marked = self.marked or changed
+
+
+class TransactionGroup:
+    """Several changes of the world in memory, written as one transaction; a context manager like that.
+
+    Args:
+        transaction: how they are written.
+        place: the store, for errors.
+
+    Attributes:
+        open: whether a group is being made.
+        appended: whether a change is part of it.
+        behind: why the file lacks what the world in memory has, if it does.
+
+    Raises:
+        StoreError: on entering, the file lacks something; or on leaving, it cannot be written.
+    """
+
+    def __init__(self, transaction: WriteTransaction, place: Place) -> None:
+        self.open = self.appended = False
+        self.behind: StoreError | None = None
+        self._transaction = transaction
+        self._place = place
+
+    def __enter__(self) -> sqlite3.Connection:
+        self.require_abreast()
+        connection = self._transaction.__enter__()
+        self.open, self.appended = True, False
+        return connection
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.open = False
+        try:
+            if error is None:
+                self._require_parts()
+            self._transaction.__exit__(kind, error, at)
+        except BaseException as failed:
+            error = failed
+            raise
+        finally:
+            if error is not None and self.appended and self.behind is None:
+                self.behind = error if isinstance(error, StoreError) else StoreError(str(error) or type(error).__name__)
+
+    def require_abreast(self) -> None:
+        """Raise `StoreError` if the file lacks what the world in memory has."""
+        if self.behind is not None:
+            message = f"the store lacks the last changes, open it anew: {self.behind.message}"
+            raise StoreError(message, place=self._place)
+
+    def _require_parts(self) -> None:
+        """A part that failed takes all others with it."""
+        try:
+            self.require_abreast()
+        except StoreError as error:
+            self._transaction.__exit__(StoreError, error, None)
+            raise

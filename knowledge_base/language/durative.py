@@ -1,0 +1,162 @@
+"""Durative actions as values (PDDL 2.1, Fox & Long 2003).
+
+Seen by those who do one thing after the other, a durative action is an ordinary one: it needs what the action
+needs when it is alone, and does what it has done at its end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from knowledge_base.language.effect import NO_EFFECT, Add, AllOf, Delete, Effect, NumericEffect, When
+from knowledge_base.language.expression import (
+    TRUE,
+    And,
+    Atom,
+    Call,
+    Comparison,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    free_variables,
+)
+
+FALSE = Or(())
+"""`(or)`, the condition that never holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """How long an action takes, in seconds: something between two terms, which are equal when it is fixed.
+
+    An action without an upper bound has the constant infinity as `most`.
+    """
+
+    least: Term
+    most: Term
+
+    @property
+    def fixed(self) -> bool:
+        """Whether there is nothing to choose."""
+        return self.least == self.most
+
+
+@dataclass(frozen=True, slots=True)
+class DurativeParts:
+    """What a durative action needs and does, by time.
+
+    Attributes:
+        start, end: what holds when it begins and just before it ends.
+        over_all: what holds all the time between the two.
+        start_effect, end_effect: what it changes at its two ends.
+    """
+
+    start: Expression = TRUE
+    over_all: Expression = TRUE
+    end: Expression = TRUE
+    start_effect: Effect = NO_EFFECT
+    end_effect: Effect = NO_EFFECT
+
+    @property
+    def precondition(self) -> Expression:
+        """What must hold at first so that the action, alone, can be begun and ended.
+
+        That is the condition at the start, and what the others ask for beyond what the start effect settles,
+        as far as one can tell from the action as it is written (the same predicate of the same variables).
+        """
+        later = [_after(e, self.start_effect, frozenset()) for e in (self.over_all, self.end)]
+        return _conjunction([part for e in (self.start, *later) for part in _conjuncts(e)])
+
+    @property
+    def effect(self) -> Effect:
+        """What has changed when the action, alone, has come to its end."""
+        undone = tuple(leaf.atom for leaf in _unconditional(self.end_effect) if isinstance(leaf, Delete))
+        settled = set(_settled(self.end_effect))
+        kept = (_unless(part, undone) for part in _parts(self.start_effect) if _changed(part) not in settled)
+        parts = (*kept, *_parts(self.end_effect))
+        return parts[0] if len(parts) == 1 else AllOf(parts)
+
+
+def _conjuncts(e: Expression) -> tuple[Expression, ...]:
+    return e.parts if isinstance(e, And) else (e,)
+
+
+def _conjunction(parts: list[Expression]) -> Expression:
+    kept = tuple(dict.fromkeys(parts))
+    return kept[0] if len(kept) == 1 else And(kept)
+
+
+def _after(e: Expression, effect: Effect, bound: frozenset[str]) -> Expression:
+    """What must hold before `effect` so that `e` holds after it (regression, by comparing texts)."""
+    match e:
+        case Atom():
+            said = {isinstance(leaf, Add) for leaf in _unconditional(effect) if _atom(leaf) == e}
+            known = said and not bound & free_variables(e)
+            return (TRUE if True in said else FALSE) if known else e
+        case Not(body):
+            inner = _after(body, effect, bound)
+            opposite = TRUE if inner == FALSE else FALSE if inner == TRUE else None
+            return Not(inner, place=e.place) if opposite is None else opposite
+        case And(parts) | Or(parts):
+            remaining = dict.fromkeys(_after(part, effect, bound) for part in parts)
+            decided, neutral = (FALSE, TRUE) if isinstance(e, And) else (TRUE, FALSE)
+            kept = tuple(part for part in remaining if part != neutral)
+            return decided if decided in remaining else type(e)(kept, place=e.place)
+        case Imply(premise, conclusion):
+            return _after(Or((Not(premise), conclusion), place=e.place), effect, bound)
+        case Exists(variables, body) | Forall(variables, body):
+            return type(e)(variables, _after(body, effect, bound | {v.name for v in variables}), place=e.place)
+        case Comparison():
+            return e
+
+
+def _parts(effect: Effect) -> Iterator[Effect]:
+    if isinstance(effect, AllOf):
+        for part in effect.parts:
+            yield from _parts(part)
+    else:
+        yield effect
+
+
+def _unconditional(effect: Effect) -> Iterator[Effect]:
+    return (part for part in _parts(effect) if isinstance(part, Add | Delete | NumericEffect))
+
+
+def _settled(effect: Effect) -> Iterator[Atom | Call | None]:
+    """What is no longer as it was before, whatever that was."""
+    for part in _unconditional(effect):
+        if not isinstance(part, NumericEffect) or part.operator == "assign":
+            yield _changed(part)
+
+
+def _changed(part: Effect) -> Atom | Call | None:
+    return part.call if isinstance(part, NumericEffect) else _atom(part)
+
+
+def _atom(leaf: Effect) -> Atom | None:
+    return leaf.atom if isinstance(leaf, Add | Delete) else None
+
+
+def _unless(part: Effect, undone: tuple[Atom, ...]) -> Effect:
+    """`part`, but a fact that the end deletes is not added where variables turn out to mean the same."""
+    if not isinstance(part, Add):
+        return part
+    same = [_same(part.atom, other) for other in undone]
+    apart = tuple(Not(And(pairs)) for pairs in same if pairs is not None)
+    return When(_conjunction(list(apart)), part) if apart else part
+
+
+def _same(atom: Atom, other: Atom) -> tuple[Expression, ...] | None:
+    """The equations under which both are one fact; `None` if they never are."""
+    if atom.predicate != other.predicate or len(atom.args) != len(other.args):
+        return None
+    pairs = [(a, b) for a, b in zip(atom.args, other.args, strict=True) if a != b]
+    if any(isinstance(a, Constant) and isinstance(b, Constant) for a, b in pairs):
+        return None
+    return tuple(Comparison("=", a, b) for a, b in pairs)

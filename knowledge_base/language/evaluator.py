@@ -1,0 +1,189 @@
+"""Is it true, who makes it true, what is it worth: conditions and terms on a world.
+
+Conditions are compiled when they are first used and remembered by identity, so that asking the same
+expression again costs no more than the look-ups it needs. Nothing is ever executed as text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from knowledge_base.errors import SchemaError
+from knowledge_base.facts import VALUE_TYPES, Content, Value
+from knowledge_base.language.binding import check_answers, check_bound
+from knowledge_base.language.compiler import Answers, compile_answers, compile_query, compile_test
+from knowledge_base.language.depth import check_depth
+from knowledge_base.language.expression import (
+    Constant,
+    Expression,
+    Term,
+    Variable,
+    free_variables,
+    variables_in_order,
+)
+from knowledge_base.language.identity_cache import IdentityCache
+from knowledge_base.language.terms import Bindings, Getter, Test, compile_term
+from knowledge_base.language.vocabulary import Vocabulary
+from knowledge_base.language.world import World
+
+NO_BINDINGS: Bindings = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A condition ready to be asked."""
+
+    e: Expression
+    free: frozenset[str]
+    test: Test
+
+    def holds(self, world: World, bindings: Mapping[str, Value]) -> bool:
+        """Whether it is true of `world`; errors as for `holds`."""
+        for name in self.free:
+            if type(bindings.get(name)) not in VALUE_TYPES:
+                check_bound(self.e, bindings)
+        return self.test(world, bindings)
+
+
+@dataclass(frozen=True, slots=True)
+class _Term:
+    free: frozenset[str]
+    get: Getter
+
+
+@dataclass(frozen=True, slots=True)
+class Queried:
+    """A query ready to be answered, for certain variables that are bound.
+
+    Attributes:
+        e: the query; it is kept alive with what was made from it.
+        answers: gives the values of the others, as `query` does.
+    """
+
+    e: Expression
+    answers: Answers
+
+
+@dataclass(frozen=True, slots=True)
+class _Queries:
+    """The ways to search for an expression's variables, by those that are bound."""
+
+    free: frozenset[str]
+    by_bound: dict[frozenset[str], Queried]
+
+
+_terms: IdentityCache[Term, _Term] = IdentityCache()
+_conditions: IdentityCache[Expression, Asked] = IdentityCache()
+_queries: IdentityCache[Expression, _Queries] = IdentityCache()
+
+
+def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> bool:
+    """Whether `e` is true of `world`; variables in `bindings` that `e` does not have are ignored.
+
+    Raises:
+        UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
+        SchemaError: a wrong number of arguments, or `<` and the like met something that is no number.
+        InputError: it is nested too deeply, or something in it cannot be computed.
+    """
+    return asked(e, world.schema).holds(world, bindings)
+
+
+def asked(e: Expression, schema: Vocabulary) -> Asked:
+    """The condition ready to be asked of worlds with this schema; errors of the text as for `holds`."""
+    return _conditions.find(e, schema) or _conditions.keep(e, schema, _compiled(e, schema))
+
+
+def prepare(e: Expression, schema: Vocabulary) -> None:
+    """Raise now what is wrong with the text of `e`, whatever the world will be; errors as for `holds`."""
+    if _conditions.find(e, schema) is None:
+        _conditions.keep(e, schema, _compiled(e, schema))
+
+
+def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> list[dict[str, Value]]:
+    """The values of the free variables of `e`, each choice once, that make it true of `world`.
+
+    Without unbound variables the answer is `[{}]` when `e` is true and `[]` when it is not. The order of
+    answers and of their variables depends on nothing but the text and the world with its order of insertion.
+
+    Raises:
+        InputError: an unbound variable occurs only under `not` or in a comparison.
+        UnknownNameError, SchemaError: as for `holds`.
+    """
+    return queried(e, world.schema, bindings).answers(world, bindings)
+
+
+def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Iterator[dict[str, Value]]:
+    """The answers of `query` in the same order, each when it is found; `world` must not change until the last.
+
+    An error about candidates that cannot be computed comes after all answers; otherwise errors are those of `query`.
+    """
+    check_depth(e)
+    bound = free_variables(e).intersection(bindings)
+    check_answers(e, bound, world.schema)
+    names = _asked_for(e, bound)
+    found = compile_query(e, world.schema, bound)(world, bindings)
+    return ({name: each[name] for name in names} for each in found)
+
+
+def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried:
+    """The query ready to be answered when `params` are bound; errors of the text as for `query`."""
+    queries = _queries.find(e, schema) or _queries.keep(e, schema, _unsearched(e))
+    bound = queries.free.intersection(params)
+    found = queries.by_bound.get(bound)
+    if found is None:
+        found = queries.by_bound[bound] = _compiled_query(e, schema, bound)
+    return found
+
+
+def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Content:
+    """What `term` is worth on `world`.
+
+    Raises:
+        UnknownNameError: a free variable is not bound, or a function is not declared.
+        SchemaError: arithmetic met something that is no number.
+        InputError: a division by zero.
+    """
+    if isinstance(term, Constant):
+        return term.value
+    if isinstance(term, Variable) and term.name in bindings:
+        return bindings[term.name]
+    schema = world.schema
+    known = _terms.find(term, schema) or _terms.keep(term, schema, _compiled_term(term, schema))
+    for name in known.free:
+        if type(bindings.get(name)) not in VALUE_TYPES:
+            check_bound(term, bindings)
+    return known.get(world, bindings)
+
+
+def evaluate_argument(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
+    """What `term` is worth as an argument of a fact; errors as for `evaluate_term`, and a geometry is one."""
+    found = evaluate_term(term, world, bindings)
+    if isinstance(found, tuple):
+        raise SchemaError("a geometry can be compared, but nothing is said about it", place=term.place)
+    return found
+
+
+def _unsearched(e: Expression) -> _Queries:
+    check_depth(e)
+    return _Queries(free_variables(e), {})
+
+
+def _compiled(e: Expression, schema: Vocabulary) -> Asked:
+    check_depth(e)
+    return Asked(e, free_variables(e), compile_test(e, schema))
+
+
+def _compiled_term(term: Term, schema: Vocabulary) -> _Term:
+    check_depth(term)
+    return _Term(free_variables(term), compile_term(term, schema))
+
+
+def _compiled_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) -> Queried:
+    check_answers(e, bound, schema)
+    return Queried(e, compile_answers(e, schema, bound, _asked_for(e, bound)))
+
+
+def _asked_for(e: Expression, bound: frozenset[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))

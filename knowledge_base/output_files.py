@@ -1,0 +1,308 @@
+"""Files that commands write: judged before a command begins, written as a whole or not at all.
+
+An output never takes the place of a store, of a file that belongs to one, or of another file of the same command. Two
+names are one file when the operating system says so (links, `./x`, case). A regular file is replaced: the new text
+stands complete beside it before it takes the name, with the mode of the old one. The place of a symlink is that of
+its target; other hard links keep the old text. Pipes, terminals and open descriptors (`-`, `/dev/stdout`,
+`/dev/fd/3`, a FIFO) are written as they are, since a new file in their place would reach nobody.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import re
+import stat
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TextIO
+
+from knowledge_base.errors import InputError
+from knowledge_base.journal.sidecar_files import is_database, store_owning
+
+STANDARD_OUTPUT = Path("-")
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""Errors of a medium, which no other name would mend."""
+PATIENCE_S = 5.0
+"""Seconds in which somebody has to begin to read a FIFO."""
+
+_LOOK_AGAIN_S = 0.02
+_DESCRIPTORS = re.compile(r"/proc/(?P<process>\d+)(/task/\d+)?/fd")
+_LOGS = {"-wal": (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83"), "-journal": (b"\xd9\xd5\x05\xf9",)}
+"""How SQLite's logs begin."""
+_Identity = tuple[object, ...]
+
+
+class Output:
+    """A file that a command writes.
+
+    Args:
+        path: where it goes; `-` is standard output.
+        option: the word of the command that names it, for messages.
+        others: what else the command reads or writes, as far as it is known; the output is none of these, nor of the
+            files that a store keeps beside itself.
+        over: how a file begins that a stream may empty; a file that begins otherwise stays.
+
+    Raises:
+        InputError: nothing can or may be written there; nothing has been changed then.
+    """
+
+    def __init__(self, path: Path | str, option: str, *others: Path | None, over: str | None = None) -> None:
+        self.path = Path(path)
+        self._option = option
+        self._others = [other for other in others if other is not None]
+        self._over = over
+        self._check()
+
+    def keep(self, *others: Path) -> None:
+        """Raise `InputError` if it is one of these files, which turned out to be needed, or belongs to one."""
+        self._others += others
+        self._check()
+
+    def write(self, text: str) -> None:
+        """Replace what is there by a text; errors as for `write_all`."""
+        write_all({self: text})
+
+    @contextmanager
+    def stream(self) -> Iterator[TextIO]:
+        """What is written in the block, line by line, where it can be read at once.
+
+        A regular file is emptied, but not replaced: who reads it already goes on with the same file.
+
+        Raises:
+            InputError: as for an output, or another program streams to this file.
+            OSError: there is no room.
+        """
+        self._check()
+        if self.path == STANDARD_OUTPUT:
+            yield sys.stdout
+            return
+        with self._reported():
+            opened = self._special() if self._is_special() else self._emptied()
+        with os.fdopen(opened, "w", encoding="utf-8", buffering=1) as stream:
+            yield stream
+
+    def refused(self, why: str) -> InputError:
+        """The error that says why it cannot be written."""
+        return InputError(f"{self._option}: cannot write '{self.path}': {why}")
+
+    def _check(self) -> None:
+        if self.path == STANDARD_OUTPUT:
+            return
+        with self._reported():
+            found = _status(self.path)
+            if found is None or not stat.S_ISCHR(found.st_mode):  # a terminal can be read and written
+                self._check_others()
+            if found is None or stat.S_ISREG(found.st_mode):
+                self._check_regular(found)
+            elif (kind := _KINDS.get(stat.S_IFMT(found.st_mode))) is not None:
+                raise self.refused(f"it is {kind}")
+
+    def _check_regular(self, found: os.stat_result | None) -> None:
+        stores = [other for other in self._others if _status(other) is None or is_database(other)]
+        store = store_owning(self.path, stores) or _lost(_target(self.path))
+        if store is not None:
+            raise self.refused("it is a store" if store == _target(self.path) else f"it belongs to the store '{store}'")
+        if (number := _descriptor(self.path)) is not None:
+            if fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY:
+                raise self.refused("it is open only to be read")
+            return
+        if self._over is not None and found is not None and found.st_size > 0 and not _begins(self.path, self._over):
+            raise self.refused("it is there already, and is no file of that kind")
+        folder = _target(self.path).parent
+        if not folder.is_dir():
+            raise self.refused(f"there is no folder '{folder}'")
+        if not os.access(self.path if found is not None else folder, os.W_OK):
+            raise self.refused("it may not be written")
+
+    def _check_others(self) -> None:
+        own = _identity(self.path)
+        for other in self._others:
+            if own == _identity(other):
+                raise self.refused(f"the command needs '{other}' for something else")
+
+    def _is_special(self) -> bool:
+        """Whether it is written as it is: no regular file, or one that is open already."""
+        found = _status(self.path)
+        return _descriptor(self.path) is not None or (found is not None and not stat.S_ISREG(found.st_mode))
+
+    def _special(self) -> int:
+        """A descriptor of what cannot be replaced."""
+        number = _descriptor(self.path)
+        if number is not None:
+            for stream in (sys.stdout, sys.stderr):
+                stream.flush()
+            return os.dup(number)
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                opened = os.open(self.path, os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
+            except OSError as error:
+                if error.errno != errno.ENXIO or time.monotonic() >= end:
+                    raise
+                time.sleep(_LOOK_AGAIN_S)
+            else:
+                os.set_blocking(opened, True)
+                return opened
+
+    def _emptied(self) -> int:
+        """A descriptor of the regular file, empty, which no other stream has."""
+        opened = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        try:
+            self._take(opened)
+        except BaseException:
+            os.close(opened)
+            raise
+        return opened
+
+    def _take(self, opened: int) -> None:
+        try:
+            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise self.refused("another program is writing it") from None
+        except OSError:
+            pass  # no locks there
+        begin = (self._over or "").encode()
+        there = os.read(opened, len(begin))
+        if there and there != begin:  # it has come since the check
+            raise self.refused("it is there already, and is no file of that kind")
+        os.ftruncate(opened, 0)
+        os.lseek(opened, 0, os.SEEK_SET)
+
+    @contextmanager
+    def _reported(self) -> Iterator[None]:
+        """Turns errors about names and rights into `InputError`s; those of a medium get the name of the file."""
+        try:
+            yield
+        except (BrokenPipeError, InputError):
+            raise
+        except OSError as error:
+            if error.errno in FULL:
+                error.filename = str(self.path)
+                raise
+            why = "nobody reads it" if error.errno == errno.ENXIO else str(error.strerror)
+            raise self.refused(why) from None
+        except ValueError as error:  # a null character in the name
+            raise self.refused(str(error)) from None
+
+
+def write_all(texts: Mapping[Output, str]) -> None:
+    """Replace what is there by the texts, all of them or, with an error before the last is complete, none.
+
+    Raises:
+        InputError: a text cannot be encoded as UTF-8, or nothing can be written there.
+        OSError: there is no room.
+    """
+    complete = {output: _encoded(output, text) for output, text in texts.items()}
+    beside: dict[Output, Path] = {}
+    try:
+        for output, data in complete.items():
+            output._check()  # noqa: SLF001  what is there may have come since
+            if output.path != STANDARD_OUTPUT and not output._is_special():  # noqa: SLF001
+                _stage(output, data, beside)
+        for output, data in complete.items():
+            with output._reported():  # noqa: SLF001
+                if output in beside:
+                    beside[output].replace(_target(output.path))
+                    del beside[output]
+                elif output.path == STANDARD_OUTPUT:
+                    sys.stdout.write(texts[output])
+                    sys.stdout.flush()
+                else:
+                    with os.fdopen(output._special(), "wb") as stream:  # noqa: SLF001
+                        stream.write(data)
+    finally:
+        for file in beside.values():
+            file.unlink(missing_ok=True)
+
+
+def _encoded(output: Output, text: str) -> bytes:
+    try:
+        return text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        half = error.object[error.start : error.end]
+        raise output.refused(f"UTF-8 has nothing for {half!a}") from None
+
+
+def _stage(output: Output, data: bytes, beside: dict[Output, Path]) -> None:
+    """Write a file in the same folder, under a name that nobody else has."""
+    target = _target(output.path)
+    file = target.with_name(f".dsc-{os.urandom(8).hex()}.tmp")
+    with output._reported():  # noqa: SLF001
+        opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        beside[output] = file
+        with os.fdopen(opened, "wb") as stream:
+            if (old := _status(target)) is not None:
+                with suppress(OSError):  # only root gives files away
+                    os.fchown(opened, old.st_uid, old.st_gid)
+                os.fchmod(opened, stat.S_IMODE(old.st_mode))
+            stream.write(data)
+            stream.flush()
+            os.fsync(opened)
+
+
+def _status(path: Path) -> os.stat_result | None:
+    """What the operating system says of what the name leads to; `None` if there is nothing."""
+    try:
+        return path.stat()
+    except FileNotFoundError:
+        return None
+
+
+def _target(path: Path) -> Path:
+    """The file that the name leads to, through all links."""
+    return Path(os.path.realpath(path))
+
+
+def _identity(path: Path) -> _Identity:
+    """Equal for two names of one file; a file that is not there is its name in its folder."""
+    try:
+        found = _status(path)
+        if found is not None:
+            return found.st_dev, found.st_ino
+        target = _target(path)
+        folder = target.parent.stat()
+    except (OSError, ValueError):
+        return (str(path),)
+    return folder.st_dev, folder.st_ino, target.name
+
+
+def _descriptor(path: Path) -> int | None:
+    """The number of the open file that the name stands for, as `/dev/stdout` does; `None` for other names."""
+    for _ in range(8):  # links to links
+        folder = _DESCRIPTORS.fullmatch(os.path.realpath(path.parent))
+        if folder is not None and path.name.isdecimal():
+            return int(path.name) if int(folder["process"]) == os.getpid() else None
+        if not path.is_symlink():
+            return None
+        path = path.parent / path.readlink()
+    return None
+
+
+def _lost(path: Path) -> Path | None:
+    """The store whose file is empty or gone, if that is its place or its log, which may hold all of it."""
+    for end, begins in _LOGS.items():
+        log = path if path.name.endswith(end) else path.with_name(path.name + end)
+        if any(_begins(log, begin) for begin in begins):
+            return log.with_name(log.name.removesuffix(end))
+    return None
+
+
+def _begins(path: Path, begin: bytes | str) -> bool:
+    """Whether it is a regular file that begins so. Not for stores: to close one takes SQLite's locks on it away."""
+    wanted = begin.encode() if isinstance(begin, str) else begin
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):  # others could keep us waiting
+            return False
+        with path.open("rb") as file:
+            return file.read(len(wanted)) == wanted
+    except OSError:
+        return False
+
+
+_KINDS = {stat.S_IFDIR: "a folder", stat.S_IFBLK: "a disk", stat.S_IFSOCK: "a socket"}
+"""What is never written to, as messages call it."""

@@ -1,0 +1,90 @@
+"""Whether what was written with one schema can be read with another: when nothing was taken away or changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from knowledge_base.errors import Place, SchemaError, SchemaMismatchError, nearest
+from knowledge_base.facts import Delta
+from knowledge_base.language.vocabulary import ROOT_TYPE, Signature
+from knowledge_base.world.change_checks import require_single
+from knowledge_base.world.schema import Schema
+from knowledge_base.world.state import WorldState
+
+
+def require_extension(written: Schema, given: Schema, place: Place | None = None) -> None:
+    """Raise an error unless `given` declares all that `written` does, and that alike.
+
+    New types, constants, predicates and functions are welcome, and more predicates that are functional;
+    parameters' names do not matter.
+
+    Raises:
+        SchemaMismatchError: each difference is named, with the nearest name of `given` for a missing one.
+    """
+    foreign = _declared(written).isdisjoint(_declared(given))
+    found = [
+        *_differences("type", written.types, given.types, hint=not foreign),
+        *_differences("constant", written.constants, given.constants, hint=not foreign),
+        *_differences("predicate", _shapes(written.predicates), _shapes(given.predicates), hint=not foreign),
+        *_differences("function", _shapes(written.functions), _shapes(given.functions), hint=not foreign),
+        *(
+            f"the predicate '{name}' was functional, now it is not"
+            for name in sorted(written.functional & given.predicates.keys() - given.functional)
+        ),
+    ]
+    if found:
+        said = "it is about another domain" if foreign else "the schema is another one"
+        raise SchemaMismatchError(found, place=place, said=said)
+
+
+def _declared(schema: Schema) -> set[str]:
+    return {*schema.types, *schema.constants, *schema.predicates, *schema.functions} - {ROOT_TYPE}
+
+
+def require_functional(state: WorldState, place: Place | None = None) -> None:
+    """Raise an error if the world says two things of what the schema made functional after it was written.
+
+    Raises:
+        SchemaMismatchError: the two facts are named.
+    """
+    try:
+        require_single(Delta(added=tuple(state.facts)), state)
+    except SchemaError as error:
+        raise SchemaMismatchError([error.message], place=place) from None
+
+
+def missing_constants(state: WorldState, place: Place | None = None) -> Delta:
+    """The change that adds those constants that the schema got after the world was written.
+
+    Raises:
+        SchemaMismatchError: a thing of that name is there already, and of another type.
+    """
+    known, constants = state.nodes, state.schema.constants
+    wrong = [
+        f"the constant '{name}' is a thing of type '{known[name]}' there, not '{type_name}'"
+        for name, type_name in constants.items()
+        if known.get(name, type_name) != type_name
+    ]
+    if wrong:
+        raise SchemaMismatchError(wrong, place=place)
+    return Delta(nodes={name: t for name, t in constants.items() if name not in known})
+
+
+def _differences(
+    kind: str, written: Mapping[str, str | None], given: Mapping[str, str | None], *, hint: bool
+) -> Iterator[str]:
+    for name, declared in written.items():
+        if name not in given:
+            meant = nearest(name, given.keys() - written.keys()) if hint else None
+            yield f"the {kind} '{name}' is missing" + (f" (nearest: '{meant}')" if meant else "")
+        elif given[name] != declared:
+            yield f"the {kind} '{name}' was declared '{declared}', now it is '{given[name]}'"
+
+
+def _shapes(signatures: Mapping[str, Signature]) -> dict[str, str | None]:
+    """What a declaration means, in words: the types of its arguments, and of a function's content."""
+    return {
+        name: " ".join([name, *("/".join(p.types or (ROOT_TYPE,)) for p in signature.parameters)])
+        + ("" if signature.result in (None, "number") else f" - {signature.result}")
+        for name, signature in signatures.items()
+    }

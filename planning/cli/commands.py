@@ -1,0 +1,196 @@
+"""Commands `dsc plan`, `dsc doctor` and `dsc bundles`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from planning.cli.plan_report import TIMED_OUT, answer_of, end, ordered, purposes
+from planning.cli.solving import read_files, solved, why_none
+
+if TYPE_CHECKING:
+    from knowledge_base.language.expression import Expression
+    from knowledge_base.store import KnowledgeBase
+    from planning.bundles import Bundle
+    from planning.domain import PlanningDomain
+    from planning.ordering.partial_order import PartialOrder
+    from planning.plan import Plan
+
+
+def bundles_command(
+    name: Annotated[str | None, typer.Argument(help="Only this one, with all that it has.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Show the bundles of the installed packages: components, plots and planning actions to build a robot of."""
+    from knowledge_base.errors import UnknownNameError
+    from planning.bundles import GROUP, installed
+
+    found = installed()
+    if name is not None and name not in found:
+        raise UnknownNameError(f"there is no bundle '{name}'", found=name, valid=found)
+    shown = list(found.values()) if name is None else [found[name]]
+    if as_json:
+        said = [bundle.to_json() for bundle in shown]
+        typer.echo(json.dumps(said if name is None else said[0]))
+    elif not shown:
+        typer.echo(f"no installed package has bundles (entry points '{GROUP}')")
+    elif name is None:
+        width = max(map(len, found))
+        for bundle in shown:
+            typer.echo(f"{bundle.name:<{width}}  {bundle.about or _counted(bundle)}")
+    else:
+        typer.echo("\n".join(_lines(shown[0].to_json())))
+
+
+def _counted(bundle: Bundle) -> str:
+    return f"plots: {len(bundle.primitive)} primitive, {len(bundle.abstract)} abstract"
+
+
+def _lines(said: dict[str, Any]) -> list[str]:
+    about = f": {said['about']}" if said["about"] else ""
+    lines = [f"{said['name']}{about}"]
+    lines += [f"component {name}: {', '.join(skills) or 'no skills'}" for name, skills in said["components"].items()]
+    for what, title in (
+        ("primitive", "primitive plots"), ("abstract", "abstract plots"), ("actions", "planning actions"),
+        ("needs", "needs"),
+    ):  # fmt: skip
+        if said[what]:
+            lines.append(f"{title}: {', '.join(said[what])}")
+    return lines
+
+
+PIPE_WIDTH = 120
+"""Columns of a table that is not printed on a terminal."""
+
+EVERY_ENGINE = (
+    "Negative conditions, disjunctions, quantifiers, conditional effects and derived predicates are compiled away,"
+    " so that every engine can do them."
+)
+
+
+def doctor_command(
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Show which planning engines there are, what each can do, and how to install what is missing."""
+    from planning.engines.installed import findings
+
+    found = findings()
+    if as_json:
+        typer.echo(json.dumps(found))
+        return
+    from rich.console import Console
+
+    console = Console(width=None if sys.stdout.isatty() else PIPE_WIDTH)
+    console.print(_engine_table(found["engines"]))
+    for one in found["engines"]:
+        if not one["ready"]:
+            console.print(f"  {one['name']}: {one['to_do']}", markup=False, highlight=False)
+    console.print(EVERY_ENGINE, highlight=False)
+    versions = {"Python": found["python"], "Java": found["java"], **found["packages"]}
+    said = ", ".join(f"{name} {version or '(none)'}" for name, version in versions.items())
+    console.print(f"\n{said}; {found['system']}", markup=False, highlight=False)
+
+
+def _engine_table(engines: list[dict[str, Any]]) -> Any:
+    from rich.table import Table
+
+    table = Table(title="planning engines", title_justify="left")
+    for head in ("engine", "version", "can do", "plans", "by itself", "licence"):
+        table.add_column(head, overflow="fold")
+    for one in engines:
+        plans = "the cheapest" if one["optimal"] else "better and better" if one["anytime"] else "one"
+        version = one["version"] or "missing" if one["ready"] else "[yellow]missing[/]"
+        races = "races" if one["races"] else "by name only"
+        table.add_row(one["name"], version, ", ".join(one["can_do"]), plans, races, one["licence"])
+    return table
+
+
+PLOT_NAME = "plan"
+
+
+def plan_command(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DOMAIN... PROBLEM", help="PDDL: the domain, in one file or several, and the problem.",
+            show_default=False,
+        ),
+    ],
+    engine: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which engine plans.  [default: those that suit it race]")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Stop posing and planning after this long.")] = 10.0,
+    parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can go side by side.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete; - is standard output.")
+    ] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Say what each step is for, or why there is no plan.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:  # fmt: skip
+    """Find a plan and print its steps.
+
+    Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
+    """
+    from knowledge_base.output_files import Output
+    from planning.cancellable_work import WorkLimitError
+    from planning.cli.plan_report import valueless
+    from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
+    from planning.problem.constructs import why_no_engine
+
+    output = None if plot is None else Output(plot, "--plot", *files)
+    domain, read, world = read_files(files)
+    notes = [*domain.notes, *read.notes]
+    try:
+        problem, outcome = solved(domain, read, world, seconds, engine)
+    except WorkLimitError as error:
+        late: dict[str, Any] = {"outcome": "timed_out", "steps": [], "engine": None, "seconds": seconds}
+        end(TIMED_OUT, late | {"while": error.doing}, notes, as_json=as_json)
+    notes += problem.notes
+    status, answer = answer_of(outcome)
+    if isinstance(outcome, NobodyCan):
+        answer["reason"] = why_no_engine(domain, read.goal, outcome)
+    if isinstance(outcome, ProvenUnsolvable) and explain:
+        answer["why"] = why_none(domain, read, world, seconds)
+    if isinstance(outcome, PlanFound):
+        plan = outcome.plan
+        notes += valueless(plan, domain, read)
+        order = _order(plan, domain, world, read.goal)
+        notes += _untraced(domain) if parallel or explain or plot else []
+        answer |= ordered(order) if parallel else {}
+        answer |= purposes(order) if explain else {}
+        if output is not None:
+            output.write(_plot_text(outcome.plan, domain, order if parallel else None))
+    end(status, answer, notes, as_json=as_json)
+
+
+def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expression) -> PartialOrder:
+    from planning.ordering.partial_order import deordered, in_sequence
+    from planning.ordering.timed_links import linked
+    from planning.problem.axioms import Derivable
+
+    if Derivable.of(domain) is not None:
+        return in_sequence(plan)
+    return (linked if plan.schedule else deordered)(plan, domain, world, goal)
+
+
+def _untraced(domain: PlanningDomain) -> list[str]:
+    """A note where plans are only for looking at."""
+    from planning.problem.axioms import Derivable
+
+    form = Derivable.of(domain)
+    names = ", ".join(f"'{one}'" for one in sorted(form.predicates)) if form else ""
+    why = "planning actions change what it follows from, itself included"
+    return [f"{names}: {why}, so who needs what is not traced, and no robot can carry the plan out"] if form else []
+
+
+def _plot_text(plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> str:
+    from dsc.text.plot_files import plot_to_yaml
+    from planning.generation.plan_to_plot import plot_from_plan
+
+    return plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))

@@ -1,0 +1,160 @@
+"""Report of `dsc plan`: plain data for `--json`, a text for people, and warnings about the problem."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import typer
+
+from knowledge_base.facts import Fact
+from knowledge_base.language.effect import AllOf, Effect, NumericEffect, When, effect_conditions
+from knowledge_base.language.expression import Call, Constant, Expression, Term, parts_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from knowledge_base.exchange.pddl import ProblemText
+    from planning.domain import PlanningDomain
+    from planning.ordering.partial_order import PartialOrder
+    from planning.plan import Plan, PlanningOutcome
+
+
+FOUND, UNSOLVABLE, TIMED_OUT, FAILED = 0, 1, 3, 4
+"""Exit statuses; 2 is bad input, for every command."""
+
+
+def end(status: int, answer: dict[str, Any], notes: list[str], *, as_json: bool) -> NoReturn:
+    """Say it, the notes on standard error, and exit."""
+    for note in () if as_json else notes:
+        typer.echo(f"note: {note}", err=True)
+    typer.echo(json.dumps(answer | {"notes": notes}) if as_json else _text(answer), err=status != FOUND and not as_json)
+    raise typer.Exit(status)
+
+
+def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
+    """Exit status and what is printed."""
+    from planning.plan import EngineFailed, NobodyCan, NoneFound, PlanFound, ProvenUnsolvable, TimedOut
+
+    match outcome:
+        case PlanFound(plan=plan, engine=engine, seconds=seconds, cost=cost):
+            found: dict[str, Any] = {"outcome": "plan", "steps": [str(step) for step in plan.steps]}
+            if plan.schedule:
+                found["schedule"] = [[round(one.start, 6), round(one.duration, 6)] for one in plan.schedule]
+            return FOUND, {**found, "cost": cost, "engine": engine, "seconds": round(seconds, 3)}
+        case ProvenUnsolvable(engine=engine, reason=reason):
+            return UNSOLVABLE, {"outcome": "unsolvable", "steps": [], "engine": engine, "reason": reason}
+        case NoneFound(engine=engine, reason=reason):
+            return UNSOLVABLE, {"outcome": "none_found", "steps": [], "engine": engine, "reason": reason}
+        case TimedOut(engine=engine, seconds=seconds):
+            return TIMED_OUT, {"outcome": "timed_out", "steps": [], "engine": engine, "seconds": seconds}
+        case EngineFailed(engine=engine, message=message):
+            return FAILED, {"outcome": "engine_failed", "steps": [], "engine": engine, "reason": message}
+        case NobodyCan(engine=engine, message=message):
+            return FAILED, {"outcome": "no_engine", "steps": [], "engine": engine, "reason": message}
+
+
+def ordered(order: PartialOrder) -> dict[str, Any]:
+    """The chains that can go side by side, and what each step waits for; steps are numbered from 1."""
+    from planning.ordering.chains import chains
+
+    linked = {(link.provider, link.user) for link in order.links}
+    found = chains(order.earlier, lambda one, other: (one, other) in linked)
+    waits = {number: list(earlier) for number, earlier in order.waits_for.items()}
+    return {"lanes": [list(chain) for chain in found], "waits_for": waits}
+
+
+def purposes(order: PartialOrder) -> dict[str, Any]:
+    """For each step what it brings about and for whom; 0 is the goal."""
+    from knowledge_base.language.printer import to_text
+
+    purposes: dict[int, list[dict[str, Any]]] = {number: [] for number in range(1, len(order.steps) + 1)}
+    for link in order.links:
+        if link.provider:
+            user = link.user if link.user <= len(order.steps) else 0
+            purposes[link.provider].append({"fact": to_text(link.fact), "for": user})
+    return {"purposes": purposes}
+
+
+def _text(answer: Mapping[str, Any]) -> str:
+    match answer["outcome"]:
+        case "plan":
+            return _plan_text(answer) if answer["steps"] else "nothing to do: the goal already holds"
+        case "none_found" | "no_engine":
+            reason: str = answer["reason"]
+            return reason
+        case "unsolvable":
+            return "\n".join([f"there is no plan ({answer['reason']})", *answer.get("why", ())])
+        case "timed_out":
+            by = f"while {answer['while']}" if "while" in answer else answer["engine"]
+            return f"no plan within {answer['seconds']:g} s ({by})"
+        case _:
+            return f"the planner {answer['engine']} failed: {answer['reason']}"
+
+
+def _plan_text(answer: Mapping[str, Any]) -> str:
+    """One step a line, by lanes if they are known, each with what it waits for and what it is for."""
+    lanes = answer.get("lanes") or [range(1, len(answer["steps"]) + 1)]
+    lines: list[str] = []
+    for number, lane in enumerate(lanes, 1):
+        lines += [f"lane {number}"] if "lanes" in answer else []
+        before = None
+        for step in lane:
+            others = [one for one in answer.get("waits_for", {}).get(step, ()) if one != before]
+            waiting = f"   waits for {', '.join(map(str, others))}" if others else ""
+            timed = _time_text(*answer["schedule"][step - 1]) if "schedule" in answer else ""
+            lines.append(f"{step:3} {timed}{answer['steps'][step - 1]}{waiting}")
+            before = step
+            for purpose in answer.get("purposes", {}).get(step, ()):
+                user = f"step {purpose['for']}" if purpose["for"] else "the goal"
+                lines.append(f"      {purpose['fact']} for {user}")
+    return "\n".join([*lines, f"cost {answer['cost']:g}, engine {answer['engine']}"])
+
+
+def _time_text(start: float, seconds: float) -> str:
+    """When a step begins and how long it takes, in the way of temporal planners."""
+    return f"{start:8.3f}: [{seconds:g}] "
+
+
+def without_derived(read: ProblemText, domain: PlanningDomain, file: Path) -> ProblemText:
+    """The problem without facts that only follow from others, with a note for each predicate."""
+    derived = {axiom.predicate for axiom in domain.axioms}
+    said = dict.fromkeys(fact.predicate for fact in read.init if fact.predicate in derived)
+    notes = [f"{file}: what :init says of '{name}' is not heeded: it is derived" for name in said]
+    kept = tuple(fact for fact in read.init if fact.predicate not in derived)
+    return replace(read, init=kept, notes=(*read.notes, *notes))
+
+
+def valueless(plan: Plan, domain: PlanningDomain, read: ProblemText) -> list[str]:
+    """A note for each number that a step of the plan asks for and nobody has given a value; it counts as 0."""
+    given, missing = set(read.values), dict[Fact, None]()
+    for step in plan.steps:
+        ground = domain.ground(step)
+        asked = [*_fluents(ground.condition), *(one for e in effect_conditions(ground.effect) for one in _fluents(e))]
+        changed = list(_assigned(ground.effect))
+        asked += [one for _, amount in changed for one in _fluents(amount)]
+        missing.update(dict.fromkeys(one for one in asked if one not in given))
+        given.update(fluent for fluent, _ in changed)
+    return [f"{fluent} has no value and counts as 0" for fluent in missing]
+
+
+def _assigned(effect: Effect) -> Iterator[tuple[Fact, Term]]:
+    match effect:
+        case AllOf(parts):
+            for part in parts:
+                yield from _assigned(part)
+        case When(_, inner):
+            yield from _assigned(inner)
+        case NumericEffect(_, call, amount):
+            for fluent in _fluents(call):
+                yield fluent, amount
+
+
+def _fluents(e: Expression | Term) -> Iterator[Fact]:
+    """Those that are named without variables."""
+    if isinstance(e, Call) and all(isinstance(arg, Constant) for arg in e.args):
+        yield Fact(e.function, tuple(arg.value for arg in e.args if isinstance(arg, Constant)))
+    for part in parts_of(e):
+        yield from _fluents(part)

@@ -1,0 +1,117 @@
+"""A plan that does not hold any more is mended where that takes little: what comes next stays as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from itertools import islice
+
+from knowledge_base.errors import InputError
+from knowledge_base.language.evaluation import World, holds
+from knowledge_base.language.expression import And, Atom, Constant, Expression
+from planning.cancellable_work import WorkLimit
+from planning.domain import PlanningDomain
+from planning.execution.progress import PlanProgress
+from planning.plan import Plan, PlanStep
+from planning.problem.construction import build_problem
+from planning.problem.derived import derivation
+from planning.strips import Problem
+from planning.validation import validate
+
+MOST_LONGER = 2
+"""A mended plan is taken if it has at most so many steps more than what was left."""
+_MOST_UNMET = 3
+"""An end of a plan that lacks more than so many conditions is not worth asking about."""
+_MOST_LEFT_OUT = 2
+"""So many of the first steps may be done in another way than planned."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocalRepair:
+    """The end of a plan to be kept, and the problem of making it possible again."""
+
+    end: tuple[PlanStep, ...]
+    problem: Problem
+
+    def mended(
+        self, first: Plan, before: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
+    ) -> Plan | None:
+        """The plan that begins with the solution `first`, if it leads to the goal and is not much longer."""
+        plan = Plan((*first.steps, *self.end))
+        short = len(plan.steps) <= len(before) + MOST_LONGER
+        return plan if short and validate(plan, domain, world, goal).valid else None
+
+
+def mending(
+    before: PlanProgress,
+    excluded: AbstractSet[PlanStep],
+    domain: PlanningDomain,
+    world: World,
+    goal: Expression,
+    patience: WorkLimit | None = None,
+) -> LocalRepair | None:
+    """How to mend what is left of a plan, if that promises to take little.
+
+    Of the ends of the plan the one that is nearest to being possible is kept; the problem is to reach what it needs.
+
+    Args:
+        before: the plan as far as it came.
+        excluded: steps that shall not be taken.
+        domain: has the steps' conditions and effects.
+        world: the present.
+        goal: what the plan is for.
+        patience: for how long.
+
+    Raises:
+        OutOfPatienceError: it takes too long.
+    """
+    derived = derivation(domain)
+    closed, left = derived.world(world), before.left  # once: the plan may go on meanwhile
+    if derived.recursive:  # its conditions are those of another state of the world
+        before = before.renewed(derived.domain, derived.expand(goal))
+    ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))
+    known = ((before.steps_of(end), before.needed_by(end)) for end in ends)
+    allowed = [(end, needed) for end, needed in known if excluded.isdisjoint(end)]
+    truths = _Truths(closed)
+    gaps = [(end, needed, truths.unmet(needed)) for end, needed in allowed if needed is not None]
+    near = [(end, needed, gap) for end, needed, gap in gaps if len(gap) <= _MOST_UNMET]
+    if not near:
+        return None
+    end, needed, gap = min(near, key=lambda one: len(one[0]) + len(one[2]))
+    if not all(map(derived.may_change, gap)):
+        return None
+    try:
+        problem = build_problem(domain, world, And(tuple(needed)), patience=patience)
+    except InputError:  # what the end needs cannot be asked for
+        return None
+    return None if problem.unreachable else LocalRepair(end, problem)
+
+
+class _Truths:
+    """What holds of what is needed, asked once: one end of a plan needs most of what a shorter one does."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._known: dict[int, bool] = {}  # by identity: conditions live as long as the plan that they are about
+
+    def unmet(self, needed: Iterable[Expression]) -> list[Expression]:
+        """What does not hold of what is needed, as soon as it is too much no more of it."""
+        return list(islice((one for one in needed if not self._holds(one)), _MOST_UNMET + 1))
+
+    def _holds(self, condition: Expression) -> bool:
+        found = self._known.get(id(condition))
+        if found is None:
+            found = self._known[id(condition)] = _true(condition, self._world)
+        return found
+
+
+def _true(condition: Expression, world: World) -> bool:
+    if isinstance(condition, Atom) and condition.predicate in world.schema.predicates:
+        args = [term.value for term in condition.args if isinstance(term, Constant)]
+        if len(args) == len(condition.args) and condition.predicate not in world.schema.computed:
+            return world.holds(condition.predicate, tuple(args))  # most are such: asked once, not worth preparing
+    try:
+        return holds(condition, world)
+    except InputError:
+        return False

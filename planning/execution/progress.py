@@ -1,0 +1,215 @@
+"""A plan being carried out: what is done, at work and left, and whether what is left still leads to the goal."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from typing import Any
+
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Fact
+from knowledge_base.language.evaluation import World, holds
+from knowledge_base.language.expression import Expression
+from knowledge_base.world.overlay import Overlay
+from planning.domain import PlanningDomain
+from planning.execution.causal_needs import CausalNeeds
+from planning.plan import PlanStep
+from planning.problem.costs import TOTAL_COST
+from planning.quantities import worth
+
+_MOST_AT_WORK = 3
+"""Of so many steps at work, each is looked at as not begun and as done; of more, only all of them."""
+
+
+def leads_to(steps: Iterable[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> bool:
+    """Whether the steps, taken in this order from `world`, reach the goal; `world` stays as it is."""
+    ahead: Overlay | None = None  # not sooner than it is needed: of a plan's ends, most fail at their first step
+    try:
+        for step in steps:
+            if not domain.applicable(step, ahead or world):
+                return False
+            ahead = ahead or Overlay(world)
+            ahead.apply(domain.effects(step, ahead))
+        return holds(goal, ahead or world)
+    except InputError:  # something is not there any more, or cannot be computed
+        return False
+
+
+def shortest_end(
+    steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
+) -> tuple[PlanStep, ...] | None:
+    """The fewest last steps that lead to the goal from `world`; `None` if not even all of them do."""
+    ends = (tuple(steps[first:]) for first in range(len(steps), -1, -1))
+    return next((end for end in ends if leads_to(end, domain, world, goal)), None)
+
+
+def thinned(steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> tuple[PlanStep, ...]:
+    """A plan without steps that are of no use: each is left out, with what then cannot be done, if the goal is reached.
+
+    Action elimination (Nakhost & Müller 2010); the result is a plan whenever `steps` are one.
+    """
+    kept, number = tuple(steps), 0
+    while number < len(kept):
+        without = (*kept[:number], *_possible(kept[:number], kept[number + 1 :], domain, world))
+        if leads_to(without, domain, world, goal):
+            kept = without
+        else:
+            number += 1
+    return kept
+
+
+def _possible(
+    first: Iterable[PlanStep], then: Iterable[PlanStep], domain: PlanningDomain, world: World
+) -> Iterator[PlanStep]:
+    """Those of `then` that can be taken after `first`, the others left out."""
+    ahead = Overlay(world)
+    for step in first:
+        ahead.apply(domain.effects(step, ahead))
+    for step in then:
+        if domain.applicable(step, ahead):
+            ahead.apply(domain.effects(step, ahead))
+            yield step
+
+
+def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
+    """What the steps, taken in this order from `world`, add to `(total-cost)`; their number if it is not declared."""
+    if TOTAL_COST.function not in domain.schema.functions:
+        return len(steps)
+    ahead = Overlay(world)
+    for step in steps:
+        ahead.apply(domain.effects(step, ahead))
+    total = Fact(TOTAL_COST.function)
+    return worth(ahead, total) - worth(world, total)
+
+
+class PlanProgress:
+    """How far a plan is; steps are spoken of by their number, from 1.
+
+    A step is done, or left out by a rule, when one that has to come after it has begun: nobody begins a step too early.
+
+    Args:
+        steps: the plan's steps.
+        domain: has their conditions and effects, without derived predicates.
+        goal: what they are for, in the same way.
+        before: pairs of steps of which the first has to be done when the second begins; each pair of the
+            sequence if left out.
+
+    Attributes:
+        early: somebody else has brought about what a later step would bring, so that steps may be of no use.
+    """
+
+    def __init__(
+        self,
+        steps: Sequence[PlanStep],
+        domain: PlanningDomain,
+        goal: Expression,
+        before: AbstractSet[tuple[int, int]] | None = None,
+    ) -> None:
+        self.steps = tuple(steps)
+        self.goal = goal
+        self.domain = domain
+        self._needs = CausalNeeds(self.steps, domain, goal)
+        self._before = before
+        self._begun: set[int] = set()
+        self._done: set[int] = set()
+        self.early = False
+
+    def to_json(self) -> dict[str, Any]:
+        """The steps, their order, and how far they are; what is done follows from that."""
+        before = None if self._before is None else sorted(map(list, self._before))
+        steps = [step.to_json() for step in self.steps]
+        return {"steps": steps, "before": before, "begun": sorted(self._begun), "early": self.early}
+
+    @classmethod
+    def from_json(cls, form: Mapping[str, Any], domain: PlanningDomain, goal: Expression) -> PlanProgress:
+        """The inverse of `to_json`, with conditions written for the present state of the world."""
+        before = None if form["before"] is None else {(first, second) for first, second in form["before"]}
+        course = cls([PlanStep.from_json(step) for step in form["steps"]], domain, goal, before)
+        for number in form["begun"]:
+            course.begin(number)
+        course.early = form["early"]
+        return course
+
+    def renewed(self, domain: PlanningDomain, goal: Expression) -> PlanProgress:
+        """Just as far, with conditions written for another state of the world."""
+        course = PlanProgress(self.steps, domain, goal, self._before)
+        course._begun, course._done = set(self._begun), set(self._done)
+        return course
+
+    def take_in_order(self, before: AbstractSet[tuple[int, int]]) -> None:
+        """The steps wait for each other in this way as well; nothing has begun yet."""
+        self._before = None if self._before is None else self._before | before
+
+    def begin(self, number: int) -> None:
+        """A step has begun."""
+        self._begun.add(number)
+        agenda = [number]
+        while agenda:
+            later = agenda.pop()
+            earlier = self._earlier(later) - self._done
+            self._done |= earlier
+            agenda += earlier
+
+    def _earlier(self, later: int) -> set[int]:
+        if self._before is None:
+            return set(range(1, later))
+        return {first for first, second in self._before if second == later}
+
+    @property
+    def at_work(self) -> tuple[int, ...]:
+        """The steps that have begun and are not known to be done."""
+        return tuple(sorted(self._begun - self._done))
+
+    @property
+    def left(self) -> tuple[int, ...]:
+        """The steps that are not done, those at work among them, in an order in which they can be taken."""
+        return tuple(number for number in range(1, len(self.steps) + 1) if number not in self._done)
+
+    @property
+    def left_steps(self) -> tuple[PlanStep, ...]:
+        """The steps with the numbers of `left`."""
+        return self.steps_of(self.left)
+
+    def needed(self) -> Mapping[Expression, int] | None:
+        """What must hold now, with who needs it first; `None` if that cannot be written as conditions.
+
+        A step at work may have done its part already, so that what later steps need of it counts as well.
+        """
+        return self._needs.before(self.left)
+
+    def needed_by(self, numbers: tuple[int, ...]) -> Mapping[Expression, int] | None:
+        """As `needed`, if only the steps with these numbers, in this order, were left."""
+        return self._needs.before(numbers)
+
+    def steps_of(self, numbers: Iterable[int]) -> tuple[PlanStep, ...]:
+        """The steps with these numbers."""
+        return tuple(self.steps[number - 1] for number in numbers)
+
+    def needed_later(self) -> Mapping[Expression, int] | None:
+        """As `needed`, as if everything at work were done."""
+        return self._needs.before(self._after(self.at_work))
+
+    def stands(self, world: World) -> bool:
+        """Whether the goal is reached from `world`; each step at work may not have begun or be done."""
+        return any(leads_to(steps, self.domain, world, self.goal) for steps in self._ways_on())
+
+    def shortest_end(self, world: World) -> tuple[PlanStep, ...] | None:
+        """The fewest last steps that lead to the goal from `world`, each step at work among them or not."""
+        ends = (shortest_end(steps, self.domain, world, self.goal) for steps in self._ways_on())
+        return min((end for end in ends if end is not None), key=len, default=None)
+
+    def coming(self) -> tuple[PlanStep, ...]:
+        """The steps that have not begun."""
+        return self.steps_of(self._after(self.at_work))
+
+    def _ways_on(self) -> Iterator[tuple[PlanStep, ...]]:
+        """What may be left to do."""
+        at_work = self.at_work
+        sizes = range(len(at_work) + 1) if len(at_work) <= _MOST_AT_WORK else (0, len(at_work))
+        finished = itertools.chain.from_iterable(itertools.combinations(at_work, size) for size in sizes)
+        return (self.steps_of(self._after(done)) for done in finished)
+
+    def _after(self, done: Iterable[int]) -> tuple[int, ...]:
+        gone = set(done)
+        return tuple(number for number in self.left if number not in gone)

@@ -1,0 +1,299 @@
+"""Plan steps in a generated plot: their needs and effects, their resources, and the state that carries each out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.events import FAILURES
+from dsc.model.actions import Configure, Switch, Trigger, component_of, flat
+from dsc.model.plot import ActionPlot
+from dsc.model.rules import Rule
+from dsc.model.states import DynamicState, State, SubmachineState
+from dsc.sequencer.dispatcher import DEFAULT_WITHIN
+from knowledge_base.errors import UnknownNameError
+from knowledge_base.facts import Value
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect
+from knowledge_base.language.expression import (
+    And,
+    Arithmetic,
+    Atom,
+    Comparison,
+    Constant,
+    Expression,
+    Not,
+    Or,
+    Term,
+    substitute,
+    substitute_term,
+)
+from knowledge_base.language.identity_cache import IdentityCache
+from planning.domain import PlanningAction, PlanningDomain
+from planning.plan import PlanStep
+from planning.problem.relevance import changed, names_of
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What plots may use, in whatever way they run.
+
+    Attributes:
+        components: names of the components that they start, configure or switch.
+        anything: they may use others as well: they plan, or bind a plot that is a value.
+        seconds: the sum of the time limits of their skills.
+    """
+
+    components: frozenset[str] = frozenset()
+    anything: bool = False
+    seconds: float = 0.0
+
+    def clashes(self, other: Usage, shared: Iterable[str] = ()) -> bool:
+        """Whether both may need one component at once that is not among the `shared` ones."""
+        return self.anything or other.anything or bool((self.components & other.components).difference(shared))
+
+
+def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] = ()) -> Usage:
+    """What the plots may use, and what the rules have for their outcomes or put before and after them.
+
+    Raises:
+        UnknownNameError: a plot uses one that is not there.
+    """
+    found: dict[str, ActionPlot] = {}
+    waiting = list(plots)
+    applied = _applied(rules, waiting)
+    waiting += [library.plot(rule.do.use) for rule in applied if rule.do.use]
+    while waiting:
+        plot = waiting.pop()
+        if plot.name not in found:
+            found[plot.name] = plot
+            waiting += [library.plot(name) for name in sorted(plot.uses())]
+    actions = [action for plot in found.values() for action in _actions(plot)]
+    actions += [one for rule in applied for one in rule.do.command if isinstance(one, Configure | Switch)]
+    names = {name for action in actions if (name := component_of(action)) is not None}
+    limits = [action.within or DEFAULT_WITHIN for action in actions if isinstance(action, Trigger)]
+    return Usage(frozenset(names), any(map(_is_open, found.values())), sum(limits))
+
+
+def _applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
+    """The rules that may have something to do with a step over these plots."""
+    emitted = FAILURES.union(*(plot.emits for plot in plots))
+    actions = {plot.implements for plot in plots}
+    named = [rule for rule in rules if not rule.steps or actions.intersection(rule.steps)]
+    return [rule for rule in named if rule.on is None or rule.on in emitted]
+
+
+def fitting(plots: Iterable[ActionPlot], bindings: Mapping[str, Value]) -> tuple[ActionPlot, ...]:
+    """The plots whose condition does not rule out these arguments, whatever the world is like; all if none does not."""
+    plots = tuple(plots)
+    return tuple(plot for plot in plots if plot.when is None or not _is_false(plot.when, bindings)) or plots
+
+
+def _is_false(e: Expression, bindings: Mapping[str, Value]) -> bool:
+    match e:
+        case And(parts):
+            return any(_is_false(part, bindings) for part in parts)
+        case Comparison("=" | "!=" as operator):
+            sides = [substitute_term(side, bindings) for side in (e.left, e.right)]
+            values = [side.value for side in sides if isinstance(side, Constant)]
+            return len(values) == len(sides) and (values[0] == values[1]) is not (operator == "=")
+        case _:
+            return False
+
+
+def _actions(plot: ActionPlot) -> Iterable[Trigger | Configure | Switch]:
+    blocks = [actions for _, state, _ in plot.walk() if isinstance(state, State) for _, actions in state.blocks()]
+    found = (action for block in blocks for action in flat(block))
+    return [action for action in found if isinstance(action, Trigger | Configure | Switch)]
+
+
+def _is_open(plot: ActionPlot) -> bool:
+    states = [state for _, state, _ in plot.walk()]
+    planned = any(isinstance(state, DynamicState) and state.goal is not None for state in states)
+    return planned or any(isinstance(state, SubmachineState) and state.use.startswith("?") for state in states)
+
+
+PATIENCE = 2
+"""A step that takes so many times as long as its action says, or as its skills may take together, is broken off."""
+_MOST_CARRIED = 1024  # steps; a plan for 50 items has about 130
+_CONFIRM = ActionPlot.model_fields["confirm"].default
+
+
+@dataclass(frozen=True, slots=True)
+class CarriedStep:
+    """A step of a plan, ready to become states.
+
+    Attributes:
+        text: the step as in PDDL.
+        needed: ground conditions that must hold when it begins.
+        over_all: those that must hold all the time, as far as it does not change them itself.
+        effect: what it changes.
+        expected: what is to be seen when it is done; nothing if its effects are assumed.
+        assumed: whether its effects are told when it is done.
+        confirm: seconds until they must have been seen.
+        seconds: how long it may take; `None` if nobody knows.
+        content: what stands in its state: the candidates, or the plot it uses.
+        outcomes: what it may end with besides being done.
+        usage: what it takes hold of.
+    """
+
+    text: str
+    needed: tuple[Expression, ...]
+    over_all: tuple[Expression, ...]
+    effect: Effect
+    expected: tuple[Expression, ...]
+    content: Mapping[str, Any]
+    assumed: bool = False
+    confirm: float = _CONFIRM
+    seconds: Term | None = None
+    outcomes: frozenset[str] = frozenset()
+    usage: Usage = field(default_factory=Usage)
+
+
+class Carrier:
+    """Knows how steps are carried out: by which plots, and what these take hold of.
+
+    Args:
+        domain: has the steps' actions.
+        library: has the plots that implement them.
+        rules: may use more plots for what those end with.
+    """
+
+    def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule] = ()) -> None:
+        self._domain = domain
+        self._library = library
+        self.rules = tuple(rules)
+        self._usage: dict[tuple[str, ...], Usage] = {}  # most steps have the candidates of others
+        self._carried: dict[tuple[PlanStep, tuple[str, ...]], CarriedStep] = {}
+
+    @staticmethod
+    def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
+        """The same as for the plan before, if that had the same rules: most of its steps come again."""
+        known = _carriers.find(domain, library)
+        if known is None or known.rules != tuple(rules):
+            known = _carriers.keep(domain, library, Carrier(domain, library, rules))
+        return known
+
+    def carried(self, step: PlanStep) -> CarriedStep:
+        """The step as a dynamic state over the plots that carry it out, if its arguments do not rule them out.
+
+        Raises:
+            UnknownNameError: no plot implements its action, or one uses a plot that is not there.
+        """
+        plots = implementing(step, self._library)  # a library may grow, what it has does not change
+        key = step, tuple([plot.name for plot in plots])
+        known = self._carried.get(key)
+        if known is None:
+            if len(self._carried) >= _MOST_CARRIED:
+                self._carried.clear()
+            known = self._carried[key] = self._newly_carried(step, plots)
+        return known
+
+    def _newly_carried(self, step: PlanStep, plots: Iterable[ActionPlot]) -> CarriedStep:
+        bindings = self._domain.bindings(step)
+        candidates = fitting(plots, bindings)
+        names = tuple(plot.name for plot in candidates)
+        if names not in self._usage:
+            self._usage[names] = usage(candidates, self._library, self.rules)
+        used = self._usage[names]
+        taken = {name for plot in candidates for name in plot.parameters}
+        content = {"dynamic": names, "with": {name: value for name, value in bindings.items() if name in taken}}
+        return _step(
+            step, self._domain, content, None if used.anything else PATIENCE * used.seconds,
+            assumed=all(plot.effects == "assumed" for plot in candidates),
+            confirm=max(plot.confirm for plot in candidates),
+            outcomes=frozenset(event for plot in candidates for event in plot.emits), usage=used,
+        )  # fmt: skip
+
+
+_carriers: IdentityCache[PlanningDomain, Carrier] = IdentityCache(size=8)
+
+
+def sketched(step: PlanStep, domain: PlanningDomain) -> CarriedStep:
+    """The step as a state that uses a plot called like its action, which is still to be written."""
+    return _step(step, domain, {"use": step.action, "with": domain.bindings(step)}, None)
+
+
+def implementing(step: PlanStep, library: Library) -> tuple[ActionPlot, ...]:
+    """The plots that carry out a step's action; raises `UnknownNameError` if there is none."""
+    found = library.implementing(step.action)
+    if not found:
+        known = [plot.implements for plot in library if plot.implements]
+        raise UnknownNameError(
+            f"no plot implements the planning action '{step.action}'", found=step.action, valid=known
+        )
+    return found
+
+
+def expectation(effect: Effect, bindings: Mapping[str, Value]) -> Expression:
+    """What holds after an effect, as far as that does not depend on what held before."""
+    ground = [(_ground(part.atom, bindings), isinstance(part, Add)) for part in _literals(effect)]
+    added = [atom for atom, adds in ground if adds]
+    return And((*added, *(Not(atom) for atom, adds in ground if not adds and atom not in added)))
+
+
+def parts(e: Expression) -> tuple[Expression, ...]:
+    """The conditions that a conjunction consists of."""
+    return tuple(chain.from_iterable(map(parts, e.parts))) if isinstance(e, And) else (e,)
+
+
+def _step(
+    step: PlanStep, domain: PlanningDomain, content: Mapping[str, Any], seconds: float | None, *,
+    assumed: bool = False, **more: Any,
+) -> CarriedStep:  # fmt: skip
+    action, bindings, ground = domain.action(step), domain.bindings(step), domain.ground(step)
+    limit = _limit(action, bindings)
+    if limit is None and seconds:
+        limit = Constant(seconds)
+    return CarriedStep(
+        text=str(step),
+        needed=tuple(one for one in parts(ground.condition) if not _decided(one)),
+        over_all=tuple(substitute(one, bindings) for one in _watched(action)),
+        effect=ground.effect,
+        expected=() if assumed else parts(expectation(action.effect, bindings)),
+        content=content, assumed=assumed, seconds=limit, **more,
+    )  # fmt: skip
+
+
+def _decided(e: Expression) -> bool:
+    """Whether it holds whatever the world is like; what a recursive predicate stands for is such a condition."""
+    match e:
+        case Comparison("=", Constant(one), Constant(other)):
+            return one == other
+        case And(those):
+            return all(map(_decided, those))
+        case Or(those):
+            return any(map(_decided, those))
+        case _:
+            return False
+
+
+def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None:
+    """How long the action may take, if it says so itself."""
+    if action.duration is None or action.duration.most == Constant(float("inf")):
+        return None
+    match substitute_term(action.duration.most, bindings):
+        case Constant(int() | float() as most):
+            return Constant(PATIENCE * most)
+        case most:
+            return Arithmetic("*", (Constant(PATIENCE), most))
+
+
+def _watched(action: PlanningAction) -> Iterator[Expression]:
+    """Over-all conditions that the action does not change itself: what it does when is its own affair."""
+    if action.timed is not None:
+        effects = (action.timed.start_effect, action.timed.end_effect)
+        own = {name for effect in effects for name in changed(effect)}
+        yield from (one for one in parts(action.timed.over_all) if not own.intersection(names_of(one)))
+
+
+def _literals(effect: Effect) -> list[Add | Delete]:
+    if isinstance(effect, AllOf):
+        return [literal for part in effect.parts for literal in _literals(part)]
+    return [effect] if isinstance(effect, Add | Delete) else []
+
+
+def _ground(atom: Atom, bindings: Mapping[str, Value]) -> Atom:
+    return Atom(atom.predicate, tuple(substitute_term(arg, bindings) for arg in atom.args))

@@ -1,0 +1,217 @@
+r"""One control flow of a generated plot: steps one after the other, waiting for those of other flows where they must.
+
+    before_3 -> step_3 -> after_3 -> before_5 -> step_5 -> after_5 -> finished_1
+                                 \-> replan_1, if what a step needs does not hold
+
+`after_n` waits until the step's effects are observed. `before_n` waits for steps of other flows: they set the variables
+`done_n` and `begun_n`, so that nobody has to ask again and again. Then it looks at what the step needs, so that no step
+begins on a wrong premise. Where there is nobody to wait for, `after_n` does that as well. Once the planner's component
+has said that other steps take the place of what is left (`held`), none begins. A step that rules may leave out has
+`step_n_skipped` besides: like `after_n`, without waiting for what the step would have changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from dsc.dynamic.responses import skipped
+from dsc.events import GAVE_UP
+from dsc.model.rules import REPLAN
+from knowledge_base.language.expression import And, Comparison, Constant, Expression, Not, Variable
+from knowledge_base.language.identity_cache import IdentityCache
+from knowledge_base.language.printer import to_text
+from planning.generation.carried_steps import CarriedStep
+from planning.ordering.partial_order import PartialOrder
+
+FINISHED = "finished"
+HELD = "held"
+"""Variable of a plot: no more steps begin, since others are going to take their place."""
+MOST_WATCHED = 86400
+"""Seconds: who watches a plan does so for as long as it takes; every wait has a bound."""
+_HELD = Comparison("=", Variable(HELD), Constant(value=True))
+_DONE, _BEGUN = "done", "begun"
+
+
+@dataclass(frozen=True, slots=True)
+class ControlFlow:
+    """A chain of steps; `mark` stands behind the names of its ends, which are unique in the plot."""
+
+    numbers: tuple[int, ...]
+    mark: str = ""
+    name: str = ""
+
+    @property
+    def finished(self) -> str:
+        """Name of the state at its end."""
+        return FINISHED + self.mark
+
+
+class Writer:
+    """Writes the states of the lanes of one plot.
+
+    Args:
+        steps: all steps.
+        order: which of them wait for which.
+        lanes: how they are spread.
+        plan: name under which the planner's component hears which step begins; nobody hears of a plot without it.
+        left_out: the steps that rules may leave out.
+        leading: outcomes with which rules leave the plan for another state, with what they pass to it.
+    """
+
+    def __init__(
+        self,
+        steps: Sequence[CarriedStep],
+        order: PartialOrder,
+        lanes: Sequence[ControlFlow],
+        plan: str | None,
+        left_out: Collection[int] = (),
+        leading: Mapping[str, Iterable[str]] = MappingProxyType({}),
+    ) -> None:
+        self._steps = dict(enumerate(steps, start=1))
+        self._left_out = left_out
+        self._ends: dict[str, Mapping[str, str]] = {end: {"reason": "?reason"} for end in (REPLAN, GAVE_UP)}
+        self._ends.update({end: {name: f"?{passed(name)}" for name in names} for end, names in leading.items()})
+        self._plan = plan
+        lane_of = {number: lane for lane in lanes for number in lane.numbers}
+        self._waits: dict[int, list[tuple[str, int]]] = {number: [] for number in self._steps}
+        for kind, pairs in ((_DONE, order.before), (_BEGUN, order.begin_before)):
+            for first, second in sorted(pairs):
+                if lane_of[first] is not lane_of[second]:
+                    self._waits[second].append((kind, first))
+        self._flags = dict.fromkeys(f"{kind}_{first}" for waits in self._waits.values() for kind, first in waits)
+
+    @property
+    def variables(self) -> Mapping[str, Any]:
+        """What lanes tell each other, and what they are told."""
+        names = (*self._flags, *([] if self._plan is None else [HELD]))
+        return {flag: {"type": "boolean", "initial": False} for flag in names}
+
+    def states(self, lane: ControlFlow) -> dict[str, Any]:
+        """The states of one lane, without the one at its end."""
+        first = lane.numbers[0] if lane.numbers else None
+        states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
+        for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
+            states[f"step_{number}"] = self._step(number, lane)
+            states[f"after_{number}"] = self._after(number, following, lane)
+            if number in self._left_out:
+                states[skipped(f"step_{number}")] = self._after(number, following, lane, left_out=True)
+            if following is not None and self._waits[following]:
+                states[f"before_{following}"] = self._before(following, lane)
+        for end, handed_out in self._ends.items():
+            states[end + lane.mark] = {"final": True, "emit": end, "with": handed_out}
+        return states
+
+    def _before(self, number: int | None, lane: ControlFlow) -> dict[str, Any]:
+        if number is None:
+            return {"always": self._onward(number, lane, ())}
+        waits = self._waits[number]
+        told = {"about": "waits for " + ", ".join(self._steps[other].text for _, other in waits)} if waits else {}
+        return {**told, "always": self._onward(number, lane, [_is_set(flag, other) for flag, other in waits])}
+
+    def _step(self, number: int, lane: ControlFlow) -> dict[str, Any]:
+        step = self._steps[number]
+        done = {"to": f"after_{number}", **({"tell": step.effect} if step.assumed else {})}
+        state: dict[str, Any] = {"about": step.text, **step.content, "on": {"done": done}}
+        if self._plan is not None:
+            listen = {"trigger": "planner.hold", "with": {"plan": self._plan}, "within": MOST_WATCHED}
+            state["entry"] = [{"set": f"planner.{self._plan}", "to": number}, listen]
+            state["on"]["held"] = {"assign": {HELD: True}}
+        if step.over_all:
+            state["always"] = [
+                self._replan(lane, f"lost during {step.text}: {to_text(one)}", Not(one)) for one in step.over_all
+            ]
+        if step.seconds is not None:
+            state["after"] = {"seconds": step.seconds, **self._replan(lane, f"too slow: {step.text}")}
+        return state
+
+    def _after(
+        self, number: int, following: int | None, lane: ControlFlow, *, left_out: bool = False
+    ) -> dict[str, Any]:
+        step, flag = self._steps[number], f"{_DONE}_{number}"
+        told = {"assign": {flag: True}} if flag in self._flags else {}
+        if following is not None and self._waits[following]:
+            onward = [_guarded({"to": f"before_{following}", **told}, None if left_out else _seen(step))]
+        elif left_out:
+            onward = self._onward(following, lane, (), told)
+        else:
+            onward = self._onward(following, lane, step.expected, told, step)
+        state: dict[str, Any] = {"always": onward}
+        if step.expected and not left_out:
+            state["after"] = {"seconds": step.confirm, **self._replan(lane, f"not observed: {step.text}")}
+        return state
+
+    def _onward(
+        self, number: int | None, lane: ControlFlow, first: Iterable[Expression], told: Mapping[str, Any] | None = None,
+        after: CarriedStep | None = None,
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """To a step if it is applicable, else back to planning; both only once the `first` conditions hold.
+
+        These are what `after` is expected to bring about, if that is given.
+        """
+        first, assigned = tuple(first), dict((told or {}).get("assign", {}))
+        begun = _joined(first) if after is None else _seen(after)
+        if number is None:
+            return [_guarded({"to": lane.finished, **(told or {})}, begun)]
+        step, flag = self._steps[number], f"{_BEGUN}_{number}"
+        if flag in self._flags:
+            assigned[flag] = True
+        begin = {"to": f"step_{number}", **({"assign": assigned} if assigned else {})}
+        both = _joined((*first, *step.needed)) if after is None else _between(after, step)
+        otherwise = [] if both == begun else [self._replan(lane, f"not applicable: {step.text}", begun)]
+        return [*self._held(lane, first, after), _guarded(begin, both), *otherwise]
+
+    def _held(self, lane: ControlFlow, first: Iterable[Expression], after: CarriedStep | None) -> list[dict[str, Any]]:
+        """No step begins if others take its place."""
+        if self._plan is None:
+            return []
+        when = _joined((_HELD, *first)) if after is None else _held_after(after)
+        return [self._replan(lane, "another plan takes its place", when)]
+
+    def _replan(self, lane: ControlFlow, reason: str, when: Expression | None = None) -> dict[str, Any]:
+        return _guarded({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, when)
+
+
+def passed(name: str) -> str:
+    """The variable of what a rule passes under that name to a state outside of the plan."""
+    return f"passed_{name}"
+
+
+def _guarded(transition: dict[str, Any], when: Expression | None) -> dict[str, Any]:
+    return transition if when is None else {**transition, "when": when}
+
+
+def _joined(conditions: Iterable[Expression]) -> Expression | None:
+    """All of them; `None` if there are none."""
+    all_ = tuple(dict.fromkeys(conditions))
+    return None if not all_ else all_[0] if len(all_) == 1 else And(all_)
+
+
+# What is known of a condition is known by its identity, and one plan has most pairs of steps of the one before.
+_pairs: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
+_ends: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
+
+
+def _seen(step: CarriedStep) -> Expression | None:
+    """What is to be seen when it is done."""
+    (found,) = _pairs.find(step, None) or _pairs.keep(step, None, (_joined(step.expected),))
+    return found
+
+
+def _held_after(step: CarriedStep) -> Expression | None:
+    """When nothing begins after it."""
+    (found,) = _ends.find(step, None) or _ends.keep(step, None, (_joined((_HELD, *step.expected)),))
+    return found
+
+
+def _between(step: CarriedStep, following: CarriedStep) -> Expression | None:
+    """What is to be seen when the one is done and needed by the other."""
+    both = (*step.expected, *following.needed)
+    (found,) = _pairs.find(step, following) or _pairs.keep(step, following, (_joined(both),))
+    return found
+
+
+def _is_set(kind: str, number: int) -> Expression:
+    return Comparison("=", Variable(f"{kind}_{number}"), Constant(value=True))

@@ -1,0 +1,184 @@
+"""Predicates that follow from themselves and from what actions change, as actions that derive them.
+
+`(above ?a ?b)` where blocks are moved: nothing can take its place, and no engine here knows axioms. But it can be
+worked out step by step: each axiom becomes an action of bookkeeping that adds what follows, and every action that may
+end something derived takes all of it back, to be derived anew (Gazen & Knoblock 1997; Thiébaux, Hoffmann & Nebel 2005).
+A fact that is derived in this way follows; one that is not may follow all the same. So that such a predicate does *not*
+hold cannot be asked for.
+
+A plan of that kind is for looking at: what a robot watches while it carries a plan out are facts and numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, effect_conditions, effect_leaves
+from knowledge_base.language.expression import Atom, Exists, Expression, Or, TypedVariable, Variable
+from planning.planning_actions import PlanningAction
+from planning.problem.construction import build_problem
+from planning.problem.derived import denied, derivation
+from planning.problem.relevance import name_of, names_of, relevant
+from planning.problem.unsolvability import why_unsolvable
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from knowledge_base.exchange.problem_text import Metric
+    from knowledge_base.language.evaluation import World
+    from planning.cancellable_work import WorkLimit
+    from planning.domain import Axiom, PlanningDomain
+    from planning.problem.derived import Derivation
+    from planning.strips import GroundAction, Problem
+
+_DERIVE = "derive "  # with a blank, which no declared name has
+
+
+@dataclass(frozen=True, slots=True)
+class Derivable:
+    """A domain in which axioms are actions, and what cannot be asked for.
+
+    Attributes:
+        original: what its derived predicates stand for.
+        domain: without derived predicates; engines plan with it, and why there is no plan is said of it.
+        predicates: those that its actions derive.
+    """
+
+    original: Derivation
+    domain: PlanningDomain
+    predicates: frozenset[str]
+
+    @staticmethod
+    def of(domain: PlanningDomain) -> Derivable | None:
+        """`None` if it has no such predicate, or durative actions change what one follows from."""
+        original = derivation(domain)
+        predicates = frozenset(original.unsupported)
+        plain = original.domain
+        axioms = [axiom for axiom in domain.axioms if axiom.predicate in predicates]
+        bodies = [original.expand(axiom.condition) for axiom in axioms]
+        harmed = _Harmed.of(bodies)
+        ending = {name: action for name, action in plain.actions.items() if harmed.by(action.effect)}
+        if not axioms or any(action.timed is not None for action in ending.values()):
+            return None
+        reset = AllOf(tuple(_forgotten(name, plain) for name in sorted(predicates)))
+        actions = {
+            name: replace(action, effect=AllOf((action.effect, reset))) if name in ending else action
+            for name, action in plain.actions.items()
+        }
+        for axiom, body in zip(axioms, bodies, strict=True):
+            for action in _deriving(axiom, body):
+                known = sum(name.startswith(action.name + " ") for name in actions)
+                name = f"{action.name} #{known + 1}"
+                actions[name] = replace(action, name=name)
+        return Derivable(original, replace(plain, actions=actions), predicates)
+
+    def world(self, world: World) -> World:
+        """The world with everything that follows now."""
+        return self.original.complete(world)
+
+    def build_problem(
+        self,
+        world: World,
+        goal: Expression,
+        metric: Metric | None = None,
+        *,
+        durations: bool = False,
+        patience: WorkLimit | None = None,
+    ) -> Problem:
+        """As `planning.problem.construction.pose`; steps that derive something are bookkeeping, which no plan shows.
+
+        Raises:
+            UnsupportedGoalError, UnsupportedActionError: also if it is asked for that a predicate does not follow.
+        """
+        wanted = self.original.expand(goal)
+        self._refuse_denied(wanted)
+        return _kept_books(
+            build_problem(self.domain, self.world(world), wanted, metric, durations=durations, patience=patience)
+        )
+
+    def why_none(self, world: World, goal: Expression, patience: WorkLimit | None = None) -> tuple[str, ...]:
+        """As `planning.problem.unsolvability.why_unsolvable`."""
+        return why_unsolvable(self.domain, self.world(world), self.original.expand(goal), patience)
+
+    def _refuse_denied(self, goal: Expression) -> None:
+        """What is derived step by step is known to hold when it does, and never not to."""
+        for atom in self._unknowable(goal):
+            raise UnsupportedGoalError(self._said("the goal", atom), place=atom.place)
+        for action in relevant(goal, None, self.domain.actions.values()).actions:
+            owner = f"the planning action '{action.name}'"
+            if action.name.startswith(_DERIVE):
+                owner = f"the axiom at {action.place}"
+            for atom in self._unknowable(action.precondition, *effect_conditions(action.effect)):
+                raise UnsupportedActionError(self._said(owner, atom), place=atom.place)
+
+    def _unknowable(self, condition: Expression, *of_effects: Expression) -> Iterator[Atom]:
+        asked = [denied(condition, wanted=True)]
+        asked += [denied(one, wanted=wanted) for one in of_effects for wanted in (True, False)]
+        return (atom for atoms in asked for atom in atoms if atom.predicate in self.predicates)
+
+    def _said(self, owner: str, atom: Atom) -> str:
+        return f"{owner} asks for the opposite of {self.original.why(atom.predicate)}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Harmed:
+    """What may end something derived: these facts becoming false, and those becoming true."""
+
+    when_false: frozenset[str]
+    when_true: frozenset[str]
+
+    @staticmethod
+    def of(bodies: Collection[Expression]) -> _Harmed:
+        asked = {name for body in bodies for name in names_of(body)}
+        wanted = {atom.predicate for body in bodies for atom in denied(body, wanted=False)}
+        unwanted = {atom.predicate for body in bodies for atom in denied(body, wanted=True)}
+        return _Harmed(frozenset(wanted), frozenset((asked - wanted) | unwanted))
+
+    def by(self, effect: Effect) -> bool:
+        """Whether the effect may do so; a number that changes may, whichever way."""
+        return any(
+            name_of(leaf) in (self.when_false if isinstance(leaf, Delete) else self.when_true)
+            for leaf in effect_leaves(effect)
+        )
+
+
+def _forgotten(predicate: str, domain: PlanningDomain) -> Effect:
+    parameters = domain.schema.predicates[predicate].parameters
+    variables = tuple(replace(p, name=f"forgotten{i}") for i, p in enumerate(parameters))
+    gone = Delete(Atom(predicate, tuple(Variable(p.name) for p in variables)))
+    return ForEach(variables, gone) if variables else gone
+
+
+def _deriving(axiom: Axiom, body: Expression) -> Iterator[PlanningAction]:
+    """An action for each alternative; what the body only says there is becomes a parameter, which is found by joins."""
+    match body:
+        case Or(parts):
+            for part in parts:
+                yield from _deriving(axiom, part)
+        case Exists(variables, inner) if _names(variables).isdisjoint(_names(axiom.parameters)):
+            for action in _deriving(axiom, inner):
+                yield replace(action, parameters=(*action.parameters, *variables))
+        case _:
+            head = Atom(axiom.predicate, tuple(Variable(p.name) for p in axiom.parameters))
+            yield PlanningAction(_DERIVE + axiom.predicate, axiom.parameters, body, Add(head), axiom.place)
+
+
+def _names(parameters: Collection[TypedVariable]) -> set[str]:
+    return {one.name for one in parameters}
+
+
+def _kept_books(problem: Problem) -> Problem:
+    """Who derives something is no step of a plan, and costs nothing."""
+
+    def whole() -> Problem:
+        return _kept_books(problem.unsliced()) if problem.unsliced is not None else problem
+
+    actions = tuple(map(_book, problem.actions))
+    return replace(problem, actions=actions, unsliced=None if problem.unsliced is None else whole)
+
+
+def _book(action: GroundAction) -> GroundAction:
+    derives = action.step is not None and action.step.action.startswith(_DERIVE)
+    return replace(action, step=None, cost=0.0) if derives else action

@@ -1,0 +1,332 @@
+"""Conditions after everything that cannot change was evaluated: what is left for a planner to decide.
+
+Quantifiers are expanded over the known objects; types, equality, numbers and predicates that no action
+changes, computed ones too, are evaluated on the world (partial evaluation). What remains is in negation normal form,
+its leaves literals and bounds on numbers that actions change.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Fact, Value
+from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
+from knowledge_base.language.evaluation import World, evaluate_argument, evaluate_term, holds
+from knowledge_base.language.expression import (
+    And,
+    Arithmetic,
+    Atom,
+    Call,
+    Comparison,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    TypedVariable,
+    Variable,
+    parts_of,
+)
+from knowledge_base.language.printer import to_text
+from planning.cancellable_work import WorkLimit
+from planning.quantities import OPPOSITE, Assignment, NumericBound, Quantity, combined
+from planning.unsupported import UnsupportedActionError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """A ground fact that shall hold, or shall not."""
+
+    fact: Fact
+    positive: bool = True
+
+    def __hash__(self) -> int:
+        """As a dataclass would, in one go: literals are looked up all the time."""
+        return hash((self.fact.predicate, self.fact.args, self.positive))
+
+    @property
+    def negated(self) -> Literal:
+        """The opposite."""
+        return Literal(self.fact, not self.positive)
+
+
+@dataclass(frozen=True, slots=True)
+class Every:
+    """All parts; never empty, never nested."""
+
+    parts: tuple[Residual, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Some:
+    """At least one part; never empty, never nested."""
+
+    parts: tuple[Residual, ...]
+
+
+Leaf = Literal | NumericBound
+Residual = bool | Leaf | Every | Some
+"""What is left of a condition: already decided, or a formula of literals and bounds."""
+
+
+def every(parts: Iterable[Residual]) -> Residual:
+    """The conjunction, simplified."""
+    kept: dict[Residual, None] = {}
+    for part in parts:
+        if part is False:
+            return False
+        kept.update(dict.fromkeys(part.parts if isinstance(part, Every) else (part,)))
+    kept.pop(True, None)
+    return True if not kept else next(iter(kept)) if len(kept) == 1 else Every(tuple(kept))
+
+
+def some(parts: Iterable[Residual]) -> Residual:
+    """The disjunction, simplified."""
+    kept: dict[Residual, None] = {}
+    for part in parts:
+        if part is True:
+            return True
+        kept.update(dict.fromkeys(part.parts if isinstance(part, Some) else (part,)))
+    kept.pop(False, None)
+    return False if not kept else next(iter(kept)) if len(kept) == 1 else Some(tuple(kept))
+
+
+def negation(residual: Residual) -> Residual:
+    """The opposite, in negation normal form."""
+    match residual:
+        case bool():
+            return not residual
+        case Literal():
+            return residual.negated
+        case NumericBound("=", left, right):
+            return _apart(left, right)
+        case NumericBound(operator, left, right):
+            return NumericBound(OPPOSITE[operator], left, right)
+        case Every(parts):
+            return some(map(negation, parts))
+        case Some(parts):
+            return every(map(negation, parts))
+
+
+def _apart(left: Quantity, right: Quantity) -> Residual:
+    """`!=` as engines take it."""
+    return Some((NumericBound("<", left, right), NumericBound(">", left, right)))
+
+
+def alternatives(residual: Residual) -> Iterator[tuple[Leaf, ...]]:
+    """The disjunctive normal form, one conjunction of leaves after the other, contradictory literals left out.
+
+    There may be exponentially many; take as many as you can bear.
+    """
+    match residual:
+        case bool():
+            yield from [()] if residual else []
+        case Literal() | NumericBound():
+            yield (residual,)
+        case Some(parts):
+            yield from itertools.chain.from_iterable(map(alternatives, parts))
+        case Every(parts):
+            for choice in itertools.product(*(tuple(alternatives(part)) for part in parts)):
+                conjunction = dict.fromkeys(itertools.chain.from_iterable(choice))
+                if not any(isinstance(one, Literal) and one.negated in conjunction for one in conjunction):
+                    yield tuple(conjunction)
+
+
+@dataclass(frozen=True, slots=True)
+class GroundEffect:
+    """One ground effect: a literal becomes true, or a number changes, if the condition held before."""
+
+    condition: Residual
+    what: Literal | Assignment
+
+
+def is_so(fact: Fact, world: World) -> bool:
+    """Whether the fact holds; worlds keep no facts of computed predicates."""
+    if fact.predicate in world.schema.computed:
+        return holds(Atom(fact.predicate, tuple(map(Constant, fact.args))), world)
+    return world.holds(fact.predicate, fact.args)
+
+
+@dataclass(frozen=True, slots=True)
+class Grounder:
+    """Evaluates what cannot change.
+
+    Attributes:
+        world: the present.
+        changing: the predicates and functions that the considered actions change.
+        keep_false: leave unchangeable facts that do not hold in the result, so that a goal which needs them
+            can say which they are.
+        patience: for how long; every choice of objects takes some of it.
+    """
+
+    world: World
+    changing: frozenset[str]
+    keep_false: bool = False
+    patience: WorkLimit = field(default_factory=WorkLimit, compare=False)
+
+    def precondition(self, e: Expression, bindings: Mapping[str, Value]) -> Residual:
+        """As `residual`, but facts that must hold or not hold in any case are left in, also unchangeable ones.
+
+        What is left then does not depend on them, and can be used again when somebody else changed them.
+        """
+        match e:
+            case And(parts):
+                return every(self.precondition(part, bindings) for part in parts)
+            case Atom(name) if name in self.world.schema.predicates:
+                return Literal(self.fact(e, bindings))
+            case Not(Atom(name) as atom) if name in self.world.schema.predicates:
+                return Literal(self.fact(atom, bindings), positive=False)
+            case _:
+                return self.residual(e, bindings)
+
+    def residual(self, e: Expression, bindings: Mapping[str, Value], *, wanted: bool = True) -> Residual:
+        """What is left of `e` (of its negation if not `wanted`) for the planner.
+
+        Raises:
+            UnsupportedActionError: a fact is about a number that actions change.
+        """
+        match e:
+            case Atom():
+                found = self._atom(e, bindings, wanted=wanted)
+            case Not(body):
+                found = self.residual(body, bindings, wanted=not wanted)
+            case And(parts) | Or(parts):
+                join = every if isinstance(e, And) is wanted else some
+                found = join(self.residual(part, bindings, wanted=wanted) for part in parts)
+            case Imply(premise, conclusion):
+                found = self.residual(Or((Not(premise), conclusion)), bindings, wanted=wanted)
+            case Exists(variables, body) | Forall(variables, body):
+                join = every if isinstance(e, Forall) is wanted else some
+                choices = self.choices(variables, bindings)
+                found = join(self.residual(body, inner, wanted=wanted) for inner in choices)
+            case Comparison():
+                found = self._comparison(e, bindings, wanted=wanted)
+        return found
+
+    def effects(
+        self,
+        effect: Effect,
+        bindings: Mapping[str, Value],
+        condition: Residual = True,  # noqa: FBT002  a formula that is decided already
+    ) -> Iterator[GroundEffect]:
+        """The ground effects on changing predicates and functions."""
+        match effect:
+            case Add(atom) | Delete(atom):
+                if atom.predicate in self.changing:
+                    yield GroundEffect(condition, Literal(self.fact(atom, bindings), isinstance(effect, Add)))
+            case AllOf(parts):
+                for part in parts:
+                    yield from self.effects(part, bindings, condition)
+            case ForEach(variables, body):
+                for inner in self.choices(variables, bindings):
+                    yield from self.effects(body, inner, condition)
+            case When(premise, body):
+                both = every([condition, self.residual(premise, bindings)])
+                if both is not False:
+                    yield from self.effects(body, bindings, both)
+            case NumericEffect():
+                if effect.call.function in self.changing:
+                    yield GroundEffect(condition, self._assignment(effect, bindings))
+
+    def choices(self, variables: Iterable[TypedVariable], bindings: Mapping[str, Value]) -> Iterator[dict[str, Value]]:
+        """The bindings extended by every choice of objects for `variables`.
+
+        Raises:
+            OutOfPatienceError: there are too many for the time that is left.
+        """
+        chosen = list(variables)
+        for values in itertools.product(*map(self.objects, chosen)):
+            self.patience.spend()
+            yield {**bindings, **dict(zip((v.name for v in chosen), values, strict=True))}
+
+    def objects(self, variable: TypedVariable) -> dict[str, None]:
+        """What the variable may stand for, as a set in order."""
+        types = variable.types or ("object",)
+        return dict.fromkeys(name for one in types for name in self.world.objects(one))
+
+    def fact(self, atom: Atom | Call, bindings: Mapping[str, Value]) -> Fact:
+        """The atom, or the numeric fluent, with values for its terms.
+
+        Raises:
+            UnsupportedActionError: one of them is a number that actions change.
+        """
+        name = atom.predicate if isinstance(atom, Atom) else atom.function
+        return Fact(name, tuple([self._value(term, bindings) for term in atom.args]))
+
+    def quantity(self, term: Term, bindings: Mapping[str, Value]) -> Quantity:
+        """What the term is worth, as far as that cannot change.
+
+        Raises:
+            InputError: it is no number, or divides by zero.
+        """
+        match term:
+            case Call(function) if function in self.changing:
+                return self.fact(term, bindings)
+            case Arithmetic(operator, args) if self.changes(term):
+                try:
+                    return combined(operator, tuple(self.quantity(arg, bindings) for arg in args))
+                except ArithmeticError as error:
+                    raise InputError(f"{to_text(term)} cannot be computed: {error}", place=term.place) from None
+            case _:
+                number = evaluate_term(term, self.world, bindings)
+                if not isinstance(number, int | float):
+                    raise InputError(f"'{number}' is no number", place=term.place)
+                return number
+
+    def changes(self, e: Expression | Term) -> bool:
+        """Whether it asks for a number that actions change."""
+        return (isinstance(e, Call) and e.function in self.changing) or any(map(self.changes, parts_of(e)))
+
+    def _comparison(self, e: Comparison, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:
+        if not self.changes(e):
+            return holds(e, self.world, bindings) is wanted
+        left, right = self.quantity(e.left, bindings), self.quantity(e.right, bindings)
+        bound = _apart(left, right) if e.operator == "!=" else NumericBound(e.operator, left, right)
+        return bound if wanted else negation(bound)
+
+    def _assignment(self, effect: NumericEffect, bindings: Mapping[str, Value]) -> Assignment:
+        fluent, amount = self.fact(effect.call, bindings), self.quantity(effect.value, bindings)
+        match effect.operator:
+            case "increase":
+                return Assignment(fluent, amount, increase=True)
+            case "decrease":
+                return Assignment(fluent, combined("-", (amount,)), increase=True)
+            case "scale-up":
+                return Assignment(fluent, combined("*", (fluent, amount)), increase=False)
+            case "scale-down":
+                return Assignment(fluent, combined("/", (fluent, amount)), increase=False)
+            case _:
+                return Assignment(fluent, amount, increase=False)
+
+    def _value(self, term: Term, bindings: Mapping[str, Value]) -> Value:
+        match term:
+            case Variable(name) if name in bindings:
+                return bindings[name]
+            case Constant(value):
+                return value
+            case _ if self.changes(term):
+                raise UnsupportedActionError(
+                    f"a fact about a number that actions change cannot be planned with: {to_text(term)}",
+                    place=term.place,
+                )
+            case _:
+                return evaluate_argument(term, self.world, bindings)
+
+    def _atom(self, atom: Atom, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:
+        schema = self.world.schema
+        if schema.is_type(atom.predicate, len(atom.args)):
+            return holds(atom, self.world, bindings) is wanted
+        ground = self.fact(atom, bindings)
+        if atom.predicate in self.changing:
+            return Literal(ground, wanted)
+        so = is_so(ground, self.world) is wanted
+        return Literal(ground, wanted) if self.keep_false and not so else so

@@ -1,0 +1,128 @@
+"""Constructs of a domain or goal that not every engine can plan with, and those that none can."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from knowledge_base.language.effect import effect_conditions
+from knowledge_base.language.expression import Atom, Call, Comparison, Expression, Term, parts_of
+from knowledge_base.language.printer import to_text
+from planning.problem.derived import derivation
+from planning.problem.relevance import changed, names_of, relevant
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator
+
+    from knowledge_base.errors import Place
+    from knowledge_base.world.schema import Schema
+    from planning.domain import PlanningAction, PlanningDomain
+    from planning.plan import NobodyCan
+
+
+def refuse_unforeseeable(goal: Expression, actions: Iterable[PlanningAction], domain: PlanningDomain) -> None:
+    """Raise an error if the goal, or one of the relevant actions, asks for what no engine can foresee.
+
+    Raises:
+        UnsupportedGoalError, UnsupportedActionError: with the place, and what is asked for.
+    """
+    schema = domain.schema
+    changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
+    content = {name for name in changing & schema.functions.keys() if schema.result(name) != "number"}
+    if not content and not schema.computed:
+        return
+    for asked, why in _asked(goal, schema, changing, content):
+        raise UnsupportedGoalError(f"the goal asks for {why}", place=asked.place)
+    for action in actions:
+        for condition in (action.precondition, *effect_conditions(action.effect)):
+            for asked, why in _asked(condition, schema, changing, content):
+                raise UnsupportedActionError(f"planning action '{action.name}' asks for {why}", place=asked.place)
+
+
+def _asked(
+    e: Expression, schema: Schema, changing: Collection[str], content: Collection[str]
+) -> Iterator[tuple[Expression, str]]:
+    for atom, read in _computed_from(e, schema, changing):
+        told = f"{to_text(atom)} reads {to_text(read)}"
+        yield atom, f"what is computed from something that planning actions change: {told}"
+    for part in _parts(e):
+        if isinstance(part, Comparison | Atom) and any(_name(inner) in content for inner in _parts(part)):
+            yield part, f"a value that planning actions change, and which is no number: {to_text(part)}"
+
+
+def _computed_from(
+    e: Expression | Term, schema: Schema, changing: Collection[str]
+) -> Iterator[tuple[Atom, Expression | Term]]:
+    """The computed atoms in `e`, each with what it reads of the functions and predicates in `changing`."""
+    if isinstance(e, Atom) and e.predicate in schema.computed:
+        for read in schema.computed[e.predicate].inputs(e.args):
+            yield from ((e, part) for part in _parts(read) if _name(part) in changing)
+            yield from ((e, inner) for _, inner in _computed_from(read, schema, changing))
+    for part in parts_of(e):
+        yield from _computed_from(part, schema, changing)
+
+
+def _parts(e: Expression | Term) -> Iterator[Expression | Term]:
+    yield e
+    for part in parts_of(e):
+        yield from _parts(part)
+
+
+def _name(e: Expression | Term) -> str | None:
+    """The function or predicate that it asks about."""
+    return e.function if isinstance(e, Call) else e.predicate if isinstance(e, Atom) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Construct:
+    """A condition on numbers that actions change.
+
+    Attributes:
+        owner: whose condition it is: `the goal`, or a planning action.
+        text: the condition, in PDDL.
+        place: where it is written.
+    """
+
+    owner: str
+    text: str
+    place: Place | None
+
+    def __str__(self) -> str:
+        """One line: `jars.pddl:7:9: planning action 'pour' compares numbers that actions change: (> (litres ?a) 0)`."""
+        said = f"{self.owner} compares numbers that actions change: {self.text}"
+        return f"{self.place}: {said}" if self.place else said
+
+
+def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Construct]:
+    """What makes the problem of reaching `goal` numeric: the goal's own conditions first, then those of actions."""
+    derived = derivation(domain)
+    goal = derived.expand(goal)
+    matters = relevant(goal, None, derived.domain.actions.values())
+    conditions = [("the goal", goal)]
+    for action in matters.actions:
+        owned = (action.precondition, *effect_conditions(action.effect))
+        conditions += [(f"planning action '{action.name}'", one) for one in owned]
+    for owner, condition in conditions:
+        for comparison in _comparisons(condition):
+            if not matters.changing.isdisjoint(names_of(comparison)):
+                yield Construct(owner, to_text(comparison), comparison.place)
+
+
+def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: NobodyCan) -> str:
+    """Why no engine can be asked, in one line: the construct, its place, who could, and how to get him.
+
+    Args:
+        domain: the planning domain.
+        goal: what shall hold.
+        nobody: what came of asking.
+    """
+    construct = next(numeric_constructs(domain, goal), None)
+    return nobody.message if construct is None else f"{construct}; {nobody.who}"
+
+
+def _comparisons(e: Expression | Term) -> Iterator[Comparison]:
+    if isinstance(e, Comparison):
+        yield e
+    for part in parts_of(e):
+        yield from _comparisons(part)

@@ -1,0 +1,291 @@
+"""Derived predicates (PDDL 2.2 axioms): compiled away, or evaluated where no action changes what they follow from.
+
+A predicate that does not follow from itself is replaced by its condition wherever it is asked for. One that does
+(`above`: on it, or on something above it) becomes facts, if nothing it follows from is changed by an action: the
+least fixpoint, stratum by stratum as in Datalog. Otherwise it cannot be planned with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import networkx as nx
+
+from knowledge_base.errors import SchemaError
+from knowledge_base.facts import Delta, Fact
+from knowledge_base.language.effect import effect_conditions
+from knowledge_base.language.evaluation import query
+from knowledge_base.language.expression import (
+    And,
+    Atom,
+    Comparison,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    Variable,
+    parts_of,
+)
+from knowledge_base.language.identity_cache import IdentityCache
+from knowledge_base.world.overlay import Overlay
+from planning.problem.relevance import changed, names_of
+from planning.problem.rewriting import instantiated, rewritten, type_test
+from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator
+
+    from knowledge_base.facts import Value
+    from knowledge_base.language.evaluation import World
+    from planning.domain import Axiom, PlanningAction, PlanningDomain
+
+
+_AXIOMS = "planners with axioms of their own, such as Fast Downward run by itself"
+
+
+def derivation(domain: PlanningDomain) -> Derivation:
+    """What the derived predicates of a domain stand for; worked out once.
+
+    Raises:
+        SchemaError: a predicate follows from its own negation.
+    """
+    return _known.find(domain, None) or _known.keep(domain, None, Derivation(domain))
+
+
+class Derivation:
+    """A domain without its derived predicates, and what replaces them.
+
+    Attributes:
+        original: the domain as it is written.
+        domain: the domain with conditions in their place, as far as that can be.
+        unsupported: the recursive predicates that actions affect, with what of it actions change.
+    """
+
+    def __init__(self, domain: PlanningDomain) -> None:
+        self.original = domain
+        self._axioms: dict[str, list[Axiom]] = {}
+        for axiom in domain.axioms:
+            self._axioms.setdefault(axiom.predicate, []).append(axiom)
+        self._expanded: IdentityCache[Expression, Expression] = IdentityCache(size=256)
+        graph = self._dependencies(domain.axioms)
+        self._circles = [circle for circle in _strata(graph) if _is_circle(circle, graph)]
+        self._recursive = frozenset().union(*self._circles)
+        self._schema = domain.schema
+        self._changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
+        reached = {name: {name, *nx.descendants(graph, name)} for name in self._recursive}
+        affected = {name: self._changing & follows for name, follows in reached.items()}
+        self.unsupported = {name: causes for name, causes in affected.items() if causes}
+        if domain.axioms:
+            actions = {name: rewritten(action, self.expand) for name, action in domain.actions.items()}
+            domain = replace(domain, actions=actions, axioms=())
+        self.domain = domain
+
+    def expand(self, e: Expression) -> Expression:
+        """The condition with those of derived predicates in their place; recursive ones stay."""
+        if not self._axioms:
+            return e
+        # The same again for the same condition: what is known of a condition is known by its identity.
+        return self._expanded.find(e, None) or self._expanded.keep(e, None, self._expand(e))
+
+    def _expand(self, e: Expression) -> Expression:
+        match e:
+            case Atom(name) if name in self._axioms and name not in self._recursive:
+                cases = tuple(self._expand(self._instance(axiom, e)) for axiom in self._axioms[name])
+                return cases[0] if len(cases) == 1 else Or(cases)
+            case Not(body) | Exists(_, body) | Forall(_, body):
+                return replace(e, body=self._expand(body))
+            case And(parts) | Or(parts):
+                return replace(e, parts=tuple(map(self._expand, parts)))
+            case Imply(premise, conclusion):
+                return Imply(self._expand(premise), self._expand(conclusion), place=e.place)
+            case _:
+                return e
+
+    def world(self, world: World) -> World:
+        """The world with the facts of those recursive predicates that no action affects."""
+        return self._closed(world, [one for one in self._circles if self.unsupported.keys().isdisjoint(one)])
+
+    def complete(self, world: World) -> World:
+        """The world with the facts of all recursive predicates, as they are now."""
+        return self._closed(world, self._circles)
+
+    def _closed(self, world: World, circles: Collection[frozenset[str]]) -> World:
+        if not circles:
+            return world
+        closed = Overlay(world)
+        for circle in circles:  # each comes after those that it follows from
+            while facts := [fact for fact in self._consequences(circle, closed) if not _holds(fact, closed)]:
+                closed.apply(Delta(added=tuple(dict.fromkeys(facts))))
+        return closed
+
+    def at(self, world: World) -> Settled:
+        """The domain for the world as it is, and as long as nothing changes that recursive predicates follow from."""
+        closed = self.world(world)
+        supported = [name for circle in self._circles for name in sorted(circle) if name not in self.unsupported]
+        facts = frozenset(
+            Fact(name, tuple(args))
+            for name in supported
+            for args in closed.match(name, (None,) * len(self._schema.predicates[name].parameters))
+        )
+        return Settled(self, facts, frozenset(supported))
+
+    def may_change(self, e: Expression) -> bool:
+        """Whether some action may make the expanded condition true or false; `False` is certain."""
+        changing = self._changing.union(self._schema.computed, self.unsupported)
+        fixed = self._schema.predicates.keys() - changing
+        return not all(name in fixed or self._schema.is_type(name, 1) for name in names_of(e))
+
+    @property
+    def recursive(self) -> bool:
+        """Whether a predicate follows from itself, so that what it stands for depends on the world."""
+        return bool(self._recursive)
+
+    def require_supported(self, goal: Expression, actions: Iterable[PlanningAction]) -> None:
+        """Raise an error if the expanded goal or actions ask for a predicate that cannot be planned with.
+
+        Raises:
+            UnsupportedGoalError, UnsupportedActionError: which, why, and where it is asked for.
+        """
+        for atom in self._unsupported_in(goal):
+            raise UnsupportedGoalError(f"the goal asks for {self.why(atom.predicate)}", place=atom.place)
+        for action in actions:
+            for condition in (action.precondition, *effect_conditions(action.effect)):
+                for atom in self._unsupported_in(condition):
+                    raise UnsupportedActionError(
+                        f"the planning action '{action.name}' asks for {self.why(atom.predicate)}", place=atom.place
+                    )
+
+    def why(self, name: str) -> str:
+        """What is the matter with an unsupported predicate, and who could plan with it."""
+        changing = ", ".join(f"'{one}'" for one in sorted(self.unsupported[name]))
+        return (
+            f"'{name}', a derived predicate that follows from itself (at {self._axioms[name][0].place}) and from what"
+            f" planning actions change ({changing}); what can do it: {_AXIOMS}"
+        )
+
+    def _unsupported_in(self, e: Expression | Term) -> Iterator[Atom]:
+        if isinstance(e, Atom) and e.predicate in self.unsupported:
+            yield e
+        for part in parts_of(e):
+            yield from self._unsupported_in(part)
+
+    def _dependencies(self, axioms: Iterable[Axiom]) -> nx.DiGraph[str]:
+        """Predicate -> what it follows from, derived or not."""
+        graph: nx.DiGraph[str] = nx.DiGraph()
+        for axiom in axioms:
+            graph.add_node(axiom.predicate)
+            graph.add_edges_from((axiom.predicate, name) for name in names_of(axiom.condition))
+        for axiom in axioms:
+            for atom in denied(axiom.condition, wanted=True):
+                if atom.predicate in graph and nx.has_path(graph, atom.predicate, axiom.predicate):
+                    raise SchemaError(
+                        f"the derived predicate '{axiom.predicate}' follows from its own negation, through"
+                        f" '{atom.predicate}'",
+                        place=atom.place or axiom.place,
+                    )
+        return graph
+
+    def _instance(self, axiom: Axiom, atom: Atom) -> Expression:
+        """The axiom's condition for the atom's arguments, and their types where the axiom asks for narrower ones."""
+        declared = self._schema.predicates[axiom.predicate].parameters
+        tests = tuple(
+            type_test(own, term)
+            for own, wide, term in zip(axiom.parameters, declared, atom.args, strict=True)
+            if own.types != wide.types
+        )
+        terms = dict(zip((p.name for p in axiom.parameters), atom.args, strict=True))
+        condition = instantiated(axiom.condition, terms)
+        return And((*tests, condition)) if tests else condition
+
+    def _consequences(self, circle: Iterable[str], world: World) -> Iterator[Fact]:
+        """What the axioms for these predicates say in `world`."""
+        for name in sorted(circle):
+            for axiom in self._axioms[name]:
+                tests = (type_test(p, Variable(p.name)) for p in axiom.parameters)
+                for found in query(And((*tests, self.expand(axiom.condition))), world):
+                    yield Fact(name, tuple(found[p.name] for p in axiom.parameters))
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A domain that the bare knowledge base can judge: nothing derived is left in it.
+
+    Attributes:
+        derivation: of the domain.
+        facts: of recursive predicates, which replace them.
+        predicates: these predicates.
+    """
+
+    derivation: Derivation = field(compare=False, repr=False)
+    facts: frozenset[Fact]
+    predicates: frozenset[str]
+
+    @property
+    def domain(self) -> PlanningDomain:
+        """The domain without derived predicates."""
+        domain = self.derivation.domain
+        if not self.predicates:
+            return domain
+        actions = {name: rewritten(action, self._replaced) for name, action in domain.actions.items()}
+        return replace(domain, actions=actions)
+
+    def condition(self, e: Expression) -> Expression:
+        """The condition without derived predicates."""
+        expanded = self.derivation.expand(e)
+        return self._replaced(expanded) if self.predicates else expanded
+
+    def _replaced(self, e: Expression) -> Expression:
+        match e:
+            case Atom(name, args) if name in self.predicates:
+                known = sorted((one.args for one in self.facts if one.predicate == name), key=str)
+                return Or(tuple(And(tuple(map(_equal, args, values))) for values in known), place=e.place)
+            case Not(body) | Exists(_, body) | Forall(_, body):
+                return replace(e, body=self._replaced(body))
+            case And(parts) | Or(parts):
+                return replace(e, parts=tuple(map(self._replaced, parts)))
+            case Imply(premise, conclusion):
+                return Imply(self._replaced(premise), self._replaced(conclusion), place=e.place)
+            case _:
+                return e
+
+
+def _equal(term: Term, value: Value) -> Expression:
+    return Comparison("=", term, Constant(value))
+
+
+_known: IdentityCache[PlanningDomain, Derivation] = IdentityCache(size=64)
+
+
+def _strata(graph: nx.DiGraph[str]) -> Iterator[frozenset[str]]:
+    """Predicates that follow from each other, after those that they follow from."""
+    components = nx.condensation(graph)
+    for number in reversed(list(nx.topological_sort(components))):
+        yield frozenset(components.nodes[number]["members"])
+
+
+def _is_circle(component: frozenset[str], graph: nx.DiGraph[str]) -> bool:
+    return len(component) > 1 or any(graph.has_edge(name, name) for name in component)
+
+
+def _holds(fact: Fact, world: World) -> bool:
+    return world.holds(fact.predicate, fact.args)
+
+
+def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
+    """The atoms that stand under an odd number of negations (`wanted`: seen from outside)."""
+    match e:
+        case Atom():
+            yield from () if wanted else (e,)
+        case Not(body):
+            yield from denied(body, wanted=not wanted)
+        case Imply(premise, conclusion):
+            yield from denied(premise, wanted=not wanted)
+            yield from denied(conclusion, wanted=wanted)
+        case _:
+            for part in parts_of(e):
+                yield from denied(part, wanted=wanted)

@@ -1,0 +1,235 @@
+"""From a planning action with parameters to ground ones: its ways with given arguments, its arguments as a join."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact, Value
+from knowledge_base.language.expression import And, Atom, Constant, Expression, Variable
+from planning.plan import PlanStep
+from planning.problem.conditions import (
+    Every,
+    GroundEffect,
+    Grounder,
+    Leaf,
+    Literal,
+    Residual,
+    alternatives,
+    every,
+    negation,
+)
+from planning.quantities import Assignment, combined, fluents
+from planning.unsupported import UnsupportedActionError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from knowledge_base.language.vocabulary import Vocabulary
+    from planning.cancellable_work import WorkLimit
+    from planning.domain import PlanningAction
+
+_MOST_CONDITIONS = 6  # of one ground action; each doubles the number of ways to take it
+_MOST_ALTERNATIVES = 64
+_AS_THEY_ARE = "planners that take ADL as it is, such as Fast Downward run by itself"
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One way to take a step: a conjunction and unconditional effects.
+
+    Attributes:
+        step: the step; `None` for bookkeeping that no plan shows.
+        condition: literals and bounds that must hold before.
+        effects: literals that become true; none contradicts another.
+        assignments: how numbers change, one for each fluent.
+    """
+
+    step: PlanStep | None
+    condition: tuple[Leaf, ...]
+    effects: tuple[Literal, ...]
+    assignments: tuple[Assignment, ...] = ()
+
+
+def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Grounder) -> Iterator[Variant]:
+    """The ways to take one step: one for each alternative of its precondition and conditional effects.
+
+    Raises:
+        UnsupportedActionError: there are too many, or a number changes in two ways at once.
+    """
+    precondition = grounder.precondition(action.precondition, bindings)
+    if precondition is False:
+        return
+    step = PlanStep(action.name, tuple([str(bindings[p.name]) for p in action.parameters]))
+    effects = _eased(list(grounder.effects(action.effect, bindings)))
+    conditions: dict[Residual, None] = {}
+    for one in effects:
+        if one.condition is not True and negation(one.condition) not in conditions:
+            conditions[one.condition] = None
+    if len(conditions) > _MOST_CONDITIONS:
+        raise UnsupportedActionError(
+            f"planning action '{action.name}' has {len(conditions)} conditional effects for {step};"
+            f" at most {_MOST_CONDITIONS} can be compiled away; what can do it: {_AS_THEY_ARE}",
+            place=action.place,
+        )
+    grounder.patience.spend()
+    for taken in itertools.product((True, False), repeat=len(conditions)):
+        chosen = [c if yes else negation(c) for c, yes in zip(conditions, taken, strict=True)]
+        happening = {True, *chosen}
+        changes = [e.what for e in effects if e.condition in happening]
+        for condition in _bounded(every([precondition, *chosen]), action):
+            yield Variant(step, condition, _literals(changes), _assignments(changes, action))
+
+
+def _eased(effects: list[GroundEffect]) -> list[GroundEffect]:
+    """The same effects under fewer conditions: what is taken away if it is there can be taken away in any case.
+
+    So can what is given if it is not there, unless something else takes it away at the same time.
+    """
+    if all(one.condition is True for one in effects):
+        return effects
+    deleted = {one.what.fact for one in effects if isinstance(one.what, Literal) and not one.what.positive}
+    return [
+        GroundEffect(_except(one.condition, one.what.negated), one.what)
+        if isinstance(one.what, Literal) and not (one.what.positive and one.what.fact in deleted)
+        else one
+        for one in effects
+    ]
+
+
+def _except(condition: Residual, known: Literal) -> Residual:
+    parts = condition.parts if isinstance(condition, Every) else (condition,)
+    return every(part for part in parts if part != known)
+
+
+def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ...]]:
+    found = list(itertools.islice(alternatives(condition), _MOST_ALTERNATIVES + 1))
+    if len(found) > _MOST_ALTERNATIVES:
+        raise UnsupportedActionError(
+            f"the precondition of planning action '{action.name}' has over {_MOST_ALTERNATIVES} alternatives"
+            f" ('or', 'imply' or 'exists' over what actions change); what can do it: {_AS_THEY_ARE}",
+            place=action.place,
+        )
+    return found
+
+
+def _literals(changes: Iterable[Literal | Assignment]) -> tuple[Literal, ...]:
+    literals = dict.fromkeys(c for c in changes if isinstance(c, Literal))
+    # PDDL: a fact both deleted and added is true
+    return tuple([one for one in literals if one.positive or one.negated not in literals])
+
+
+def _assignments(changes: Iterable[Literal | Assignment], action: PlanningAction) -> tuple[Assignment, ...]:
+    found: dict[Fact, Assignment] = {}
+    for change in changes:
+        if isinstance(change, Assignment):
+            first = found.get(change.fluent)
+            found[change.fluent] = change if first is None else _both(first, change, action)
+    return tuple(found.values())
+
+
+def _both(first: Assignment, second: Assignment, action: PlanningAction) -> Assignment:
+    if first.increase and second.increase:
+        return Assignment(first.fluent, combined("+", (first.amount, second.amount)), increase=True)
+    if first == second and first.fluent not in fluents(first.amount):
+        return first
+    raise UnsupportedActionError(
+        f"planning action '{action.name}' changes {first.fluent} in two ways at once", place=action.place
+    )
+
+
+class ReachedFacts:
+    """Facts by predicate and by predicate, position and value."""
+
+    def __init__(self, facts: Iterable[Fact] = ()) -> None:
+        self._index: dict[tuple[Value, ...], list[Fact]] = {}
+        for fact in facts:
+            self.add(fact)
+
+    def add(self, fact: Fact) -> None:
+        """Also this one, which was not there before."""
+        for key in ((fact.predicate,), *((fact.predicate, i, v) for i, v in enumerate(fact.args))):
+            self._index.setdefault(key, []).append(fact)
+
+    def candidates(self, atom: Atom, bindings: Mapping[str, Value]) -> Sequence[Fact]:
+        """A short list that contains every fact which fits `atom`."""
+        found: Sequence[Fact] = self._index.get((atom.predicate,), ())
+        for position, term in enumerate(atom.args):
+            value = term.value if isinstance(term, Constant) else bindings.get(_name(term))
+            if value is not None:
+                narrower = self._index.get((atom.predicate, position, value), ())
+                found = min(found, narrower, key=len)
+        return found
+
+
+def _name(term: object) -> str:
+    return term.name if isinstance(term, Variable) else ""
+
+
+@dataclass(frozen=True, slots=True)
+class JoinRule:
+    """An action as a join.
+
+    Attributes:
+        action: the planning action.
+        atoms: the positive conjuncts of its precondition.
+        allowed: what each parameter may stand for.
+        patience: every fact tried takes some of it.
+    """
+
+    action: PlanningAction
+    atoms: tuple[Atom, ...]
+    allowed: Mapping[str, Mapping[str, None]]
+    patience: WorkLimit
+
+    @staticmethod
+    def of(action: PlanningAction, grounder: Grounder) -> JoinRule:
+        """The rule for an action."""
+        atoms = joined_atoms(action, grounder.world.schema)
+        return JoinRule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters}, grounder.patience)
+
+    def unify(self, atom: Atom, fact: Fact, bindings: Mapping[str, Value]) -> dict[str, Value] | None:
+        """The bindings extended so that the atom is the fact, if that is possible."""
+        extended = dict(bindings)
+        for term, value in zip(atom.args, fact.args, strict=True):
+            if isinstance(term, Constant):
+                fits = term.value == value
+            else:
+                name = _name(term)
+                fits = extended.setdefault(name, value) == value and value in self.allowed.get(name, {value: None})
+            if not fits:
+                return None
+        return extended
+
+    def join(
+        self, reached: ReachedFacts, atoms: tuple[Atom, ...], bindings: dict[str, Value]
+    ) -> Iterator[dict[str, Value]]:
+        """All bindings under which the atoms are reached; the most selective atom first."""
+        if not atoms:
+            yield bindings
+            return
+        found = [reached.candidates(atom, bindings) for atom in atoms]
+        best = min(range(len(atoms)), key=lambda i: len(found[i]))
+        for fact in found[best]:
+            self.patience.spend()
+            extended = self.unify(atoms[best], fact, bindings)
+            if extended is not None:
+                yield from self.join(reached, atoms[:best] + atoms[best + 1 :], extended)
+
+
+def joined_atoms(action: PlanningAction, schema: Vocabulary) -> tuple[Atom, ...]:
+    """The positive conjuncts of an action's precondition that facts can be joined with."""
+    return tuple(
+        atom
+        for atom in _conjuncts(action.precondition)
+        if atom.predicate in schema.predicates and all(isinstance(t, Variable | Constant) for t in atom.args)
+    )
+
+
+def _conjuncts(e: Expression) -> Iterator[Atom]:
+    if isinstance(e, And):
+        for part in e.parts:
+            yield from _conjuncts(part)
+    elif isinstance(e, Atom):
+        yield e

@@ -1,0 +1,211 @@
+"""Numbering of literals, bounds and fluents: compared and looked up faster than values; and the way back to facts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact, Value
+from planning.problem.conditions import Leaf, Literal, is_so
+from planning.quantities import NumericBound, fluents, worth
+from planning.strips import GroundAction, Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from knowledge_base.facts import Fact
+    from knowledge_base.language.evaluation import World
+    from planning.problem.operators import GroundOperator
+    from planning.problem.reduction import Task
+
+
+NOT = "not "
+"""Before a predicate: the fact that carries a negative literal (positive normal form). No declared name has a blank."""
+
+
+class _Images(dict[int, int]):
+    """Made when they are asked for."""
+
+    def __init__(self, rename: Callable[[int], int]) -> None:
+        super().__init__()
+        self._rename = rename
+
+    def __missing__(self, number: int) -> int:
+        image = self[number] = self._rename(number)
+        return image
+
+
+class Numbering:
+    """Grows; a number once given stays.
+
+    Attributes:
+        fluents: the numbers of numeric fluents.
+    """
+
+    def __init__(self) -> None:
+        self._numbers: dict[Fact | NumericBound, int] = {}
+        self._named: list[Fact | NumericBound] = []
+        self._by_predicate: dict[str, list[tuple[int, tuple[Value, ...]]]] = {}
+        self._bounds: dict[int, NumericBound] = {}
+        self._facts: dict[int, Fact] = {}
+        self._images: dict[tuple[str, str], _Images] = {}
+        self._wants: dict[int, dict[int, None]] = {}
+        self._supports: dict[int, dict[int, None]] = {}
+        self.fluents: set[int] = set()
+
+    @property
+    def wants(self) -> Mapping[int, Mapping[int, None]]:
+        """Bound -> the fluents it asks about."""
+        return self._wants
+
+    @property
+    def supports(self) -> Mapping[int, Mapping[int, None]]:
+        """Fluent -> the bounds that ask about it."""
+        return self._supports
+
+    def of(self, leaf: Leaf) -> int:
+        """The number of a literal or bound."""
+        if isinstance(leaf, Literal):
+            return self._number(leaf.fact) + (not leaf.positive)
+        known = self._numbers.get(leaf)
+        return self._bound(leaf) if known is None else known
+
+    def fluent(self, fluent: Fact) -> int:
+        """The number of a numeric fluent."""
+        number = self._number(fluent)
+        self.fluents.add(number)
+        return number
+
+    def named(self, number: int) -> Fact | NumericBound:
+        """What has the number, or is denied by it."""
+        return self._named[number >> 1]
+
+    def fact(self, number: int) -> Fact:
+        """The literal in positive normal form."""
+        known = self._facts.get(number)
+        if known is None:
+            fact = self._named[number >> 1]
+            if not isinstance(fact, Fact):
+                raise TypeError(f"{fact} is no fact")
+            known = self._facts[number] = as_fact(Literal(fact, not number & 1))
+        return known
+
+    def present(self, world: World) -> set[int]:
+        """The numbers of all literals and bounds that hold in `world`; fluents have no truth."""
+        values = {one: worth(world, one) for one in map(self.fact, sorted(self.fluents))}
+        held = {number for number, bound in self._bounds.items() if bound.holds(values)}
+        for predicate, listed in self._by_predicate.items():
+            if predicate in world.schema.computed:
+                held.update([number + (not is_so(Fact(predicate, args), world)) for number, args in listed])
+            else:  # all at once: most of what is asked about is named here
+                known = set(world.match(predicate, (None,) * len(listed[0][1])))
+                held.update([number + (args not in known) for number, args in listed])
+        return held
+
+    def images(self, name: str, other: str) -> Mapping[int, int]:
+        """Literal -> the same literal about `other` in the place of `name`; for every literal."""
+        if (name, other) not in self._images:
+            self._images[name, other] = _Images(lambda number: self._renamed(number, name, other))
+        return self._images[name, other]
+
+    def _renamed(self, number: int, name: str, other: str) -> int:
+        fact = self._named[number >> 1]
+        if isinstance(fact, NumericBound) or name not in fact.args:
+            return number
+        args: tuple[Value, ...] = tuple([other if value == name else value for value in fact.args])
+        return self._number(Fact(fact.predicate, args)) + (number & 1)
+
+    def _number(self, one: Fact | NumericBound) -> int:
+        number = self._numbers.get(one)
+        if number is None:
+            number = self._numbers[one] = 2 * len(self._named)
+            self._named.append(one)
+            if isinstance(one, NumericBound):
+                self._bounds[number] = one
+            else:
+                self._by_predicate.setdefault(one.predicate, []).append((number, one.args))
+        return number
+
+    def _bound(self, bound: NumericBound) -> int:
+        number = self._number(bound)
+        for one in bound.fluents():
+            fluent = self.fluent(one)
+            self._wants.setdefault(number, {})[fluent] = None
+            self._supports.setdefault(fluent, {})[number] = None
+        return number
+
+
+def as_fact(literal: Literal) -> Fact:
+    """The literal in positive normal form."""
+    return literal.fact if literal.positive else Fact(NOT + literal.fact.predicate, literal.fact.args)
+
+
+_MOST_KEPT = 20_000  # ground actions; a problem of 50 items has 3,000
+
+
+class Assembly:
+    """Makes problems of tasks that share a numbering and whose ways have the same numbers."""
+
+    def __init__(self, numbering: Numbering) -> None:
+        self._numbering = numbering
+        self._made: dict[int, tuple[GroundOperator, GroundAction]] = {}  # by identity
+
+    def problem(
+        self, domain: str, task: Task, things: Mapping[str, str], world: World | None, notes: tuple[str, ...]
+    ) -> Problem:
+        """The problem that the task stands for.
+
+        Args:
+            domain: its name.
+            task: what is left of the problem in numbers.
+            things: all things with their types.
+            world: where numeric fluents have their values; none is needed if there are no fluents.
+            notes: for people.
+        """
+        init, _ = self._split(task.init)
+        goal, bounds = self._split(task.goal)
+        ways = task.ways.all if task.left is None else task.left.values()
+        known = self._made.get
+        actions = tuple([found[1] if (found := known(id(way))) else self._action(way) for way in ways])
+        mentioned = dict.fromkeys([arg for action in actions if action.step for arg in action.step.args])
+        mentioned.update(dict.fromkeys(str(value) for fact in (*init, *goal) for value in fact.args))
+        objects = {one: things[one] for one in mentioned if one in things}
+        asked = _fluents(actions, bounds) if self._numbering.fluents else ()
+        numbers = {} if world is None else {one: worth(world, one) for one in asked}
+        return Problem(domain, objects, init, goal, actions, numbers=numbers, bounds=bounds, notes=notes)
+
+    def _action(self, way: GroundOperator) -> GroundAction:
+        if len(self._made) >= _MOST_KEPT:
+            self._made.clear()
+        action = self._make(way)
+        self._made[id(way)] = way, action
+        return action
+
+    def _make(self, way: GroundOperator) -> GroundAction:
+        numbering = self._numbering
+        needs, bounds = self._split(way.needs)
+        adds = tuple([numbering.fact(one) for one in way.adds if one not in numbering.fluents])
+        deletes = tuple(map(numbering.fact, way.deletes))
+        cost = 0.0 if way.cost is None else way.cost
+        return GroundAction(way.step, needs, adds, deletes, cost, bounds, way.assignments)
+
+    def _split(self, numbers: Iterable[int]) -> tuple[tuple[Fact, ...], tuple[NumericBound, ...]]:
+        """Facts in positive normal form, and bounds."""
+        facts: list[Fact] = []
+        bounds: list[NumericBound] = []
+        for number in numbers:
+            one = self._numbering.named(number)
+            if isinstance(one, NumericBound):
+                bounds.append(one)
+            else:
+                facts.append(self._numbering.fact(number))
+        return tuple(facts), tuple(bounds)
+
+
+def _fluents(actions: Iterable[GroundAction], goal: Iterable[NumericBound]) -> dict[Fact, None]:
+    """All numeric fluents that matter."""
+    found = dict.fromkeys(fluent for bound in goal for fluent in bound.fluents())
+    for action in actions:
+        found.update((fluent, None) for bound in action.bounds for fluent in bound.fluents())
+        for one in action.assignments:
+            found.update(dict.fromkeys((one.fluent, *fluents(one.amount))))
+    return found

@@ -1,0 +1,321 @@
+"""Ground operators of a domain in numbers, found by relaxed reachability and kept from one problem to the next."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from knowledge_base.facts import Content, Fact, Value
+from knowledge_base.language.effect import ForEach, effect_conditions, effect_parts
+from knowledge_base.language.expression import Exists, Expression, Forall, Term, Variable, parts_of
+from knowledge_base.language.vocabulary import ROOT_TYPE
+from planning.cancellable_work import WorkLimit
+from planning.plan import PlanStep
+from planning.problem.conditions import Grounder
+from planning.problem.costs import Costs
+from planning.problem.grounding import JoinRule, ReachedFacts, Variant, joined_atoms, variants
+from planning.problem.numbering import Numbering
+from planning.problem.relevance import Relevant
+from planning.quantities import Assignment
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+
+    from knowledge_base.language.evaluation import World
+    from knowledge_base.language.vocabulary import Vocabulary
+    from planning.domain import PlanningAction
+
+
+_T = TypeVar("_T")
+_MOST_KNOWN = 16
+
+
+class GroundOperator(NamedTuple):
+    """One way to take a step; a tuple, for thousands are made for each problem.
+
+    Attributes:
+        step: the step; `None` for bookkeeping.
+        needs: literals and bounds that must hold before.
+        adds: literals that hold afterwards and fluents that it changes.
+        deletes: literals that hold no longer.
+        assignments: how it changes them.
+        cost: `None` if what it does to the metric is no cost.
+        number: the same for what is left of a way when parts that do not matter are left out.
+    """
+
+    step: PlanStep | None
+    needs: tuple[int, ...]
+    adds: tuple[int, ...]
+    deletes: tuple[int, ...]
+    assignments: tuple[Assignment, ...] = ()
+    cost: float | None = 1.0
+    number: int = -1
+
+
+Key = tuple[str, tuple[str, ...]] | None
+
+
+def key(step: PlanStep | None) -> Key:
+    """The step by value; hashed much faster than itself."""
+    return None if step is None else (step.action, step.args)
+
+
+class OperatorIndex:
+    """Ways in order, indexed when that is first asked for; referred to by position."""
+
+    def __init__(self, ways: Sequence[GroundOperator]) -> None:
+        self.all = ways
+        self._known: dict[Hashable, Any] = {}
+
+    def known(self, key: Hashable, work_out: Callable[[], _T]) -> _T:
+        """What follows from these ways and `key`; worked out unless that was done lately."""
+        found: _T = self._known.pop(key) if key in self._known else work_out()
+        self._known[key] = found  # the last one is kept longest
+        if len(self._known) > _MOST_KNOWN:
+            del self._known[next(iter(self._known))]
+        return found
+
+    @cached_property
+    def counts(self) -> Sequence[int]:
+        """How much each way needs."""
+        return [len(way.needs) for way in self.all]
+
+    @cached_property
+    def users(self) -> Mapping[int, Sequence[int]]:
+        """Literal or bound -> the ways that need it."""
+        users: dict[int, list[int]] = {}
+        for i, way in enumerate(self.all):
+            for one in way.needs:
+                users.setdefault(one, []).append(i)
+        return users
+
+    @cached_property
+    def adders(self) -> Mapping[int, Sequence[int]]:
+        """Literal or fluent -> the ways that add or change it; none that need it, since they bring nothing."""
+        adders: dict[int, list[int]] = {}
+        for i, way in enumerate(self.all):
+            for one in way.adds:
+                if one not in way.needs:
+                    adders.setdefault(one, []).append(i)
+        return adders
+
+    @cached_property
+    def touching(self) -> Mapping[int, Sequence[int]]:
+        """Literal, bound or fluent -> the ways that have anything to do with it."""
+        touching: dict[int, list[int]] = {}
+        for i, way in enumerate(self.all):
+            for one in {*way.needs, *way.adds, *way.deletes}:
+                touching.setdefault(one, []).append(i)
+        return touching
+
+    @cached_property
+    def naming(self) -> Mapping[str, Sequence[int]]:
+        """Object -> the ways whose steps name it."""
+        naming: dict[str, list[int]] = {}
+        for i, way in enumerate(self.all):
+            for name in set(way.step.args) if way.step else ():
+                naming.setdefault(name, []).append(i)
+        return naming
+
+    @cached_property
+    def of_step(self) -> Mapping[Key, Sequence[int]]:
+        """Step, see `key` -> the ways to take it."""
+        of_step: dict[Key, list[int]] = {}
+        for i, way in enumerate(self.all):
+            of_step.setdefault(key(way.step), []).append(i)
+        return of_step
+
+
+class Consulted:
+    """A world that remembers what it was asked, so that one can say later whether the answers would be the same.
+
+    Its things are all that there ever were.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._truths: dict[Fact, bool] = {}
+        self._contents: dict[Fact, Content] = {}
+        self.things = things_of(world)
+
+    def agrees(self, world: World) -> bool:
+        """Whether `world` gives all the answers that were given so far."""
+        return (
+            all(self.things.get(name, own) == own for name, own in things_of(world).items())
+            and all(world.holds(f.predicate, f.args) is truth for f, truth in self._truths.items())
+            and all(world.value(f.predicate, f.args) == number for f, number in self._contents.items())
+        )
+
+    def follow(self, world: World) -> bool:
+        """Ask `world` from now on; whether there are things in it that were never there before."""
+        before, self._world = len(self.things), world
+        self.things.update(things_of(world))
+        return len(self.things) > before
+
+    @property
+    def schema(self) -> Vocabulary:
+        """What may be said about it."""
+        return self._world.schema
+
+    def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
+        """Whether the fact is true."""
+        truth = self._truths[Fact(predicate, args)] = self._world.holds(predicate, args)
+        return truth
+
+    def value(self, function: str, args: tuple[Value, ...]) -> Content:
+        """What the function is worth."""
+        content = self._contents[Fact(function, args)] = self._world.value(function, args)
+        return content
+
+    def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
+        """The facts that agree with the pattern; not remembered: grounding asks for one fact after the other."""
+        return self._world.match(predicate, pattern)
+
+    def objects(self, type_name: str) -> Iterable[str]:
+        """The things of that type."""
+        return [name for name, own in self.things.items() if self.schema.is_a(own, type_name)]
+
+    def type_of(self, name: str) -> str | None:
+        """The thing's type."""
+        return self.things.get(name)
+
+
+class OperatorCache:
+    """Ground actions over all facts that were reached so far.
+
+    Attributes:
+        numbering: of all that they are about.
+        ways: all ways to take a step in one of the worlds so far; in an order that does not depend on them.
+
+    Args:
+        relevant: what of the domain matters.
+        metric: what plans shall have little of.
+        world: the first world it serves.
+    """
+
+    def __init__(self, relevant: Relevant, metric: Term | None, world: World) -> None:
+        self.numbering = Numbering()
+        self._world = Consulted(world)
+        self._grounder = Grounder(self._world, relevant.changing)
+        self._actions = relevant.actions
+        self._over_all = any(_ranges_over_all(action, world.schema) for action in relevant.actions)
+        self._order = {action.name: i for i, action in enumerate(relevant.actions)}
+        self._costs = Costs.of(metric, self._grounder)
+        self._rules: list[JoinRule] = []
+        self._reached = ReachedFacts()
+        self._met: set[Fact] = set()
+        self._queue: deque[Fact] = deque()
+        self._done: set[PlanStep] = set()
+        self.ways = OperatorIndex([])
+        self._found_so_far = 0
+
+    def serves(self, world: World) -> bool:
+        """Whether everything that was worked out is right for this world, too."""
+        same = not self._over_all or list(things_of(world)) == list(self._world.things)
+        return same and self._world.agrees(world)
+
+    def extend(self, world: World, patience: WorkLimit | None = None) -> None:
+        """Find the ways that are possible only in this world.
+
+        Args:
+            world: the next world it serves.
+            patience: for how long; after an error nothing here is of use any more.
+
+        Raises:
+            UnsupportedActionError: see `planning.problem.grounding.variants`.
+            OutOfPatienceError: it takes too long.
+        """
+        patience = patience or WorkLimit()
+        self._grounder = replace(self._grounder, patience=patience)
+        self._rules = [replace(rule, patience=patience) for rule in self._rules]
+        found = list(self._found(world, more=self._world.follow(world)))
+        if found:
+            self.ways = OperatorIndex(sorted([*self.ways.all, *found], key=self._key))
+
+    def _found(self, world: World, *, more: bool) -> Iterator[GroundOperator]:
+        first = not self._rules
+        if first or more:
+            self._rules = [JoinRule.of(action, self._grounder) for action in self._actions]
+        for rule in self._rules if first else ():
+            if not rule.atoms:
+                yield from self._take(rule, {})
+        triggers: dict[str, list[tuple[JoinRule, int]]] = {}
+        for rule in self._rules:
+            for position, atom in enumerate(rule.atoms):
+                triggers.setdefault(atom.predicate, []).append((rule, position))
+        for predicate in triggers:
+            arity = len(world.schema.predicates[predicate].parameters)
+            for args in world.match(predicate, (None,) * arity):
+                self._meet(Fact(predicate, args))
+        while self._queue:
+            fact = self._queue.popleft()
+            self._reached.add(fact)
+            for rule, position in triggers.get(fact.predicate, ()):
+                self._grounder.patience.doing = f"grounding action '{rule.action.name}'"
+                start = rule.unify(rule.atoms[position], fact, {})
+                rest = rule.atoms[:position] + rule.atoms[position + 1 :]
+                for bindings in rule.join(self._reached, rest, start) if start is not None else ():
+                    yield from self._take(rule, bindings)
+
+    def _meet(self, fact: Fact) -> None:
+        if fact not in self._met:
+            self._met.add(fact)
+            self._queue.append(fact)
+
+    def _take(self, rule: JoinRule, bindings: dict[str, Value]) -> Iterator[GroundOperator]:
+        self._grounder.patience.doing = f"grounding action '{rule.action.name}'"
+        open_parameters = [p for p in rule.action.parameters if p.name not in bindings]
+        for full in self._grounder.choices(open_parameters, bindings):
+            step = PlanStep(rule.action.name, tuple([str(full[p.name]) for p in rule.action.parameters]))
+            if step not in self._done:
+                self._done.add(step)
+                for variant in variants(rule.action, full, self._grounder):
+                    for effect in variant.effects:
+                        if effect.positive:
+                            self._meet(effect.fact)
+                    yield self._way(variant)
+
+    def _way(self, variant: Variant) -> GroundOperator:
+        cost = 1.0 if self._costs is None else self._costs.cost(variant.assignments)
+        self._found_so_far += 1
+        return numbered(variant, self.numbering, cost, self._found_so_far)
+
+    def _key(self, way: GroundOperator) -> tuple[int, tuple[str, ...]]:
+        """Independent of which world the way was found for; ways of one step are found together."""
+        return (self._order[way.step.action], way.step.args) if way.step else (len(self._order), ())
+
+
+def numbered(variant: Variant, numbering: Numbering, cost: float | None, number: int = -1) -> GroundOperator:
+    """The variant in numbers."""
+    made = [numbering.of(effect) for effect in variant.effects]
+    touched = [numbering.fluent(one.fluent) for one in variant.assignments]
+    return GroundOperator(
+        variant.step,
+        tuple([numbering.of(leaf) for leaf in variant.condition]),
+        (*made, *touched),
+        tuple([number ^ 1 for number in made]),
+        variant.assignments,
+        cost,
+        number,
+    )
+
+
+def things_of(world: World) -> dict[str, str]:
+    """All things with their types."""
+    return {name: world.type_of(name) or ROOT_TYPE for name in world.objects(ROOT_TYPE)}
+
+
+def _ranges_over_all(action: PlanningAction, schema: Vocabulary) -> bool:
+    """Whether which ways there are depends on all things of a type, not only on those that facts name."""
+    bound = {term.name for atom in joined_atoms(action, schema) for term in atom.args if isinstance(term, Variable)}
+    return (
+        any(parameter.name not in bound for parameter in action.parameters)
+        or any(map(_quantified, (action.precondition, *effect_conditions(action.effect))))
+        or any(isinstance(part, ForEach) for part in effect_parts(action.effect))
+    )
+
+
+def _quantified(e: Expression | Term) -> bool:
+    return isinstance(e, Exists | Forall) or any(map(_quantified, parts_of(e)))

@@ -1,0 +1,238 @@
+"""Posing a problem with durations: ground actions with conditions and effects at their start, their end and between.
+
+Which ground actions there are is found by relaxed reachability, as everywhere, but over the two ends of an action: the
+end can happen if the start can and all that the action needs later can hold. So what is out of reach here is out of
+reach whatever is done at the same time, which cannot be said where one action is done after the other.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact
+from knowledge_base.language.effect import AllOf
+from knowledge_base.language.evaluation import evaluate_term
+from knowledge_base.language.expression import And, Expression
+from knowledge_base.language.terms import as_number
+from planning.plan import PlanStep
+from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, alternatives
+from planning.problem.grounding import Variant, variants
+from planning.problem.numbering import NOT, as_fact
+from planning.problem.operators import GroundOperator, OperatorCache, OperatorIndex
+from planning.problem.reduction import Task
+from planning.problem.relaxed_reachability import reachable
+from planning.problem.relevance import changed, relevant
+from planning.strips import ActionSpan, GroundAction, Problem
+from planning.unsupported import UnsupportedActionError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from knowledge_base.facts import Value
+    from knowledge_base.language.evaluation import World
+    from planning.cancellable_work import WorkLimit
+    from planning.domain import PlanningAction, PlanningDomain
+    from planning.problem.relevance import Relevant
+
+LONGEST = 1e6
+"""Seconds that an action may take whose domain sets no limit."""
+
+_MOST_ALTERNATIVES = 64  # of one step
+_ENDS, _BEGUN = " ends", "begun "  # with blanks, which no declared name has
+
+
+class _NotOfFactsError(Exception):
+    """Numbers that actions change matter, or the goal is a disjunction: no engine here takes that with durations."""
+
+
+def durative(domain: PlanningDomain, goal: Expression) -> bool:
+    """Whether actions with a duration matter for the goal, in which derived predicates have been replaced."""
+    if all(action.timed is None for action in domain.actions.values()):
+        return False
+    return any(action.timed is not None for action in _relevant(domain, goal).actions)
+
+
+def build_temporal_problem(
+    domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit
+) -> Problem | None:
+    """The problem of reaching `goal` with durations; `None` if it has more than facts, or its goal is a disjunction.
+
+    Args:
+        domain: without derived predicates, as `planning.problem.derived.derivation` has it.
+        world: the present, with derived facts.
+        goal: what shall hold, in the same way.
+        patience: for how long.
+
+    Raises:
+        OutOfPatienceError: it takes too long.
+    """
+    matters = _relevant(domain, goal)
+    actions = {action.name: domain.actions[action.name] for action in matters.actions}
+    changing = matters.changing.union(*(changed(action.effect) for action in matters.actions))  # also by durations
+    try:
+        wanted = _literals(Grounder(world, matters.changing, keep_false=True, patience=patience).residual(goal, {}))
+        steps, missing = _possible(actions.values(), matters, wanted, world, patience)
+        if missing:
+            return Problem(domain.name, {}, (), (), (), missing)
+        grounding = _Grounding(actions, Grounder(world, changing, patience=patience), world)
+        found = [action for step in steps for action in grounding.of(step)]
+    except (_NotOfFactsError, UnsupportedActionError):
+        return None
+    return _restricted(domain.name, found, tuple(map(as_fact, wanted)), world)
+
+
+def _relevant(domain: PlanningDomain, goal: Expression) -> Relevant:
+    """What matters for the goal; an action with all its conditions and effects, whenever they are."""
+    return relevant(goal, None, map(_whole, domain.actions.values()))
+
+
+def _whole(action: PlanningAction) -> PlanningAction:
+    timed = action.timed
+    if timed is None:
+        return action
+    precondition = And((timed.start, timed.over_all, timed.end))
+    return replace(action, precondition=precondition, effect=AllOf((timed.start_effect, timed.end_effect)))
+
+
+def _literals(wanted: Residual) -> tuple[Literal, ...]:
+    parts = wanted.parts if isinstance(wanted, Every) else (wanted,)
+    found = tuple(part for part in parts if isinstance(part, Literal))
+    if len(found) < len(parts):
+        raise _NotOfFactsError
+    return found
+
+
+def _start(action: PlanningAction) -> PlanningAction:
+    """What happens when it begins, as an ordinary action; an action without duration is that already."""
+    timed = action.timed
+    return action if timed is None else replace(action, precondition=timed.start, effect=timed.start_effect)
+
+
+def _end(action: PlanningAction, *needed: Expression) -> Iterator[PlanningAction]:
+    if action.timed is not None:
+        name = action.name + _ENDS
+        yield replace(action, name=name, precondition=And(needed), effect=action.timed.end_effect)
+
+
+def _possible(
+    actions: Iterable[PlanningAction],
+    matters: Relevant,
+    wanted: tuple[Literal, ...],
+    world: World,
+    patience: WorkLimit,
+) -> tuple[list[PlanStep], tuple[str, ...]]:
+    """The steps that can be taken if nothing ever becomes false, and what of the goal cannot be reached even then."""
+    actions = tuple(actions)
+    later = [one for action in actions if action.timed for one in _end(action, action.timed.over_all, action.timed.end)]
+    ends = replace(matters, actions=(*map(_start, actions), *later))
+    groundwork = OperatorCache(ends, None, world)
+    groundwork.extend(world, patience)
+    numbering = groundwork.numbering
+
+    def linked(way: GroundOperator, step: PlanStep) -> GroundOperator:
+        begun = numbering.of(Literal(Fact(_BEGUN + step.action.removesuffix(_ENDS), step.args)))
+        if step.action.endswith(_ENDS):
+            return way._replace(needs=(*way.needs, begun))
+        return way._replace(adds=(*way.adds, begun))
+
+    ways = OperatorIndex([linked(way, way.step) for way in groundwork.ways.all if way.step is not None])
+    goal = tuple(map(numbering.of, wanted))
+    begun = {one for way in ways.all for one in way.adds if str(numbering.named(one)).startswith(f"({_BEGUN}")}
+    reach = reachable(Task(numbering, numbering.present(world) - begun, goal, ways))
+    missing = [one for one, number in zip(wanted, goal, strict=True) if number not in reach.facts]
+    if missing:
+        return [], tuple(str(one.fact) if one.positive else f"(not {one.fact})" for one in missing)
+    taken = {way.step: None for way, so in zip(ways.all, reach.taken, strict=True) if so and way.step is not None}
+    endless = {action.name for action in actions if action.timed is None}
+    return [s for s in taken if s.action in endless or PlanStep(s.action + _ENDS, s.args) in taken], ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Grounding:
+    """Makes ground actions of possible steps."""
+
+    actions: Mapping[str, PlanningAction]
+    grounder: Grounder
+    world: World
+
+    def of(self, step: PlanStep) -> Iterator[GroundAction]:
+        """One action for each alternative of the conditions; of those over all, the same one must hold all the time."""
+        action = self.actions[step.action]
+        bindings = {p.name: arg for p, arg in zip(action.parameters, step.args, strict=True)}
+        starts = list(variants(_start(action), bindings, self.grounder))
+        spans = list(self._spans(action, bindings))
+        if len(starts) * len(spans) > _MOST_ALTERNATIVES:
+            raise _NotOfFactsError
+        for start, span in itertools.product(starts, spans):
+            yield GroundAction(step, *_parts(start), span=span)
+
+    def _spans(self, action: PlanningAction, bindings: Mapping[str, Value]) -> Iterator[ActionSpan | None]:
+        timed, duration = action.timed, action.duration
+        if timed is None or duration is None:
+            yield None
+            return
+        if any(map(self.grounder.changes, (duration.least, duration.most))):
+            raise _NotOfFactsError
+        least, most = (
+            as_number(evaluate_term(one, self.world, bindings), "a duration", one.place)
+            for one in (duration.least, duration.most)
+        )
+        lasting = list(
+            itertools.islice(alternatives(self.grounder.precondition(timed.over_all, bindings)), _MOST_ALTERNATIVES + 1)
+        )
+        ends = [end for one in _end(action, timed.end) for end in variants(one, bindings, self.grounder)]
+        if len(lasting) * len(ends) > _MOST_ALTERNATIVES:
+            raise _NotOfFactsError
+        for always, end in itertools.product(lasting, ends):
+            yield ActionSpan(least, min(most, LONGEST), _facts(always), *_parts(end))
+
+
+def _parts(variant: Variant) -> tuple[tuple[Fact, ...], tuple[Fact, ...], tuple[Fact, ...]]:
+    """What it needs, adds and deletes."""
+    if variant.assignments:
+        raise _NotOfFactsError
+    effects = variant.effects
+    return _facts(variant.condition), _facts(effects), _facts(one.negated for one in effects)
+
+
+def _facts(leaves: Iterable[Leaf]) -> tuple[Fact, ...]:
+    found = tuple(leaves)
+    literals = tuple(one for one in found if isinstance(one, Literal))
+    if len(literals) < len(found):
+        raise _NotOfFactsError
+    return tuple(map(as_fact, literals))
+
+
+def _restricted(name: str, actions: list[GroundAction], goal: tuple[Fact, ...], world: World) -> Problem:
+    """The problem without facts that nobody asks for, or that hold and cannot cease to."""
+    asked = dict.fromkeys([*goal, *(fact for action in actions for fact in _needed(action))])
+    gone = {fact for action in actions for fact in (*action.deletes, *(action.span.deletes if action.span else ()))}
+    present = [fact for fact in asked if _holds(fact, world)]
+    kept = asked.keys() - (set(present) - gone)
+
+    def among(facts: tuple[Fact, ...]) -> tuple[Fact, ...]:
+        return tuple(fact for fact in facts if fact in kept)
+
+    def small(action: GroundAction) -> GroundAction:
+        one = action.span
+        span = one and ActionSpan(one.least, one.most, *map(among, (one.over_all, one.end, one.adds, one.deletes)))
+        return replace(
+            action, precondition=among(action.precondition), adds=among(action.adds), deletes=among(action.deletes),
+            span=span,
+        )  # fmt: skip
+
+    mentioned = dict.fromkeys(arg for action in actions if action.step for arg in action.step.args)
+    objects = {one: kind for one in mentioned if (kind := world.type_of(one)) is not None}
+    return Problem(name, objects, tuple(f for f in present if f in kept), among(goal), tuple(map(small, actions)))
+
+
+def _needed(action: GroundAction) -> tuple[Fact, ...]:
+    span = action.span
+    return (*action.precondition, *(() if span is None else (*span.over_all, *span.end)))
+
+
+def _holds(fact: Fact, world: World) -> bool:
+    predicate = fact.predicate.removeprefix(NOT)
+    return world.holds(predicate, fact.args) is (predicate == fact.predicate)

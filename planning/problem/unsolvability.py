@@ -1,0 +1,340 @@
+"""Unsolvability: goal facts out of reach, mutexes (h²), and the missing facts of the nearest action."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from knowledge_base.facts import Fact, Value
+from knowledge_base.language.effect import Add, AllOf, Effect, ForEach, When, effect_leaves
+from knowledge_base.language.evaluation import World, explain
+from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
+from knowledge_base.language.printer import to_text
+from planning.cancellable_work import WorkLimit
+from planning.plan import PlanStep
+from planning.problem.conditions import Every, Grounder, Literal, Residual, Some, is_so
+from planning.problem.construction import ProblemBuilder, check_goal
+from planning.problem.derived import derivation
+from planning.problem.grounding import JoinRule, ReachedFacts
+from planning.problem.numbering import NOT, as_fact
+from planning.problem.reduction import Task
+from planning.problem.relaxed_reachability import reachable
+from planning.quantities import Assignment, NumericBound, helps, worth
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from knowledge_base.facts import Fact
+    from planning.cancellable_work import WorkLimit
+    from planning.domain import PlanningAction, PlanningDomain
+    from planning.strips import Problem
+
+
+@dataclass(frozen=True, slots=True)
+class _Action:
+    """Facts by number; sets of them as bits."""
+
+    needs: tuple[int, ...]
+    needed: int
+    adds: tuple[int, ...]
+    added: int
+    kept: int
+
+
+def excluding(problem: Problem, patience: WorkLimit) -> Iterator[tuple[Fact, Fact]]:
+    """The pairs of goal facts that can never hold together, though each may by itself.
+
+    Raises:
+        OutOfPatienceError: it takes too long.
+    """
+    number = {fact: i for i, fact in enumerate(dict.fromkeys([*problem.init, *problem.goal, *_mentioned(problem)]))}
+    actions = []
+    for action in problem.actions:
+        adds, deletes = ([number[fact] for fact in facts] for facts in (action.adds, action.deletes))
+        needs = tuple(number[fact] for fact in action.precondition)
+        actions.append(_Action(needs, _bits(needs), tuple(adds), _bits(adds), ~(_bits(adds) | _bits(deletes))))
+    together = _reached(actions, [number[fact] for fact in problem.init], len(number), patience)
+    for one, other in itertools.combinations(problem.goal, 2):
+        if not together[number[one]] >> number[other] & 1:
+            yield one, other
+
+
+def _mentioned(problem: Problem) -> Iterator[Fact]:
+    for action in problem.actions:
+        yield from action.facts()
+
+
+def _bits(numbers: Iterable[int]) -> int:
+    found = 0
+    for number in numbers:
+        found |= 1 << number
+    return found
+
+
+def _reached(actions: list[_Action], init: list[int], size: int, patience: WorkLimit) -> list[int]:
+    """For each fact those that it can hold together with, as bits; with itself, if it can hold at all."""
+    possible = _bits(init)
+    together = [possible if possible >> i & 1 else 0 for i in range(size)]
+    before: list[int] = []
+    while before != together:
+        before = together.copy()
+        for action in actions:
+            patience.spend()
+            if any(action.needed & ~together[need] for need in action.needs):
+                continue
+            beside = action.kept & possible
+            for need in action.needs:
+                beside &= together[need]
+            for one in action.adds:
+                fresh = (beside | action.added) & ~together[one]
+                together[one] |= fresh
+                _mirror(one, fresh, together)
+            possible |= action.added
+    return together
+
+
+def _mirror(one: int, fresh: int, together: list[int]) -> None:
+    while fresh:
+        lowest = fresh & -fresh
+        together[lowest.bit_length() - 1] |= 1 << one
+        fresh ^= lowest
+
+
+_LONGEST_CHAIN = 6
+
+
+def why_unsolvable(
+    domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit | None = None
+) -> tuple[str, ...]:
+    """One sentence for each goal fact that no action sequence can reach even if nothing became false.
+
+    Each follows the nearest action back to what is missing in the end. If every fact is reachable alone,
+    the one sentence says so: then it is the deletions that stand in the way.
+
+    Raises:
+        InputError, OutOfPatienceError: as for `planning.problem.construction.pose`.
+    """
+    check_goal(goal, world)
+    derived = derivation(domain)
+    domain, world, goal = derived.domain, derived.world(world), derived.expand(goal)
+    grounded = ProblemBuilder(domain).grounded(world, goal, patience=patience)
+    if grounded.task is None:
+        return (f"{explain(goal, world).deciding} and no planning action changes that",)
+    grounder = Grounder(world, grounded.relevant.changing, patience=patience or WorkLimit())
+    rules = tuple(JoinRule.of(case, grounder) for action in grounded.relevant.actions for case in _cases(action))
+    reach = _Reach.of(grounded.task, world)
+    known = dict.fromkeys([*_present(rules, world), *sorted(reach.facts, key=str)])
+    causes = _Causes(domain, rules, grounder, reach, frozenset(known), ReachedFacts(known))
+    return tuple(dict.fromkeys(causes.of(grounded.wanted))) or _not_together(
+        domain, world, goal, patience or WorkLimit()
+    )
+
+
+def _not_together(domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit) -> tuple[str, ...]:
+    """Which goal facts exclude each other; that there must be some, if no two of them do."""
+    patience.doing = "looking for goal facts that exclude each other"
+    problem = ProblemBuilder(domain).build_problem(world, goal, patience=patience)
+    pairs = [] if problem.one_at_a_time else list(excluding(problem.whole or problem, patience))
+    told = [(one, other) for one, other in pairs if _declared(one) and _declared(other)]
+    said = [f"{_as_written(one)} and {_as_written(other)} can never hold together" for one, other in told]
+    return tuple(said) or ("each goal fact can be reached by itself, but not all of them together",)
+
+
+def _declared(fact: Fact) -> bool:
+    """Not one that stands for a disjunction, whose name has a blank."""
+    return " " not in fact.predicate.removeprefix(NOT)
+
+
+def _as_written(fact: Fact) -> str:
+    denied = fact.predicate.startswith(NOT)
+    return f"(not {replace(fact, predicate=fact.predicate.removeprefix(NOT))})" if denied else str(fact)
+
+
+@dataclass(frozen=True, slots=True)
+class _Reach:
+    """What can hold if nothing ever became false.
+
+    Attributes:
+        facts: in positive normal form.
+        changes: how numbers can change.
+        world: the present.
+    """
+
+    facts: frozenset[Fact]
+    changes: tuple[Assignment, ...]
+    world: World
+
+    @staticmethod
+    def of(task: Task, world: World) -> _Reach:
+        reach, numbering = reachable(task), task.numbering
+        named = [one for one in reach.facts.keys() - numbering.fluents if isinstance(numbering.named(one), Fact)]
+        taken = itertools.compress(task.ways.all, reach.taken)
+        changes = dict.fromkeys(change for way in taken for change in way.assignments)
+        return _Reach(frozenset(map(numbering.fact, named)), tuple(changes), world)
+
+    def allows(self, condition: Residual) -> bool:
+        """Whether the condition holds, or may hold: each of its leaves by itself."""
+        match condition:
+            case bool():
+                return condition
+            case Literal(fact, positive):
+                present = is_so(fact, self.world) is positive
+                return present or as_fact(condition) in self.facts
+            case NumericBound():
+                numbers = {one: worth(self.world, one) for one in condition.fluents()}
+                return condition.holds(numbers) or any(
+                    helps(change, condition) for change in self.changes if change.fluent in numbers
+                )
+            case Every(parts):
+                return all(map(self.allows, parts))
+            case Some(parts):
+                return any(map(self.allows, parts))
+
+
+@dataclass(frozen=True, slots=True)
+class _Nearest:
+    """A step that would add a fact, with what it lacks: facts, conditions, and how many are unchangeable."""
+
+    step: PlanStep
+    facts: tuple[Fact, ...]
+    conditions: tuple[str, ...]
+
+    fixed: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Causes:
+    domain: PlanningDomain
+    rules: tuple[JoinRule, ...]
+    grounder: Grounder
+    reach: _Reach
+    reached: frozenset[Fact]
+    index: ReachedFacts
+
+    def of(self, wanted: Residual) -> Iterator[str]:
+        """A sentence for each literal that is out of reach."""
+        match wanted:
+            case Literal():
+                if as_fact(wanted) not in self.reached:
+                    yield self.chain(wanted.fact) if wanted.positive else _stays(wanted.fact)
+            case NumericBound():
+                if not self.reach.allows(wanted):
+                    yield f"{wanted} does not hold, and no planning action that can be taken changes that"
+            case Every(parts):
+                for part in parts:
+                    yield from self.of(part)
+            case Some(parts):
+                causes = [tuple(self.of(part)) for part in parts]
+                if all(causes):
+                    yield from itertools.chain.from_iterable(causes)
+
+    def chain(self, fact: Fact) -> str:
+        """From the fact through the nearest actions to what cannot be had."""
+        said: list[str] = []
+        agenda, seen, rooted = [fact], {fact}, False
+        while agenda and len(said) < _LONGEST_CHAIN:
+            here = agenda.pop(0)
+            nearest = self.nearest(here)
+            if nearest is None:
+                rooted = True
+                said.append(f"{here} does not hold, and no planning action makes it true")
+                continue
+            rooted |= not nearest.facts or bool(nearest.conditions)
+            said.append(f"{here} needs {nearest.step}, which needs {_listed(nearest)}")
+            fresh = [missing for missing in nearest.facts if missing not in seen]
+            seen.update(fresh)
+            agenda.extend(fresh)
+        return "; ".join(said if rooted or agenda else [*said, "none of these can come first"])
+
+    def nearest(self, fact: Fact) -> _Nearest | None:
+        """The action that lacks least for adding the fact; the first of the domain among equals."""
+        found = [near for rule in self.rules for near in self.ways(rule, fact)]
+        return min(found, key=_distance, default=None)
+
+    def ways(self, rule: JoinRule, fact: Fact) -> Iterator[_Nearest]:
+        """For each effect of the action that can be the fact, the arguments that lack least."""
+        for leaf in effect_leaves(rule.action.effect):
+            if isinstance(leaf, Add) and leaf.atom.predicate == fact.predicate:
+                start = rule.unify(leaf.atom, fact, {})
+                closest = None if start is None else self.closest(rule, start)
+                if closest is not None:
+                    yield closest
+
+    def closest(self, rule: JoinRule, start: dict[str, Value]) -> _Nearest | None:
+        """Give up ever more of the positive preconditions until arguments are found for the others."""
+        for given_up in range(len(rule.atoms) + 1):
+            found = [
+                self.lacking(rule, full)
+                for kept in itertools.combinations(rule.atoms, len(rule.atoms) - given_up)
+                for bindings in itertools.islice(rule.join(self.index, kept, start), 1)
+                if (full := self.completed(rule, bindings)) is not None
+            ]
+            if found:
+                return min(found, key=_distance)
+        return None
+
+    def completed(self, rule: JoinRule, bindings: dict[str, Value]) -> dict[str, Value] | None:
+        """Parameters that nothing decides stand for the first object of their type."""
+        first = {name: next(iter(objects), None) for name, objects in rule.allowed.items()}
+        full = {name: bindings.get(name, value) for name, value in first.items()}
+        return {k: v for k, v in full.items() if v is not None} if None not in full.values() else None
+
+    def lacking(self, rule: JoinRule, bindings: dict[str, Value]) -> _Nearest:
+        parameters = self.domain.actions[rule.action.name].parameters
+        step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in parameters))
+        needed = [self.grounder.fact(atom, bindings) for atom in rule.atoms]
+        others = _parts(rule.action.precondition)
+        unmet = [
+            c for c in others if c not in rule.atoms and not self.reach.allows(self.grounder.residual(c, bindings))
+        ]
+        missing = tuple(fact for fact in needed if fact not in self.reached)
+        fixed = len(unmet) + sum(fact.predicate not in self.grounder.changing for fact in missing)
+        return _Nearest(step, missing, tuple(to_text(substitute(c, bindings)) for c in unmet), fixed)
+
+
+def _cases(action: PlanningAction) -> Iterator[PlanningAction]:
+    """One action for each effect, with what the effect depends on as parameters and precondition."""
+    for leaf, variables, conditions in _effects(action.effect):
+        needed = (*_parts(action.precondition), *(part for one in conditions for part in _parts(one)))
+        yield replace(action, parameters=(*action.parameters, *variables), precondition=And(needed), effect=leaf)
+
+
+def _effects(
+    effect: Effect, variables: tuple[TypedVariable, ...] = (), conditions: tuple[Expression, ...] = ()
+) -> Iterator[tuple[Effect, tuple[TypedVariable, ...], tuple[Expression, ...]]]:
+    """The changes an effect consists of, each with the variables and conditions around it."""
+    match effect:
+        case AllOf(parts):
+            for part in parts:
+                yield from _effects(part, variables, conditions)
+        case ForEach(more, body):
+            yield from _effects(body, (*variables, *more), conditions)
+        case When(condition, body):
+            yield from _effects(body, variables, (*conditions, condition))
+        case _:
+            yield effect, variables, conditions
+
+
+def _parts(e: Expression) -> tuple[Expression, ...]:
+    return e.parts if isinstance(e, And) else (e,)
+
+
+def _present(rules: Iterable[JoinRule], world: World) -> Iterator[Fact]:
+    """The facts that hold now, of all predicates that the actions ask for."""
+    for predicate in dict.fromkeys(atom.predicate for rule in rules for atom in rule.atoms):
+        arity = len(world.schema.predicates[predicate].parameters)
+        for args in world.match(predicate, (None,) * arity):
+            yield Fact(predicate, tuple(args))
+
+
+def _distance(near: _Nearest) -> tuple[int, int]:
+    return len(near.facts) + len(near.conditions), near.fixed
+
+
+def _listed(nearest: _Nearest) -> str:
+    return " and ".join([*map(str, nearest.facts), *nearest.conditions]) or "more than can hold together"
+
+
+def _stays(fact: Fact) -> str:
+    return f"{fact} holds, and no planning action makes it false"
