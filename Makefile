@@ -45,10 +45,11 @@ test-all: $(VENV)/.engines check   ## as test, with every planning engine and th
 	$(BIN)/python -m pytest -n auto -rs
 	frontend/tests.sh
 
-check: $(VENV)/.test   ## ruff, mypy strict, import contracts
+check: $(VENV)/.test   ## ruff, mypy strict, import contracts, prose
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/python tests/prose.py
 
 conformance: $(VENV)/.test   ## the SCXML charts of SCION and of the W3C, fetched with npm into .conformance/, on this engine (WRITE=1 writes the docs)
 	$(BIN)/python tests/conformance/charts.py $(if $(WRITE),--write)
