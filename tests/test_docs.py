@@ -16,7 +16,8 @@ from dsc.drawing import draw
 from dsc.text.profile_files import parse_profile
 
 ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+GUIDE = ROOT / "CONTRIBUTING.md"
+PAGES = [ROOT / "README.md", GUIDE, *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(page, language):
@@ -41,6 +42,30 @@ def test_yaml_on_a_page_is_a_plot_a_profile_or_a_scenario(page):
 def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
         assert target.startswith("https://") or (page.parent / target).exists(), target
+
+
+def named_in_the_guide(form):
+    text = re.sub(r"^```.*?^```", "", GUIDE.read_text(), flags=re.MULTILINE | re.DOTALL)
+    found = {name for span in re.findall(r"`([^`]+)`", text) for name in re.findall(form, span)}
+    assert len(found) > 10
+    return found
+
+
+def test_files_that_the_guide_for_contributors_names_exist():
+    for path in named_in_the_guide(r"(?<!\S)[\w.-]+/[\w./-]+(?!\S)|^[\w.-]+\.(?:md|py|toml|yaml)$"):
+        assert path.startswith(".venv/") or (ROOT / path).exists(), path
+
+
+def test_targets_that_the_guide_for_contributors_names_exist():
+    targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
+    assert named_in_the_guide(r"^make ([\w-]+)") - {*targets} == set()
+
+
+def test_names_in_code_that_the_guide_for_contributors_names_exist():
+    sources = [path for folder in ("dsc", "planning", "knowledge_base", "domains", "tests") for path in (ROOT / folder).rglob("*.py")]
+    sources.append(ROOT / "frontend" / "src" / "core" / "plots.ts")
+    words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
+    assert named_in_the_guide(r"^(\w*(?:_|[a-z][A-Z]|[A-Z]{2})\w*)$") - words == set()
 
 
 UNITS = {"": 1, " s": 1, " MiB": 1 << 20, " GiB": 1 << 30}
