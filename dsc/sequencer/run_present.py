@@ -88,9 +88,10 @@ class RunState:
             self._reached(state.root)
         serial = None if state.root is None else state.root.serial
         # Most events change none of this; of outcome events there are only ever more.
-        settings = tuple([(one, type(one.value)) for one in reactor.settings.values()])  # 1 and 1.0 are equal
+        settings = reactor.settings.values()
+        typed = tuple([(one, type(one.value)) for one in settings]) if settings else ()  # 1 and 1.0 are equal
         remembered = (
-            serial, state.finished, len(reactor.emitted), frozenset(reactor.in_vain), reactor.problem, settings,
+            serial, state.finished, len(reactor.emitted), frozenset(reactor.in_vain), reactor.problem, typed,
         )  # fmt: skip
         if remembered != self._remembered:
             self._remembered = remembered

@@ -55,6 +55,7 @@ class RunWriter:
         self._listeners: list[Callable[[Boundary], None]] = []
         self._together = knowledge.together()
         with self._together as self.connection:
+            self._cursor = self.connection.cursor()  # `Connection.execute` makes one each time
             if not require_tables_of_runs(self.connection, path):
                 for statement in TABLES.values():
                     self.connection.execute(statement)
@@ -79,18 +80,21 @@ class RunWriter:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         try:
             if error is None:
-                self._tell("before commit")
+                for listener in self._listeners:
+                    listener("before commit")
         except BaseException as stopped:
             self._close(stopped)
             raise
         self._close(error)
         if error is None:
             self.begun = True
-            self._tell("after commit")
+            for listener in self._listeners:
+                listener("after commit")
 
     def require_right(self) -> None:
         """Raise `StoreError` if another sequencer has taken the run over."""
-        self._require(self.connection.execute(_RIGHT, (self._epoch,)).fetchone() is not None)
+        if self.connection.execute(_RIGHT, (self._epoch,)).fetchone() is None:
+            raise self._taken_over()
 
     def begin(self, *row: Any) -> int:
         """The row of a run without its number, which is returned; errors as for `require_right`."""
@@ -104,10 +108,11 @@ class RunWriter:
     def step(self, *row: Any) -> None:
         """The row of a macrostep without its place; errors as for `require_right`, which it makes needless."""
         knowledge = self._knowledge.digest
-        before = self._digest or self._continued()
-        digest = link(before + knowledge, *row)
-        self._require(self.connection.execute(_STEP, (*row, knowledge, digest, self._epoch)).rowcount == 1)
-        self._last = before + knowledge, row
+        before = (self._digest or self._continued()) + knowledge
+        digest = link(before, *row)
+        if self._cursor.execute(_STEP, (*row, knowledge, digest, self._epoch)).rowcount != 1:
+            raise self._taken_over()
+        self._last = before, row
         self._digest = digest
 
     def more(self, change: str = "", records: str = "") -> None:
@@ -135,9 +140,8 @@ class RunWriter:
         self._last = before + knowledge, tuple(row)
         return link(before + knowledge, *row)
 
-    def _require(self, right: object) -> None:
-        if not right:
-            raise StoreError("another sequencer has taken this run over", place=Place(str(self._path)))
+    def _taken_over(self) -> StoreError:
+        return StoreError("another sequencer has taken this run over", place=Place(str(self._path)))
 
     def _close(self, error: BaseException | None) -> None:
         self.lost = self.lost or error is not None
@@ -146,7 +150,3 @@ class RunWriter:
         except BaseException:
             self.lost = True
             raise
-
-    def _tell(self, boundary: Boundary) -> None:
-        for listener in self._listeners:
-            listener(boundary)

@@ -43,7 +43,9 @@ class WriteTransaction:
         self._path = path
         self._durability = durability
         self._name = str(path)  # a `Path` takes longer
-        self._file = os.stat(self._name)  # noqa: PTH116
+        found = os.stat(self._name)  # noqa: PTH116
+        self._file = found.st_dev, found.st_ino
+        self._cursor = connection.cursor()  # `Connection.execute` makes one each time
         self._commits = 0
         self._rows = 0  # ever written, when it began
 
@@ -52,7 +54,7 @@ class WriteTransaction:
         if not self.is_in_place():
             raise StoreError("the store was moved or deleted while it is open", place=Place(self._name))
         try:
-            self._connection.execute("BEGIN IMMEDIATE")
+            self._cursor.execute("BEGIN IMMEDIATE")
         except BaseException as error:
             self._roll_back(error)
             raise
@@ -71,9 +73,10 @@ class WriteTransaction:
     def is_in_place(self) -> bool:
         """Whether the file that is written still has its name; without it a restart finds nothing of a commit."""
         try:
-            return os.path.samestat(os.stat(self._name), self._file)  # noqa: PTH116
+            found = os.stat(self._name)  # noqa: PTH116
         except OSError:
             return False
+        return (found.st_dev, found.st_ino) == self._file
 
     def _roll_back(self, error: BaseException) -> None:
         with reported(self._path, "write"):
@@ -89,12 +92,12 @@ class WriteTransaction:
         if changed and not self.marked:
             mark_open(connection, self._token)
         if self._durability == "power" or not changed or self._commits % TIDY_UP_AFTER:
-            connection.execute("COMMIT")
+            self._cursor.execute("COMMIT")
         elif not CHECKPOINTS.is_behind(self._path):
             with CHECKPOINTS.asking(self._path):
-                connection.execute("COMMIT")
+                self._cursor.execute("COMMIT")
         else:
-            connection.execute("COMMIT")
+            self._cursor.execute("COMMIT")
             CHECKPOINTS.leave(self._path)
             with suppress(sqlite3.Error):  # it is committed; what cannot be tidied up now is later
                 connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
@@ -132,7 +135,7 @@ class TransactionGroup:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.open = False
         try:
-            if error is None:
+            if error is None and self.behind is not None:
                 self._require_parts()
             self._transaction.__exit__(kind, error, at)
         except BaseException as failed:
