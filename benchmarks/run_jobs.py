@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import sqlite3
+from collections.abc import Awaitable, Callable
 from itertools import count
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from timing import Job
@@ -26,11 +28,12 @@ from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.journal.file import Durability
 
 SCHEMA = Schema.parse("(define (domain bench))")
-PING, STOP = Event("ping"), Event("stop")
+PING, LAST, STOP = Event("ping"), Event("last"), Event("stop")
 EVENTS = ActionPlot.model_validate({
-    "plot": "events", "receives": {"ping": None, "stop": None}, "parameters": {"n": "number"},
+    "plot": "events", "receives": {"ping": None, "last": None, "stop": None}, "parameters": {"n": "number"},
     "states": {
-        "a": {"on": {"ping": "b", "stop": "e"}}, "b": {"on": {"ping": "a", "stop": "e"}}, "e": {"final": True},
+        "a": {"on": {"ping": "b", "last": "c", "stop": "e"}}, "b": {"on": {"ping": "a", "last": "c", "stop": "e"}},
+        "c": {"on": {"stop": "e"}}, "e": {"final": True},
     },
 })  # fmt: skip
 ANSWERS = ActionPlot.model_validate({
@@ -53,12 +56,21 @@ ROW = "x" * 400
 
 
 class Robot(Component):
-    """Its work is done at once."""
+    """Its work is done at once.
+
+    Attributes:
+        called: when its work was asked for, each time.
+    """
 
     name = "robot"
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.called: list[float] = []
+
     @skill(outcomes={"did": {}}, after_crash="repeat")
     async def work(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+        self.called.append(perf_counter())
         return Outcome("did")
 
 
@@ -79,7 +91,7 @@ class Bench:
         jobs = {ENGINE: Job(_answered if case == ANSWER else _moved), HOP: Job(_hops), NO_STORE: self._run(case, None)}
         for durability in DURABILITIES:
             jobs[durability] = self._run(case, durability)
-            jobs[bare(durability)] = Job(_commits, prepare=lambda n, d=durability: (n, self._bare(d)))
+            jobs[bare(durability)] = Job(_commits, prepare=lambda n, d=durability: (n, self._bare(d)), timed=True)
         return jobs
 
     def _run(self, case: str, durability: Durability | None) -> Job:
@@ -90,26 +102,24 @@ class Bench:
             kb = KnowledgeBase.open(SCHEMA, path, durability)
             return times, kb, RunStore(kb, path)
 
-        def run(prepared: Any) -> None:
+        def run(prepared: Any) -> float:
             times, kb, store = prepared
 
-            async def main() -> None:
-                sequencer = Sequencer(LIBRARY, kb, [Robot()], LoopClock(), store=store, open_ended=case == ONE)
+            async def main() -> float:
+                robot = Robot()
+                sequencer = Sequencer(LIBRARY, kb, [robot], LoopClock(), store=store, open_ended=case != ANSWER)
                 plot = ANSWERS if case == ANSWER else EVENTS
-                running = asyncio.get_running_loop().create_task(sequencer.run(plot.name, {"n": times}))
-                if case == ONE:
-                    await _one_at_a_time(sequencer, times)
-                elif case == MANY:
-                    for _ in range(times):
-                        sequencer.post(PING)
-                    sequencer.post(STOP)
+                running = asyncio.get_running_loop().create_task(sequencer.run(plot.name, {"n": times + 1}))
+                seconds = await DRIVERS[case](sequencer, times) if case in DRIVERS else 0.0
                 end = await running
                 assert end.finished, end
+                return seconds or robot.called[-1] - robot.called[0]
 
-            run_real(main())
+            seconds = run_real(main())
             kb.close()
+            return seconds
 
-        return Job(run, prepare=prepare)
+        return Job(run, prepare=prepare, timed=True)
 
     def _bare(self, durability: Durability) -> sqlite3.Connection:
         connection = sqlite3.connect(self._file(), isolation_level=None)
@@ -122,15 +132,40 @@ class Bench:
         return self._folder / f"{next(self._numbers)}.kb"
 
 
-async def _one_at_a_time(sequencer: Sequencer, times: int) -> None:
+async def _one_at_a_time(sequencer: Sequencer, times: int) -> float:
     """Each event waits until the macrostep of the one before is over: there and back, which is two hops."""
     done: asyncio.Queue[None] = asyncio.Queue()
     sequencer.listen(lambda _: done.put_nowait(None))
     await done.get()  # the start
+    start = perf_counter()
     for _ in range(times):
         sequencer.post(PING)
         await done.get()
+    seconds = perf_counter() - start
     sequencer.post(STOP)
+    return seconds
+
+
+async def _all_at_once(sequencer: Sequencer, times: int) -> float:
+    """All events wait when the sequencer takes the first; another one after them says that they are taken."""
+    await _until(lambda: sequencer.machine.state.root is not None)
+    start = perf_counter()
+    for _ in range(times):
+        sequencer.post(PING)
+    sequencer.post(LAST)
+    await _until(lambda: sequencer.machine.state.configuration() == ("c",))
+    seconds = perf_counter() - start
+    sequencer.post(STOP)
+    return seconds
+
+
+async def _until(holds: Callable[[], bool]) -> None:
+    while not holds():  # noqa: ASYNC110  # a listener would hear every macrostep, and its time would count
+        await asyncio.sleep(0)
+
+
+DRIVERS: dict[str, Callable[[Sequencer, int], Awaitable[float]]] = {ONE: _one_at_a_time, MANY: _all_at_once}
+"""Post the events of a case and return the seconds they take, without begin and end; the robot's answers need none."""
 
 
 def _moved(times: int) -> None:
@@ -166,10 +201,13 @@ def _hops(times: int) -> None:
     run_real(main())
 
 
-def _commits(prepared: tuple[int, sqlite3.Connection]) -> None:
+def _commits(prepared: tuple[int, sqlite3.Connection]) -> float:
     times, connection = prepared
+    start = perf_counter()
     for _ in range(times):
         connection.execute("BEGIN IMMEDIATE")
         connection.execute("INSERT INTO rows (text) VALUES (?)", (ROW,))
         connection.execute("COMMIT")
+    seconds = perf_counter() - start
     connection.close()
+    return seconds

@@ -16,20 +16,22 @@ class Job:
 
     Attributes:
         run: does it.
+        timed: whether `run` returns its seconds, without what is paid once however often it runs.
         units: events (or whatever is counted) for each time.
         prepare: number of times -> what `run` gets; not timed.
     """
 
-    run: Callable[[Any], object]
+    run: Callable[[Any], Any]
     units: int = 1
     prepare: Callable[[int], Any] = int
+    timed: bool = False
 
     def seconds(self, times: int) -> float:
         """How long that many times take."""
         prepared = self.prepare(times)
         start = time.perf_counter()
-        self.run(prepared)
-        return time.perf_counter() - start
+        seconds = self.run(prepared)
+        return seconds if self.timed else time.perf_counter() - start
 
     def times(self, seconds: float) -> int:
         """How often it runs in about that many seconds; at least once."""
