@@ -1,11 +1,13 @@
 """`make bench-run` works: every way to run has its figures and ratios, and many plots at once are all served."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
-BENCH = Path(__file__).parent.parent / "benchmarks" / "run.py"
+BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
+BENCH = BENCHMARKS / "run.py"
 
 
 def test_every_way_to_run_a_chart_is_timed_and_many_plots_at_once(tmp_path):
@@ -24,3 +26,20 @@ def test_every_way_to_run_a_chart_is_timed_and_many_plots_at_once(tmp_path):
     assert [(one["plots"], one["fewest"], one["most"]) for one in measured["plots"]] == 2 * [(1, 20, 20), (5, 1, 1)]
     assert all(one["p50"] <= one["p99"] <= one["longest"] for one in measured["plots"])
     assert not list(tmp_path.iterdir())
+
+
+def test_what_a_run_pays_once_does_not_count(tmp_path):
+    said = """
+import sys, time
+from pathlib import Path
+from run_jobs import CASES, Bench
+bench = Bench(Path(sys.argv[1]))
+for case in CASES:
+    job = bench.jobs(case)["process"]
+    begun = time.perf_counter()
+    timed = job.seconds(1)
+    print(timed > 0, timed < (time.perf_counter() - begun) / 5)
+"""
+    environment = {**os.environ, "PYTHONPATH": str(BENCHMARKS)}
+    done = subprocess.run([sys.executable, "-c", said, tmp_path], capture_output=True, text=True, check=True, env=environment)
+    assert done.stdout.split() == 6 * ["True"]
