@@ -103,9 +103,9 @@ PENDING = {
     "knowledge_base/exchange", "knowledge_base/journal", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
     "dsc", "dsc/components", "dsc/dynamic", "dsc/engine", "dsc/model", "dsc/sequencer", "dsc/testing", "dsc/text",
-    "dsc/text/diagram", "dsc/text/diagram/layered", "dsc/text/scxml", "dsc/validation", "dsc/viewer",
+    "dsc/drawing", "dsc/drawing/layered", "dsc/scxml", "dsc/validation", "dsc/viewer",
     "planning", "planning/cli", "planning/engines", "planning/execution", "planning/generation", "planning/ordering",
-    "planning/posing",
+    "planning/problem",
     "domains", "domains/clean_up_table",
     "benchmarks", "benchmarks/knowledge", "benchmarks/peers",
 }  # fmt: skip

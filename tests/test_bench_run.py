@@ -41,5 +41,7 @@ for case in CASES:
     print(timed > 0, timed < (time.perf_counter() - begun) / 5)
 """
     environment = {**os.environ, "PYTHONPATH": str(BENCHMARKS)}
-    done = subprocess.run([sys.executable, "-c", said, tmp_path], capture_output=True, text=True, check=True, env=environment)
+    done = subprocess.run(
+        [sys.executable, "-c", said, tmp_path], capture_output=True, text=True, check=True, env=environment
+    )
     assert done.stdout.split() == 6 * ["True"]

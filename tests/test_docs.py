@@ -62,7 +62,11 @@ def test_targets_that_the_guide_for_contributors_names_exist():
 
 
 def test_names_in_code_that_the_guide_for_contributors_names_exist():
-    sources = [path for folder in ("dsc", "planning", "knowledge_base", "domains", "tests") for path in (ROOT / folder).rglob("*.py")]
+    sources = [
+        path
+        for folder in ("dsc", "planning", "knowledge_base", "domains", "tests")
+        for path in (ROOT / folder).rglob("*.py")
+    ]
     sources.append(ROOT / "frontend" / "src" / "core" / "plots.ts")
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
     assert named_in_the_guide(r"^(\w*(?:_|[a-z][A-Z]|[A-Z]{2})\w*)$") - words == set()

@@ -147,7 +147,9 @@ def test_a_sentence_is_found_at_its_line_behind_tables_and_code() -> None:
 # -- the command -----------------------------------------------------------------------------------------
 
 
-def test_a_pending_room_is_not_checked_but_its_citations_are(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_pending_room_is_not_checked_but_its_citations_are(
+    checkout: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert prose.main([]) == 1
     assert capsys.readouterr().out.splitlines() == [
         "README.md:3: word: 'anew' (use again): The store starts anew.",
