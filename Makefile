@@ -6,7 +6,7 @@ BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores
-.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer test-viewer screenshots clean
+.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -126,9 +126,13 @@ pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 
 NODE_MODULES := frontend/node_modules/.made
 
-$(NODE_MODULES): frontend/package.json   # Node is needed to build the page, never to show it
-	cd frontend && npm install --no-package-lock --no-fund --no-audit
+$(NODE_MODULES): frontend/package-lock.json   # Node is needed to build the page, never to show it
+	cd frontend && npm ci --no-fund --no-audit
 	@touch $@
+
+lock-viewer:   ## the page's lock after a change of frontend/package.json: versions and digests, and no registry's name
+	cd frontend && npm install --package-lock-only --omit-lockfile-registry-resolved --no-audit
+	sed -i '/"funding": {/,/},\?$$/d' frontend/package-lock.json
 
 viewer: $(NODE_MODULES)   ## build the page that `dsc view` shows (needs Node and npm)
 	cd frontend && npm run --silent build

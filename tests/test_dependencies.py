@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from dependencies import PAGE, TITLES, WHY, Requirement, licence, requirements
 
+ROOT = Path(__file__).parents[1]
 ROWS = [
     tuple(cell.strip() for cell in line.split("|")[1:-1])
     for line in PAGE.read_text().splitlines()
@@ -44,3 +47,12 @@ def test_a_program_that_plans_does_not_import_pyperplan():
         "assert not [name for name in sys.modules if name.partition('.')[0] == 'pyperplan']\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_the_page_is_built_from_a_lock_that_names_no_registry():
+    lock = json.loads((ROOT / "frontend" / "package-lock.json").read_text(encoding="utf-8"))
+    declared = json.loads((ROOT / "frontend" / "package.json").read_text(encoding="utf-8"))
+    assert lock["packages"][""]["dependencies"] == declared["dependencies"]
+    assert lock["packages"][""]["devDependencies"] == declared["devDependencies"]
+    assert all("integrity" in package for place, package in lock["packages"].items() if place)
+    assert "://" not in json.dumps(lock)
