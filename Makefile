@@ -47,6 +47,7 @@ test-all: $(VENV)/.engines check   ## as test, with every planning engine and th
 
 check: $(VENV)/.test   ## ruff, mypy strict, import contracts, prose
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python tests/prose.py
