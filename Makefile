@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores
+.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots clean
 
 help:   ## this list
@@ -95,6 +95,16 @@ lower-bounds: $(LOWER)/.made   ## tests of every room with the oldest packages t
 fuzz: $(VENV)/.test   ## mutated inputs for every reader and command: no traceback, no hang, no growth (SECONDS=N SEED=N ONLY=NAMES REPRODUCE=FILE)
 	$(BIN)/python tests/fuzz/fuzz.py --seconds $(or $(SECONDS),60) --seed $(or $(SEED),0) $(if $(ONLY),--only $(ONLY)) $(if $(REPRODUCE),--reproduce $(REPRODUCE))
 
+MUTATION := .venv-mutation
+
+$(MUTATION)/.made: pyproject.toml   # apart, since mutmut brings much along
+	$(PYTHON) -m venv $(MUTATION)
+	$(MUTATION)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[mutation]'
+	@touch $@
+
+mutation: $(MUTATION)/.made   ## change one thing at a time: do the tests of the room notice? (ROOM=NAMES SAMPLE=N SEED=N JOBS=N)
+	$(MUTATION)/bin/python tests/mutation/mutation.py $(ROOM) $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(SEED),--seed $(SEED)) $(if $(JOBS),--jobs $(JOBS))
+
 corrupt-stores: $(VENV)/.test   ## stores damaged in every way: does any reader answer what never was? (CORRUPTIONS=N FIRST=SEED)
 	$(BIN)/python tests/dsc/stores_soak.py $(or $(CORRUPTIONS),1000) $(or $(FIRST),0)
 
@@ -148,4 +158,4 @@ bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watc
 	$(BIN)/python benchmarks/viewer.py $(if $(RUNS),--rounds $(RUNS))
 
 clean:   ## forget the environment and caches
-	rm -rf $(VENV) $(BENCH) $(LOWER) frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) $(BENCH) $(LOWER) $(MUTATION) .mutation frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

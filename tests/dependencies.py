@@ -55,6 +55,7 @@ WHY = {
     "jsonschema": ("the published JSON Schema, tested", BUILD),
     "pytest": ("tests", BUILD),
     "pytest-xdist": ("tests on all cores", BUILD),
+    "mutmut": ("mutants in `make mutation`", BUILD),
     "import-linter": ("the direction of imports, checked", BUILD),
     "mypy": ("types, checked", BUILD),
     "ruff": ("style, checked", BUILD),
@@ -72,6 +73,7 @@ LICENCES = {
     "up-fast-downward": "GPL-3.0 (the engine)", "up-enhsp": "Apache-2.0; the engine GPL-3.0", "up-aries": "MIT",
     "pyoxigraph": "MIT OR Apache-2.0", "python-statemachine": "MIT", "rdflib": "BSD-3-Clause", "sismic": "LGPL-3.0",
     "scipy": "BSD-3-Clause", "transitions": "MIT", "xstate-statemachine": "MIT", "hatchling": "MIT",
+    "mutmut": "BSD-3-Clause",
 }  # fmt: skip
 """Of what `make test` does not install, and of a package that says too little."""
 SPELT = {"GPL3+": "GPL-3.0-or-later", "APACHE": "Apache-2.0", "BSD 2-Clause License": "BSD-2-Clause"}
@@ -79,6 +81,7 @@ SPELT = {"GPL3+": "GPL-3.0-or-later", "APACHE": "Apache-2.0", "BSD 2-Clause Lice
 TITLES = {
     "core": "Core", "viewer": "Extra `viewer`", "bt": "Extra `bt`", "fast": "Extra `fast`", "numeric": "Extra `numeric`",
     "durations": "Extra `durations`", "test": "Extra `test`", "check": "Extra `check`", "bench": "Extra `bench`",
+    "mutation": "Extra `mutation`",
     "build": "To build the package",
 }  # fmt: skip
 HEAD = """# Dependencies
