@@ -234,3 +234,124 @@ def test_a_closed_monitor_says_nothing():
     plan.monitor.close()
     plan.change("eve", gone="in p2 store")
     assert plan.news == []
+
+
+def test_what_the_running_step_itself_has_broken_is_said_with_who_when_and_for_which_step():
+    plan = Watched()
+    plan.begin(1)
+    plan.change("bob", gone="open office")
+    plan.begin(2)
+    assert plan.news == [Broken("(open office) is false", "(open office)", 2, "the steps before", plan.kb.version)]
+
+
+def test_the_goal_reached_by_the_step_itself_is_heard_when_the_next_begins():
+    plan = Watched()
+    plan.begin(1)
+    plan.change("bob", gone="in p1 store, in p2 store", now="in p1 office, in p2 office")
+    assert plan.news == []
+    plan.begin(2)
+    assert plan.news == [Reached("the steps before")]
+
+
+def test_a_goal_that_does_not_hold_any_more_is_not_reached_again():
+    plan = Watched()
+    plan.begin(1)
+    plan.change("eve", gone="in p1 store, in p2 store", now="in p1 office, in p2 office")
+    plan.news.clear()
+    plan.change("eve", gone="in p1 office")
+    assert Reached("eve") not in plan.news
+
+
+def test_a_goal_about_a_thing_that_is_gone_is_not_reached():
+    plan = Watched()
+    plan.begin(1)
+    plan.kb.apply(Delta(removed_nodes=("p2",)), "bob")
+    plan.news.clear()
+    plan.begin(2)
+    assert [type(one) for one in plan.news] == [Broken]
+
+
+def test_each_condition_that_falls_is_said_and_none_that_comes_back():
+    plan = Watched()
+    plan.begin(1)
+    plan.change("eve", gone="in p2 store, open office")
+    assert {one.needed for one in plan.news} == {"(in p2 store)", "(open office)"}
+    plan.news.clear()
+    plan.change("eve", now="in p2 store")
+    assert plan.news == []
+
+
+def test_news_may_be_answered_with_a_change_before_the_next_is_told():
+    plan, told = Watched(), []
+
+    def answer(news):
+        told.append(news)
+        plan.kb.apply(Delta(added=(fact("painted", "hall"),)), f"who heard news {len(told)}")
+
+    Monitor(plan.course, DOMAIN, plan.kb, lambda author: author == "bob", answer).look("earlier")
+    change = plan.change("eve", gone="in p2 store, open office")
+    assert [(one.author, one.version) for one in told] == [("eve", change.version)] * 2
+
+
+def test_nobody_is_interrupted_for_a_shorter_plan_while_several_steps_are_at_work():
+    plan = Watched(TWO, parse_condition("(and (in p1 office) (in p2 office))"), SIDE_BY_SIDE, (fact("at", "eve", "hall"), fact("in", "p2", "hall")))
+    plan.begin(1)
+    plan.do(1)
+    plan.begin(2)
+    assert plan.course.at_work == (1, 2)
+    assert plan.news == []
+    plan.change("bob", gone="holding bob p1")
+    plan.begin(4)
+    assert plan.news == [Broken("(in p1 store) is false", "(in p1 store)", 1, "the steps before", plan.kb.version)]
+
+
+def test_a_later_step_that_can_be_the_next_one_is_not_announced_while_one_is_at_work():
+    plan = Watched()
+    for number in range(1, 5):
+        plan.begin(number)
+        plan.do(number)
+    plan.change("eve", gone="in p2 store", now="holding bob p2")  # step 5 is not needed, and cannot be taken
+    assert plan.news == []
+
+
+def test_what_a_step_that_is_done_needed_is_not_watched_any_more(monkeypatch):
+    plan = Watched()
+    plan.begin(1)
+    plan.do(1)
+    plan.begin(2)
+    looked = []
+    monkeypatch.setattr(Course, "stands", lambda *args: looked.append(args))
+    plan.change("eve", now="in p1 store")
+    plan.change("eve", gone="in p1 store")
+    assert looked == []
+
+
+def test_only_what_somebody_else_brings_about_is_early():
+    plan = Watched()
+    plan.begin(1)
+    plan.do(1)
+    plan.change("bob", now="in p2 office")
+    plan.change("eve", gone="in p2 office")
+    assert not plan.course.early
+    plan.change("eve", now="in p2 office")
+    assert plan.course.early
+    plan.begin(2)
+    assert plan.course.early is False
+
+
+def test_a_plan_that_can_be_judged_as_a_whole_alone_names_what_later_steps_need():
+    plan = Watched([step("grow"), step("go bob store hall")], parse_condition("(and (> (weight p1) 3) (at bob hall))"))
+    plan.change("bob", values={fact("weight", "p1"): 2.0})
+    plan.news.clear()
+    plan.begin(1)
+    assert plan.news == []
+    change = plan.change("eve", gone="open hall")
+    assert plan.news == [Broken("(open hall) is false", "(open hall)", 2, "eve", change.version)]
+
+
+def test_a_broken_plan_that_needs_no_single_condition_names_its_goal():
+    plan = Watched([step("grow"), step("grow"), step("grow")], parse_condition("(and (> (weight p1) 3) (open hall))"))
+    plan.change("bob", values={fact("weight", "p1"): 1.0})
+    plan.news.clear()
+    change = plan.change("eve", gone="open hall")
+    assert plan.news == [Broken("(open hall) is false", "", 4, "eve", change.version)]
