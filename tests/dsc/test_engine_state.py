@@ -137,3 +137,17 @@ def test_a_state_nested_too_deeply_is_refused():
         form["root"] = {**form["root"], "children": {"a": form["root"]}}
     with pytest.raises(InputError, match="no state of a machine"):
         MachineState.from_json(form, run.library)
+
+
+def test_what_is_active_inside_a_state_is_its_own_activation_and_those_of_its_content():
+    waiting = "{plot: q, states: {a: {after: {seconds: 5, to: b}}, b: {final: true}}}"
+    run = Run(plot("{plot: p, states: {h: {use: q, on: {done: e}}, e: {final: true}}}"), plot(waiting))
+    run.start()
+    state = run.machine.state
+    own, inner = state.root.activations["h"], state.root.children["h"].activations["a"]
+    assert state.activations_inside(own) == {own, inner}
+    assert state.activations_inside(inner) == {inner}
+    assert state.activations_inside(0) == MachineState().activations_inside(own) == frozenset()
+    assert state.has_activation(inner)
+    assert not state.has_activation(0)
+    assert not MachineState().has_activation(inner)

@@ -75,7 +75,11 @@ def _body(lines: list[str], span: LineSpan) -> list[str]:
 
 def _difference(before: list[str], after: list[str]) -> tuple[int, str]:
     """Return the offset of the first change, and the changed lines."""
-    blocks = [code for code in difflib.SequenceMatcher(None, before, after, autojunk=False).get_opcodes() if code[0] != "equal"]
+    blocks = [
+        code
+        for code in difflib.SequenceMatcher(None, before, after, autojunk=False).get_opcodes()
+        if code[0] != "equal"
+    ]
     gone = [f"- {line.strip()}" for _, start, end, _, _ in blocks for line in before[start:end]]
     come = [f"+ {line.strip()}" for _, _, _, start, end in blocks for line in after[start:end]]
     return blocks[0][1], "\n".join([*gone, *come])

@@ -37,7 +37,12 @@ def main() -> None:
     unknown = sorted(set(said.rooms) - set(rooms))
     if unknown:
         parser.error(f"no room {', '.join(unknown)}; there are {', '.join(rooms)}")
-    problems = [problem for name in said.rooms or rooms for problem in judge(rooms[name], said.sample, said.seed, said.jobs)]
+    try:
+        problems = [
+            problem for name in said.rooms or rooms for problem in judge(rooms[name], said.sample, said.seed, said.jobs)
+        ]
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the next run goes on here")
     for problem in problems:
         print(f"FAILED: {problem}")
     sys.exit(1 if problems else 0)
@@ -63,7 +68,9 @@ def judge(room: Room, size: int | None, seed: int, jobs: int) -> list[str]:
         known = verdicts(tested)
     problems = report(room.name, tested, known, Counter(excluded.values()))
     spent = sum(seconds for _, seconds in known.values())
-    print(f"  time       {_minutes(time.monotonic() - started)} for this run, {_minutes(spent)} of tests for all verdicts\n")
+    print(
+        f"  time       {_minutes(time.monotonic() - started)} for this run, {_minutes(spent)} of tests for all verdicts\n"
+    )
     return problems
 
 
@@ -73,7 +80,9 @@ def sample(mutants: Sequence[Mutant], size: int, seed: int) -> list[Mutant]:
     return drawn[:size]
 
 
-def report(name: str, tested: Sequence[Mutant], known: dict[str, tuple[Verdict, float]], excluded: Counter[str]) -> list[str]:
+def report(
+    name: str, tested: Sequence[Mutant], known: dict[str, tuple[Verdict, float]], excluded: Counter[str]
+) -> list[str]:
     """Print figures and survivors, and return what is wrong."""
     counts = Counter(known[mutant.name][0] for mutant in tested if mutant.name in known)
     total, left_out = counts.total(), excluded.total()

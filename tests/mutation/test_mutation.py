@@ -16,7 +16,9 @@ def test_every_room_has_modules_and_tests():
 def test_an_accepted_survivor_is_a_line_of_its_function_and_has_a_reason():
     for (function, change), reason in read_accepted().items():
         parts = function.split(".")
-        module = next(path for at in range(len(parts)) if (path := ROOT.joinpath(*parts[:at]).with_suffix(".py")).is_file())
+        module = next(
+            path for at in range(len(parts)) if (path := ROOT.joinpath(*parts[:at]).with_suffix(".py")).is_file()
+        )
         source = {line.strip() for line in module.read_text().splitlines()}
         gone = {line.removeprefix("- ") for line in change.splitlines() if line.startswith("- ")}
         assert gone <= source, f"{function}: {gone - source}"

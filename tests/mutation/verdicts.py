@@ -68,14 +68,19 @@ def forget_survivors(room: Room) -> None:
 
 
 def run_mutmut(mutants: Iterable[Mutant], jobs: int) -> None:
-    """Let mutmut test these mutants.
+    """Let mutmut test these mutants; on a terminal it shows how far it is.
 
     Raises:
         SystemExit: the tests fail without any mutant.
     """
     command = [str(Path(sys.executable).with_name("mutmut")), "run", "--max-children", str(jobs)]
-    log = Path("mutmut.log")
+    log = Path("mutmut.log").absolute()
     with log.open("w") as file:
-        ended = subprocess.run([*command, *(mutant.name for mutant in mutants)], stdout=file, stderr=file, check=False)
+        shown = None if sys.stdout.isatty() else file
+        ended = subprocess.run(
+            [*command, *(mutant.name for mutant in mutants)], stdout=shown, stderr=shown, check=False
+        )
     if ended.returncode:
-        raise SystemExit(log.read_text()[-3000:] + f"\nmutmut ended with {ended.returncode}")
+        raise SystemExit(
+            f"mutmut ended with {ended.returncode}; it wrote to {'the terminal' if shown is None else log}"
+        )

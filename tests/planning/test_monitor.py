@@ -355,3 +355,8 @@ def test_a_broken_plan_that_needs_no_single_condition_names_its_goal():
     plan.news.clear()
     change = plan.change("eve", gone="open hall")
     assert plan.news == [Broken("(open hall) is false", "", 4, "eve", change.version)]
+
+
+def test_a_goal_about_a_number_that_is_not_known_is_not_reached():
+    plan = Watched([step("grow")], parse_condition("(> (weight p1) 3)"))
+    assert [type(one) for one in plan.news] == [Broken]
