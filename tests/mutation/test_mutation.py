@@ -32,6 +32,9 @@ def test_no_survivor_is_accepted_twice():
 def test_a_kind_is_excluded_by_its_whole_change_with_a_reason():
     assert all(kind.reason.strip() for kind in read_excluded())
     assert len(tomllib.loads(EXCLUDED.read_text())["excluded"]) == len({kind.pattern for kind in read_excluded()})
+    sql = '- row = db.execute("SELECT a FROM b", {"a": 1})\n+ row = db.execute("select a from b", {"%s": 1})'
+    assert exclusion(sql % "a", read_excluded())
+    assert not exclusion(sql % "A", read_excluded())
     kinds = [Excluded(r"- a\n\+ b", "why")]
     assert exclusion("- a\n+ b", kinds) == "why"
     assert exclusion("- a\n+ bb", kinds) is None
