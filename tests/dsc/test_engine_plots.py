@@ -207,3 +207,27 @@ def test_an_outcome_for_a_state_that_is_left_in_the_same_microstep_reaches_nobod
     run.start()
     assert len(run.send("e").microsteps) == 1
     assert run.active == ["away"]
+
+
+def layers(on):
+    """A plot in a plot in a plot, whose outermost state takes these events."""
+    waiting = "{plot: r, states: {a: {after: {seconds: 5, to: b}}, b: {final: true}}}"
+    middle = "{plot: q, states: {m: {use: r, on: {done: f}}, f: {final: true}}}"
+    outer = f"{{plot: p, states: {{h: {{use: q, on: {{done: e, {on}}}}}, e: {{final: true}}, broken: }}}}"
+    run = Run(*map(plot, (outer, middle, waiting)))
+    run.start()
+    return run
+
+
+@pytest.mark.parametrize("failure", ["skill_error", "timed_out"])
+def test_a_failure_that_nobody_inside_takes_is_offered_outwards_and_no_other_event(failure):
+    run = layers(f"{failure}: broken, stop: broken")
+    assert not run.send("stop", to="h/m/a").handled
+    assert run.send(failure, to="h/m/a").handled
+    assert run.machine.state.configuration() == ("broken",)
+
+
+def test_a_failure_that_nobody_takes_is_not_handled():
+    run = layers("stop: broken")
+    assert not run.send("skill_error", to="h/m/a").handled
+    assert run.machine.state.configuration() == ("h", "h/m", "h/m/a")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 from dsc_charts import FakeSituation, Run, plot
 
 from dsc.dynamic.library import Library
 from dsc.engine.machine import step
-from dsc.engine.machine_state import MachineState
+from dsc.engine.machine_state import FrameState, MachineState
 from dsc.engine.situation import Decision
 from dsc.events import Event
 from knowledge_base.errors import InputError, UnknownNameError
@@ -151,3 +152,54 @@ def test_what_is_active_inside_a_state_is_its_own_activation_and_those_of_its_co
     assert state.has_activation(inner)
     assert not state.has_activation(0)
     assert not MachineState().has_activation(inner)
+
+
+def test_a_frame_goes_to_json_and_back():
+    run = rich()
+    run.start()
+    frame = run.machine.state.root
+    assert FrameState.from_json(json.loads(json.dumps(frame.to_json())), run.library) == frame
+    with pytest.raises(InputError):
+        FrameState.from_json({"plot": "p"}, run.library)
+
+
+def test_a_plot_that_moves_on_has_not_ended_also_with_variables():
+    run = Run(plot("{plot: p, variables: {n: {type: number, initial: 0}}, states: {a: {on: {go: b}}, b: {on: {go: a, up: {to: b, assign: {n: 1}}}}}}"))
+    run.start()
+    for event in ("go", "up", "go", "go", "go"):
+        run.send(event)
+        assert not run.machine.state.finished
+    assert run.machine.state.configuration() == ("a",)
+
+
+def test_a_plot_bound_as_a_value_is_another_than_the_same_plot_by_name():
+    library = Library([plot(INNER)])
+    named = library.compiled("q")
+    bound = library.bind({"plot": "q", "states": {"a": {"on": {"go": "b"}}, "b": {"final": True}}})
+    assert named != bound
+    assert named != replace(named, form={})
+    assert named == replace(named)
+    assert bound != replace(bound, plot=named.plot)
+
+
+def test_content_is_looked_through_in_document_order_whatever_was_entered_last():
+    inner = plot("{plot: q, states: {a: {on: {go: b}}, b: }}")
+    regions = "{r1: {states: {x: {use: q, on: {again: x}}}}, r2: {states: {y: {use: q}}}}"
+    run = Run(plot(f"{{plot: p, states: {{o: {{regions: {regions}}}}}}}"), inner)
+    run.start()
+    run.send("again")
+    (micro,) = run.send("go").microsteps
+    assert (micro.exited, micro.entered) == (("y/a", "x/a"), ("x/b", "y/b"))
+    assert run.machine.state.configuration() == ("o", "x", "x/b", "y", "y/b")
+
+
+def test_what_a_configuration_asks_is_forgotten_when_it_is_too_much(monkeypatch):
+    monkeypatch.setattr("dsc.engine.choice.MOST_QUESTIONS", 2)
+    events = "".join(f"e{number}: {{to: b, when: (p)}}, " for number in range(5))
+    run = Run(plot(f"{{plot: p, states: {{a: {{on: {{{events}}}}}, b: }}}}"))
+    run.start()
+    configuration = run.machine.state.root.configuration
+    for number in range(5):
+        run.send(f"e{number}")
+        assert len(configuration.choices) <= 3
+        assert 0 <= configuration.questions <= 2

@@ -243,6 +243,22 @@ def test_a_period_does_not_pile_up_while_its_state_waits():
     assert run.active == ["b"]
 
 
+def test_one_state_may_be_left_while_another_still_waits():
+    run = started("""
+        plot: p
+        states:
+          o:
+            regions:
+              r1: {states: {a: {at_least: 1, on: {go: a2}}, a2: }}
+              r2: {states: {b: {at_least: 5, on: {go: b2}}, b2: }}
+    """)
+    run.send("at_least", to="a", exact=True, number=0)
+    run.send("go")
+    assert run.machine.state.configuration() == ("o", "a2", "b")
+    run.send("at_least", to="b", exact=True, number=0)
+    assert run.machine.state.configuration() == ("o", "a2", "b2")
+
+
 def test_a_run_stays_at_least_as_long():
     ran = Ran("{plot: p, states: {a: {at_least: 2, after: {seconds: 0.5, to: b}}, b: {final: true}}}")
     assert ran.end.finished
