@@ -18,7 +18,7 @@ from dsc.events import Event
 from dsc.sequencer.messages import ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.run_forms import Outcome, Shortener, frame_form
 from dsc.sequencer.run_present import RunState
-from dsc.sequencer.run_standing import RunSnapshot, latest_snapshot
+from dsc.sequencer.run_standing import RunSnapshot, SnapshotRow, latest_snapshot
 
 EVERY_KIND = st.one_of(libraries(depth=2), libraries(scxml=True, depth=2))
 
@@ -89,3 +89,34 @@ def test_another_kind_of_number_is_another_setting():
         present.reached(reactor)
         found.take(json.loads(present.change() or "{}"))
         assert repr(found.reactor["settings"][0]["value"]) == repr(value)
+
+
+def pending(present):
+    return {int(place): row for place, row in json.loads(present.change(whole=True))["pending"].items()}
+
+
+def test_of_events_that_are_sent_alike_one_is_awaited_no_longer_when_one_comes():
+    present = RunState(Shortener(lambda *_: None))
+    present.asked([LATER, LATER, LATER], 1, 0.0, NOBODY)
+    assert list(pending(present)) == [1, 2, 3]
+    present.taken(LATER)
+    assert list(pending(present)) == [2, 3]
+    present.asked([Revoke(LATER.event.frame, "x")], 2, 1.0, NOBODY)
+    assert pending(present) == {}
+
+
+def test_a_parameter_is_in_force_when_it_was_taken_and_forgotten_when_it_was_refused():
+    present = RunState(Shortener(lambda *_: None))
+    first, second = (SetParameter("robot", "speed", speed) for speed in (1, 2))
+    present.asked([first], 1, 0.0, NOBODY)
+    assert [SnapshotRow(*row).reports for row in pending(present).values()] == [0]
+    present.left([first])
+    assert [SnapshotRow(*row).reports for row in pending(present).values()] == [0]
+    present.left(())
+    assert [SnapshotRow(*row).reports for row in pending(present).values()] == [1]
+    present.asked([second], 2, 1.0, NOBODY)
+    present.left((), refused=[second])
+    assert list(pending(present)) == [1]
+    present.asked([second], 3, 2.0, NOBODY)
+    present.left(())
+    assert list(pending(present)) == [3]
