@@ -574,14 +574,14 @@ HOLD_THEN = """
 
 
 @pytest.mark.parametrize(("arm", "next_", "within", "log", "at"), [
-    (Tidy(), "close", 100, ["open at 3", "closes at 3"], 3),
-    (AllAtOnce(), "close", 100, ["closes at 2", "open at 3"], 3),
-    (Tidy(), "how", 100, ["asked", "open at 3"], 3),
-    (Tidy(5), "close", 3, ["open at 7"], 7),
+    (Tidy, "close", 100, ["open at 3", "closes at 3"], 3),
+    (AllAtOnce, "close", 100, ["closes at 2", "open at 3"], 3),
+    (Tidy, "how", 100, ["asked", "open at 3"], 3),
+    (lambda: Tidy(5), "close", 3, ["open at 7"], 7),
 ])  # fmt: skip
 def test_a_skill_waits_until_what_was_cancelled_there_has_put_things_in_order(arm, next_, within, log, at):
     text = HOLD_THEN.replace("NEXT", next_).replace("WITHIN", str(within))
-    ran = Ran(text.replace("OUTCOME", "answered" if next_ == "how" else "closed"), arm=arm)
+    ran = Ran(text.replace("OUTCOME", "answered" if next_ == "how" else "closed"), arm=arm())
     assert (ran.end.finished, ran.end.problem) == (True, None)
     assert ran.arm.log == log
     assert ran.at == pytest.approx(at)

@@ -357,6 +357,9 @@ def test_a_broken_plan_that_needs_no_single_condition_names_its_goal():
     assert plan.news == [Broken("(open hall) is false", "", 4, "eve", change.version)]
 
 
-def test_a_goal_about_a_number_that_is_not_known_is_not_reached():
-    plan = Watched([step("grow")], parse_condition("(> (weight p1) 3)"))
+def test_a_goal_that_cannot_be_computed_is_not_reached():
+    plan = Watched([step("grow")], parse_condition("(> (/ 1 (weight p1)) 3)"))
+    plan.change("bob", values={fact("weight", "p1"): 0.0})
+    plan.news.clear()
+    plan.begin(1)
     assert [type(one) for one in plan.news] == [Broken]
