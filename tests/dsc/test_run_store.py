@@ -21,7 +21,7 @@ from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.run_tables import archive, has_run, records_of
 from dsc.sequencer.sequencer import RunEnd
 from dsc.skills import skill
-from knowledge_base.errors import StoreError, UnknownNameError
+from knowledge_base.errors import Place, StoreError, UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
 
@@ -322,8 +322,9 @@ def test_a_run_that_has_ended_is_not_resumed(tmp_path):
 def test_a_store_holds_one_run_after_the_other_and_only_one_that_is_unfinished(tmp_path):
     crashes = Crashes(tmp_path, TWICE)
     _, done, folder = crashes.copies[2]
-    with pytest.raises(StoreError, match="unfinished run, which can be resumed"):
+    with pytest.raises(StoreError, match="unfinished run, which can be resumed") as refused:
         Run(folder, [TWICE])
+    assert refused.value.place == Place(str(folder / "run.kb"))
     Run(folder, [TWICE], done=done, resume=True)
     Run(folder, [TWICE])
     with archive(folder / "run.kb") as runs:
