@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 
@@ -77,10 +80,13 @@ def run_mutmut(mutants: Iterable[Mutant], jobs: int) -> None:
     log = Path("mutmut.log").absolute()
     with log.open("w") as file:
         shown = None if sys.stdout.isatty() else file
-        ended = subprocess.run(
-            [*command, *(mutant.name for mutant in mutants)], stdout=shown, stderr=shown, check=False
-        )
-    if ended.returncode:
-        raise SystemExit(
-            f"mutmut ended with {ended.returncode}; it wrote to {'the terminal' if shown is None else log}"
-        )
+        names = [mutant.name for mutant in mutants]
+        # In a group of its own: what a mutant has started may outlive its test.
+        with subprocess.Popen([*command, *names], stdout=shown, stderr=shown, process_group=0) as running:
+            try:
+                code = running.wait()
+            finally:
+                with suppress(ProcessLookupError):
+                    os.killpg(running.pid, signal.SIGKILL)
+    if code:
+        raise SystemExit(f"mutmut ended with {code}; it wrote to {'the terminal' if shown is None else log}")
