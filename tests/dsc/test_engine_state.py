@@ -164,7 +164,11 @@ def test_a_frame_goes_to_json_and_back():
 
 
 def test_a_plot_that_moves_on_has_not_ended_also_with_variables():
-    run = Run(plot("{plot: p, variables: {n: {type: number, initial: 0}}, states: {a: {on: {go: b}}, b: {on: {go: a, up: {to: b, assign: {n: 1}}}}}}"))
+    run = Run(
+        plot(
+            "{plot: p, variables: {n: {type: number, initial: 0}}, states: {a: {on: {go: b}}, b: {on: {go: a, up: {to: b, assign: {n: 1}}}}}}"
+        )
+    )
     run.start()
     for event in ("go", "up", "go", "go", "go"):
         run.send(event)
@@ -194,7 +198,7 @@ def test_content_is_looked_through_in_document_order_whatever_was_entered_last()
 
 
 def test_what_a_configuration_asks_is_forgotten_when_it_is_too_much(monkeypatch):
-    monkeypatch.setattr("dsc.engine.choice.MOST_QUESTIONS", 2)
+    monkeypatch.setattr("dsc.engine.reaction_choice.MOST_QUESTIONS", 2)
     events = "".join(f"e{number}: {{to: b, when: (p)}}, " for number in range(5))
     run = Run(plot(f"{{plot: p, states: {{a: {{on: {{{events}}}}}, b: }}}}"))
     run.start()

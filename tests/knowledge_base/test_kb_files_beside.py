@@ -4,7 +4,7 @@ import pytest
 
 from knowledge_base.errors import StoreError
 from knowledge_base.journal import file
-from knowledge_base.journal.neighbours import INDEX, LOG
+from knowledge_base.journal.sidecar_files import INDEX, LOG
 
 
 @pytest.fixture

@@ -250,7 +250,7 @@ def test_the_goal_reached_by_the_step_itself_is_heard_when_the_next_begins():
     plan.change("bob", gone="in p1 store, in p2 store", now="in p1 office, in p2 office")
     assert plan.news == []
     plan.begin(2)
-    assert plan.news == [Reached("the steps before")]
+    assert plan.news == [GoalReached("the steps before")]
 
 
 def test_a_goal_that_does_not_hold_any_more_is_not_reached_again():
@@ -259,7 +259,7 @@ def test_a_goal_that_does_not_hold_any_more_is_not_reached_again():
     plan.change("eve", gone="in p1 store, in p2 store", now="in p1 office, in p2 office")
     plan.news.clear()
     plan.change("eve", gone="in p1 office")
-    assert Reached("eve") not in plan.news
+    assert GoalReached("eve") not in plan.news
 
 
 def test_a_goal_about_a_thing_that_is_gone_is_not_reached():
@@ -294,7 +294,12 @@ def test_news_may_be_answered_with_a_change_before_the_next_is_told():
 
 
 def test_nobody_is_interrupted_for_a_shorter_plan_while_several_steps_are_at_work():
-    plan = Watched(TWO, parse_condition("(and (in p1 office) (in p2 office))"), SIDE_BY_SIDE, (fact("at", "eve", "hall"), fact("in", "p2", "hall")))
+    plan = Watched(
+        TWO,
+        parse_condition("(and (in p1 office) (in p2 office))"),
+        SIDE_BY_SIDE,
+        (fact("at", "eve", "hall"), fact("in", "p2", "hall")),
+    )
     plan.begin(1)
     plan.do(1)
     plan.begin(2)
@@ -320,7 +325,7 @@ def test_what_a_step_that_is_done_needed_is_not_watched_any_more(monkeypatch):
     plan.do(1)
     plan.begin(2)
     looked = []
-    monkeypatch.setattr(Course, "stands", lambda *args: looked.append(args))
+    monkeypatch.setattr(PlanProgress, "stands", lambda *args: looked.append(args))
     plan.change("eve", now="in p1 store")
     plan.change("eve", gone="in p1 store")
     assert looked == []

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from planning.execution.monitor import Broken, Reached, Shorter
+from planning.execution.monitor import Broken, GoalReached, Shorter
 from planning.execution.watched import StepEnded, Watched
 from planning.plan import PlanStep
 
@@ -13,7 +13,7 @@ SHORTER = Shorter((PlanStep("take", ("bob", "p1")), PlanStep("wait", ())))
 FORMS = [
     (BROKEN, {"broken": {"why": BROKEN.why, "needed": BROKEN.needed, "user": 2, "author": "eve", "version": 7}}),
     (SHORTER, {"shorter": [step.to_json() for step in SHORTER.steps]}),
-    (Reached("eve"), {"reached": "eve"}),
+    (GoalReached("eve"), {"reached": "eve"}),
     (StepEnded(), None),
 ]
 
