@@ -12,8 +12,8 @@ from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
 from dsc.model.plot import ActionPlot
 from dsc.primitive import primitive_plot
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.trace import Trace, write_to

@@ -20,8 +20,8 @@ from dsc.engine.machine import Machine
 from dsc.engine.steps import Start
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real
-from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from knowledge_base import KnowledgeBase, Schema

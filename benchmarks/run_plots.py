@@ -27,8 +27,8 @@ from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real
-from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from knowledge_base import KnowledgeBase

@@ -33,7 +33,7 @@ from dsc.chance import choose, uniform
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
 from dsc.events import Event
-from dsc.sequencer.run_tables import has_run
+from dsc.runs.archive import has_run
 from dsc.sequencer.sequencer import Sequencer
 from dsc.testing.crashes import Crashes
 from dsc.testing.faults import USUAL, Fault, Faults

@@ -20,9 +20,9 @@ from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
 from dsc.profiles import configure
+from dsc.runs.encoding import Kept
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
-from dsc.sequencer.run_forms import Kept
-from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.skills import signatures
 from dsc.text.plot_files import parse_plot

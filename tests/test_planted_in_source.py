@@ -21,8 +21,8 @@ from dsc.components.hosted import HostedActions
 from dsc.components.remote import Host, RemoteComponent
 from dsc.components.transport import LocalTransport
 from dsc.dynamic.library import Library
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.text.plot_files import parse_plot

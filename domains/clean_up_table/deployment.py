@@ -24,7 +24,7 @@ from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.profile import Profile
 from dsc.profiles import adapted, configure
-from dsc.sequencer.run_tables import archive, has_run, unfinished
+from dsc.runs.archive import archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.text.plot_files import load_library
 from dsc.trace import Listener, Record

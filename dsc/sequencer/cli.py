@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from dsc.sequencer.run_tables import RunArchive, RunRow, StepRow
+    from dsc.runs.archive import RunArchive, RunRow, StepRow
 
 app = typer.Typer(
     name="runs", rich_markup_mode=None, no_args_is_help=True, help="Look at runs that were kept with --store."
@@ -26,7 +26,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 @app.command("list")
 def list_(file: Store, as_json: AsJson = False) -> None:
     """Name the runs: what was run, how far it came, how it ended."""
-    from dsc.sequencer.run_tables import archive
+    from dsc.runs.archive import archive
 
     with archive(file) as runs:
         found = [_summary(runs, run) for run in runs.runs()]
@@ -40,7 +40,7 @@ def list_(file: Store, as_json: AsJson = False) -> None:
 @app.command()
 def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
     """Tell what happened in a run, one macrostep a line, and what is under way if it has not ended."""
-    from dsc.sequencer.run_tables import archive
+    from dsc.runs.archive import archive
 
     with archive(file) as runs:
         row = runs.run(run)
@@ -76,7 +76,7 @@ def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
 @app.command()
 def check(file: Store) -> None:
     """Look whether a store, runs and knowledge, has what was written into it and nothing else; it reads all of it."""
-    from dsc.sequencer.run_tables import archive
+    from dsc.runs.archive import archive
     from knowledge_base.journal.archive import Archive
 
     Archive(file.resolve(), None).require_all()

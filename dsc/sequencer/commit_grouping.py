@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from dsc.engine.steps import Output
+from dsc.messages import Message, SkillMessage
 from dsc.sequencer.inbox import Inbox
-from dsc.sequencer.messages import Message, SkillMessage
 from dsc.sequencer.reactor import Reactor
 
 MOST = 100

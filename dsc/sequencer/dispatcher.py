@@ -37,9 +37,9 @@ from dsc.engine.steps import (
     SwitchMode,
 )
 from dsc.events import SKILL_ERROR
+from dsc.messages import Message, SkillMessage, TimerMessage
 from dsc.sequencer.cancellation import PendingCleanups, TimeLimit
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.messages import Message, SkillMessage, TimerMessage
 from dsc.sequencer.outbox import CLOSING, Outbox, failure
 from dsc.sequencer.outcome_checks import Declared, broken, declared, encoded, late
 from dsc.sequencer.resumed_skills import InterruptedSkill, PastClock, asked_after

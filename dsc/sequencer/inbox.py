@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 
 from dsc.engine.steps import Start
+from dsc.messages import LateMessage, Message, SkillMessage
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.messages import LateMessage, Message, SkillMessage
 
 
 class Inbox:

@@ -9,11 +9,11 @@ from typing import Any
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.events import NO_ATTRIBUTES, RESERVED, Event
+from dsc.messages import KnowledgeMessage, ParameterMessage
 from dsc.model.plot import ActionPlot
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.messages import KnowledgeMessage, ParameterMessage
 from dsc.sequencer.outcome_checks import encoded
-from dsc.sequencer.run_store import RunStore
 from dsc.trace import Trace
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 
 from dsc.engine.steps import SendLater
+from dsc.messages import Message, SkillMessage, TimerMessage
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.messages import Message, SkillMessage, TimerMessage
 
 MOST = 10_000
 """Answers, timers and events of its own that a run may take at one moment; a few thousand for a long plan of skills

@@ -12,13 +12,12 @@ from dsc.components.component import Component
 from dsc.components.hooks import contained
 from dsc.components.life_cycle import Life
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
+from dsc.messages import Told
 from dsc.sequencer.outcome_checks import encoded
 from knowledge_base.errors import described
 
 CLOSING = GRACE
 """Seconds for components to take what they were last told, and for cancelled skills to stop."""
-Told = SetParameter | SwitchMode | SendMessage
-"""What is told."""
 _MOST_REFUSED = 1000
 """Of a run that is not kept nobody asks what was refused."""
 

@@ -15,9 +15,9 @@ from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Cancel, Output, SendLater, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.runs.encoding import Kept
 from dsc.sequencer.outcome_checks import Declared, broken, require_things
-from dsc.sequencer.run_forms import Kept
 from dsc.sequencer.step_tracing import StepTracer
 from dsc.trace import Trace
 from knowledge_base.errors import InputError, described

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Iterable
 
 from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
+from dsc.messages import LateMessage
+from dsc.runs.encoding import Kept, Pending
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import ScheduledInput
-from dsc.sequencer.messages import LateMessage
 from dsc.sequencer.resumed_skills import InterruptedSkill
-from dsc.sequencer.run_forms import Kept, Pending
 
 
 def require_components(kept: Kept, dispatcher: Dispatcher) -> None:

@@ -9,10 +9,10 @@ from pathlib import Path
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, Start
 from dsc.json_text import text_of
-from dsc.sequencer.design_changes import plots_of
+from dsc.runs.archive import RunArchive, RunRow, StepRow, archive
+from dsc.runs.design_changes import plots_of
+from dsc.runs.encoding import full, message_of
 from dsc.sequencer.reactor import Reactor
-from dsc.sequencer.run_forms import full, message_of
-from dsc.sequencer.run_tables import RunArchive, RunRow, StepRow, archive
 from dsc.trace import Trace
 from knowledge_base.exchange.json_forms import delta_form
 from knowledge_base.facts import Delta

@@ -12,16 +12,16 @@ from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
 from dsc.events import GAVE_UP, NO_PLAN, Event
+from dsc.messages import FromOutside, LateMessage, Message, SkillMessage
+from dsc.runs.encoding import Kept
+from dsc.runs.store import RunStore
 from dsc.sequencer import commit_grouping, input_checks
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import Inbox, ScheduledInput
 from dsc.sequencer.livelock import LivelockGuard
-from dsc.sequencer.messages import FromOutside, LateMessage, Message, SkillMessage
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import require_components, take_up
-from dsc.sequencer.run_forms import Kept
-from dsc.sequencer.run_store import RunStore
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta

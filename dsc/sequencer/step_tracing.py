@@ -21,7 +21,7 @@ from dsc.engine.steps import (
     SwitchMode,
 )
 from dsc.events import Event
-from dsc.sequencer.messages import ParameterMessage
+from dsc.messages import ParameterMessage
 from dsc.trace import Trace
 from knowledge_base.exchange.json_forms import delta_form, schema_form, world_form
 from knowledge_base.facts import Change

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from dsc.engine.steps import Revoke, SendLater, StartTimer
 from dsc.events import EVERY
+from dsc.messages import TimerMessage
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.messages import TimerMessage
 
 
 class Timers:

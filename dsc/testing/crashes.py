@@ -17,8 +17,8 @@ from typing import Any, Generic, TypeVar
 from dsc.calls import Outcome, SkillCall
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
-from dsc.sequencer.run_tables import archive
-from dsc.sequencer.run_writing import Boundary
+from dsc.runs.archive import archive
+from dsc.runs.writer import Boundary
 from dsc.sequencer.sequencer import Sequencer
 from knowledge_base.errors import StoreError
 

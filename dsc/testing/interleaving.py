@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dsc.chance import uniform
 from dsc.engine.steps import SendLater
 from dsc.events import Event
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.sequencer import Sequencer
 
 

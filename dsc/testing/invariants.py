@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from dsc.dynamic.library import Library
+from dsc.runs.archive import StepRow, archive
 from dsc.sequencer.replay import replay
-from dsc.sequencer.run_tables import StepRow, archive
 from dsc.trace import Record
 from knowledge_base.errors import DamagedStoreError, InputError
 from knowledge_base.facts import Fact

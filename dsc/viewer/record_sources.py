@@ -9,7 +9,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
-from dsc.sequencer.run_tables import archive, has_run
+from dsc.runs.archive import archive, has_run
 from dsc.trace import Record, header
 from dsc.viewer.records import RecordLog, read_trace
 from knowledge_base.errors import HistoryError, Place, StoreError

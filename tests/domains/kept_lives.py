@@ -7,7 +7,7 @@ from pathlib import Path
 
 from domains.clean_up_table.deployment import deploy, resumed
 from domains.clean_up_table.scenario import Scenario
-from dsc.sequencer.run_tables import archive, has_run
+from dsc.runs.archive import archive, has_run
 
 SCENARIO = "table: {cups: 2, cans: 1, crisp_cans: [small]}"
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from domains.clean_up_table.report import FAILURES
-from dsc.sequencer import run_writing
+from dsc.messages import SkillMessage
+from dsc.runs import writer
+from dsc.runs.store import RunStore
+from dsc.runs.writer import RunWriter
 from dsc.sequencer.dispatcher import Dispatcher
-from dsc.sequencer.messages import SkillMessage
-from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_writing import RunWriter
 from dsc.sequencer.sequencer import Sequencer
 
 
@@ -79,7 +79,7 @@ def _forgetting(take_up, later):
 def no_fence(monkeypatch):
     """Whoever writes a run goes on writing it, whoever has taken it over."""
     monkeypatch.setattr(RunWriter, "_require", lambda self, right: None)
-    monkeypatch.setattr(run_writing, "_STEP", run_writing._STEP.replace("FROM fence WHERE epoch = ?", "WHERE ? > 0"))
+    monkeypatch.setattr(writer, "_STEP", writer._STEP.replace("FROM fence WHERE epoch = ?", "WHERE ? > 0"))
 
 
 def failures_not_recorded(monkeypatch):

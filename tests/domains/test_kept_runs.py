@@ -18,8 +18,8 @@ from domains.clean_up_table.deployment import PROFILES, deploy, resumed
 from domains.clean_up_table.durable_world import KIND, DurableWorld
 from domains.clean_up_table.scenario import Scenario
 from dsc.dynamic.library import Library
+from dsc.runs.store import RunStore
 from dsc.sequencer.replay import replay
-from dsc.sequencer.run_store import RunStore
 from dsc.text.profile_files import find_profile
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.errors import InputError, StoreError

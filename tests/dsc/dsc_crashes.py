@@ -18,9 +18,10 @@ from dsc_runs import SCHEMA
 from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
+from dsc.runs.archive import archive
+from dsc.runs.store import RunStore
+from dsc.runs.tables import CHAIN
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_tables import CHAIN, archive
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.trace import Trace

@@ -27,9 +27,9 @@ from dsc_crashes import Robot, Run, copied
 from dsc_kept_charts import CHARTS
 from typer.testing import CliRunner
 
+from dsc.runs.archive import archive, has_run
 from dsc.sequencer.cli import app
 from dsc.sequencer.replay import replay
-from dsc.sequencer.run_tables import archive, has_run
 from dsc.viewer.record_sources import records_of
 from knowledge_base.errors import DamagedStoreError, InputError
 from knowledge_base.exchange.json_forms import schema_form, world_form

@@ -13,10 +13,10 @@ from stores_soak import Judge, originals
 from typer.testing import CliRunner
 
 from dsc.dynamic.library import Library
+from dsc.runs.archive import archive, records_of
+from dsc.runs.store import RunStore
 from dsc.sequencer.cli import app
 from dsc.sequencer.replay import replay
-from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_tables import archive, records_of
 from knowledge_base.errors import DamagedStoreError
 from knowledge_base.store import KnowledgeBase
 

@@ -15,9 +15,9 @@ from dsc.components.ports import event
 from dsc.components.remote import Host, RemoteComponent
 from dsc.components.transport import LocalTransport
 from dsc.dynamic.library import Library
+from dsc.runs.archive import archive
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_tables import archive
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.trace import Trace

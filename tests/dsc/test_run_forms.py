@@ -9,8 +9,8 @@ import pytest
 
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
-from dsc.sequencer.messages import KnowledgeMessage, LateMessage, ParameterMessage, SkillMessage, TimerMessage
-from dsc.sequencer.run_forms import Outcome, Shortener, awaited_form, awaited_of, full, message_form, message_of
+from dsc.messages import KnowledgeMessage, LateMessage, ParameterMessage, SkillMessage, TimerMessage
+from dsc.runs.encoding import Outcome, Shortener, awaited_form, awaited_of, full, message_form, message_of
 from knowledge_base.facts import Delta, fact
 
 PLOT = {"plot": "made", "states": {}}

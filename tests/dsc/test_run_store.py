@@ -15,10 +15,10 @@ from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.events import Event
-from dsc.sequencer import run_store
+from dsc.runs import store as store_module
+from dsc.runs.archive import archive, has_run, records_of
+from dsc.runs.store import RunStore
 from dsc.sequencer.replay import replay
-from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_tables import archive, has_run, records_of
 from dsc.sequencer.sequencer import RunEnd
 from dsc.skills import skill
 from knowledge_base.errors import Place, StoreError, UnknownNameError
@@ -382,13 +382,13 @@ def test_runs_in_tables_of_another_format_are_refused_with_that_reason(tmp_path)
     for look in (has_run, records_of):
         with pytest.raises(StoreError, match="the runs in this store have format 1"):
             look(path)
-    with KnowledgeBase.open(SCHEMA, path) as kb, pytest.raises(StoreError, match="goes on with format 4"):
+    with KnowledgeBase.open(SCHEMA, path) as kb, pytest.raises(StoreError, match="resumes format 4"):
         RunStore(kb, path)
     assert run_with(new(tmp_path), TWICE, Robot())[0].finished
 
 
 def test_a_restart_reads_no_more_macrosteps_than_since_all_was_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(run_store, "WHOLE_EVERY", 3)
+    monkeypatch.setattr(store_module, "WHOLE_EVERY", 3)
     chart = CHARTS["one skill after the other"]
     crashes = Crashes(tmp_path, chart)
     with archive(crashes.copies[-1][2] / "run.kb") as runs:

@@ -10,9 +10,9 @@ from dsc_charts import plot
 from dsc_runs import SCHEMA
 
 from dsc import Component, Library, Outcome, Sequencer, skill
+from dsc.runs.archive import has_run, is_unfinished
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.sequencer.run_store import RunStore
-from dsc.sequencer.run_tables import has_run, is_unfinished
 from dsc.testing import Crashes, comes_to_an_end, executed_once, one_history, replays, violations
 from dsc.trace import Trace
 from knowledge_base import Delta, KnowledgeBase, StoreError

@@ -28,11 +28,11 @@ from dsc.engine.machine_state import MachineState
 from dsc.errors import NotExpressibleError, RunawayError
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
+from dsc.runs.archive import archive
 from dsc.scxml.reader import parse_scxml
 from dsc.scxml.writer import to_scxml
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.replay import replay
-from dsc.sequencer.run_tables import archive
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.text.plot_files import load_plot, parse_plot, plot_to_yaml

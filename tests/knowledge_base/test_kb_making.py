@@ -8,7 +8,7 @@ from itertools import count
 
 import pytest
 
-from dsc.sequencer.run_tables import has_run
+from dsc.runs.archive import has_run
 from knowledge_base import Delta, KnowledgeBase, Schema, fact
 from knowledge_base.errors import StoreError
 from knowledge_base.journal import atomic_files, journal, lock

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from hostile_files import LINKS_TO_TEXT, STRANGERS, picture
 
-from dsc.sequencer.run_tables import has_run
-from dsc.sequencer.run_tables import records_of as run_records
+from dsc.runs.archive import has_run
+from dsc.runs.archive import records_of as run_records
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
 from knowledge_base.cli.changes import new
 from knowledge_base.journal.lock import WriterLock

@@ -16,9 +16,9 @@ from hostile_files import picture
 from typer.testing import CliRunner
 
 from dsc import Event, Library, Sequencer, parse_plot
+from dsc.runs.store import RunStore
 from dsc.sequencer.cli import app as runs
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.run_store import RunStore
 from dsc.viewer.record_sources import records_of
 from knowledge_base import Delta, KnowledgeBase, Schema, StoreError, fact
 from knowledge_base.cli import app as kb

@@ -10,9 +10,9 @@ import pytest
 
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from dsc.errors import ChangedError
+from dsc.runs.archive import archive
 from dsc.sequencer.clock import run_real, run_simulated
 from dsc.sequencer.replay import replay
-from dsc.sequencer.run_tables import archive
 from knowledge_base import Delta, InputError, KnowledgeBase, fact
 from knowledge_base.errors import StoreError
 from planning import Executive, PlannerProcess, PlanningDomain

@@ -11,7 +11,7 @@ from errands import DOMAIN, HOLDER, ROOMS, ROUND
 from obedient_robot import FAILED, plots
 
 from dsc import Component, Outcome, SkillCall, parse_plot, skill
-from dsc.sequencer.run_tables import archive
+from dsc.runs.archive import archive
 from knowledge_base import Delta, fact
 from planning import Executive, PlanStep
 from planning.validation import Validation

@@ -9,8 +9,8 @@ import pytest
 from dsc import parse_plot
 from dsc.dynamic.library import Library
 from dsc.events import Event
+from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.sequencer.run_store import RunStore
 from dsc.sequencer.sequencer import Sequencer
 from dsc.trace import Trace
 from dsc.viewer.record_sources import records_of

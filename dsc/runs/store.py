@@ -10,20 +10,18 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output
 from dsc.json_text import text_of
-from dsc.sequencer.design_changes import require_unchanged
-from dsc.sequencer.messages import LateMessage, Message
-from dsc.sequencer.outbox import Told
-from dsc.sequencer.reactor import Reactor
-from dsc.sequencer.run_forms import Kept, Shortener, message_form
-from dsc.sequencer.run_present import RunState, read
-from dsc.sequencer.run_tables import RunArchive, archive, unfinished
-from dsc.sequencer.run_writing import RunWriter
+from dsc.messages import LateMessage, Message, Told
+from dsc.runs.archive import RunArchive, archive, unfinished
+from dsc.runs.design_changes import require_unchanged
+from dsc.runs.encoding import Kept, Shortener, message_form
+from dsc.runs.state import ReactorState, RunState, read
+from dsc.runs.writer import RunWriter
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
 
 WHOLE_EVERY = 256
-"""After so many macrosteps one writes all that a restart needs: a restart reads at most as many."""
+"""Macrosteps from one that writes the whole state to the next: a restart reads at most as many."""
 
 
 class RunStore:
@@ -32,14 +30,13 @@ class RunStore:
     Args:
         knowledge: the knowledge base of the run, opened at `path`.
         path: its file.
-        header: what the run's program wants to find again, plain data.
-        domain: what the plots rely on that is no plot, as text by what it is called ("planning action 'go'").
+        header: plain data of the run's program.
+        domain: other things that plots rely on, as text by name ("planning action 'go'").
 
     Attributes:
-        writing: one transaction, `with store.writing`: what is committed to the knowledge inside, and what is written
-            with the methods below.
+        writing: one transaction, `with store.writing`, for the knowledge and for the methods below.
         hear: takes a record of the trace, to be kept with the next macrostep.
-        last_late: the highest number of a `LateMessage` that is still to come.
+        last_late: the highest number of a pending `LateMessage`.
 
     Raises:
         StoreError: the file cannot be written.
@@ -62,7 +59,7 @@ class RunStore:
         self._records: list[Record] = []
         self.hear: Callable[[Record], None] = self._records.append
         self._short = Shortener(self._put_form)
-        self._present = RunState(self._short)
+        self._state = RunState(self._short)
 
     @property
     def begun(self) -> bool:
@@ -71,11 +68,11 @@ class RunStore:
 
     @property
     def lost(self) -> bool:
-        """Whether something could not be kept: what is in memory is ahead of the file."""
+        """Whether a write failed: memory is ahead of the file."""
         return self.writing.lost
 
     def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> int:
-        """Make a new run; the knowledge is what is known at its start.
+        """Begin a new run with the present knowledge.
 
         Returns:
             The last serial number that earlier runs have given out.
@@ -87,7 +84,7 @@ class RunStore:
         (open_runs,) = self.writing.connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
         if open_runs:
             raise StoreError("the store has an unfinished run, which can be resumed", place=Place(str(self.path)))
-        self._number, self._present = 0, RunState(self._short)
+        self._number, self._state = 0, RunState(self._short)
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
         row = (
             plot, text_of(self._short(arguments)), self._knowledge.version, text_of(self._header), text_of(plots),
@@ -99,42 +96,42 @@ class RunStore:
         return serials
 
     def late(self, late: LateMessage, due: float) -> None:
-        """Something was handed in that comes later, at second `due` of run time."""
-        self._present.put(late, self._number, due)
+        """Keep a message from outside that comes at second `due` of run time."""
+        self._state.put(late, self._number, due)
         if self._number:  # else it goes with the first macrostep
-            self.writing.more(change=self._present.change())
+            self.writing.more(change=self._state.change())
 
     def step(
         self,
         now: float,
         message: Message | None,
         output: Iterable[Output],
-        reactor: Reactor,
+        reactor: ReactorState,
         under_way: Collection[Told] = (),
         refused: Collection[Told] = (),
         memories: Iterable[tuple[str, Any]] = (),
     ) -> None:
-        """A macrostep; `message` is `None` for the first, in which the plot was started, and for leaving it.
+        """Keep a macrostep; `message` is `None` for the start of the plot and for leaving it.
 
         Args:
             now: second of run time.
-            message: what was taken.
-            output: what is to be carried out after the commit.
-            reactor: after it.
-            under_way: what components were told before and have not taken yet.
-            refused: what they were told before and did not take.
-            memories: what components have to remember, by name.
+            message: the message that it took.
+            output: its actions, for after the commit.
+            reactor: its state after the macrostep.
+            under_way: earlier commands that components have not taken yet.
+            refused: earlier commands that components did not take.
+            memories: of components, by name.
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
         state, version = reactor.machine.state, self._knowledge.version
-        self._present.left(under_way, refused)
+        self._state.dispatched(under_way, refused)
         if message is not None:
-            self._present.taken(message)
-        self._present.asked(output, self._number, now, reactor)
-        self._present.reached(reactor)
-        self._present.remember(memories)
-        change = self._present.change(whole=self._number % WHOLE_EVERY == 1)
+            self._state.take(message)
+        self._state.ask(output, self._number, now, reactor)
+        self._state.update(reactor)
+        self._state.remember(memories)
+        change = self._state.change(whole=self._number % WHOLE_EVERY == 1)
         self.writing.step(
             self._run, self._number, float(now), self.writing.before, version, state.serials, text_of(form),
             _paths_text(state.configuration()), change, self._new_records(),
@@ -142,11 +139,11 @@ class RunStore:
         self.writing.before = version  # the next macrostep may be part of the same transaction
 
     def end(self, *, finished: bool, problem: str | None) -> None:
-        """The run is over."""
+        """Keep the end of the run."""
         self.writing.end(self._run, text_of({"finished": finished, "problem": problem}), self._new_records())
 
     def take_up(self, library: Library) -> Kept:
-        """The unfinished run as it is now, to be gone on with; to be called outside `writing`.
+        """Load the unfinished run, to be resumed; call it outside `writing`.
 
         Raises:
             StoreError: there is none, or it cannot be read.
@@ -158,13 +155,13 @@ class RunStore:
             kept = read(runs, run, library)
         self.writing.begun = True
         self._run, self._number = run.number, kept.number
-        self._present.restored(kept)
+        self._state.restore(kept)
         late = [one.what.number for one in kept.pending if isinstance(one.what, LateMessage)]
         self.last_late = max(late, default=0)
         return kept
 
     def _new_records(self) -> str:
-        """What was heard since the last time, one record a line."""
+        """The records since the last call, one a line."""
         lines = [record.to_line() for record in self._records]
         self._records.clear()
         return "\n".join(lines) + "\n" if lines else ""
@@ -175,5 +172,5 @@ class RunStore:
 
 @lru_cache(maxsize=256)
 def _paths_text(configuration: tuple[str, ...]) -> str:
-    """Most runs come back to the same few configurations."""
+    """Cached: most runs come back to the same few configurations."""
     return text_of(configuration)

@@ -1,14 +1,15 @@
-"""What a run needs to go on, of which each macrostep writes what it has changed."""
+"""`RunState` holds every value that a restart needs; each macrostep writes its change of them."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Protocol
 
 from dsc.components.life_cycle import Life
 from dsc.dynamic.library import Library
+from dsc.engine.machine import Machine
 from dsc.engine.machine_state import FrameState, MachineState
 from dsc.engine.steps import (
     Cancel,
@@ -23,10 +24,9 @@ from dsc.engine.steps import (
 )
 from dsc.events import Event
 from dsc.json_text import text_of
-from dsc.sequencer.messages import LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
-from dsc.sequencer.outbox import Told
-from dsc.sequencer.reactor import Reactor
-from dsc.sequencer.run_forms import (
+from dsc.messages import LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage, Told
+from dsc.runs.archive import RunArchive, RunRow
+from dsc.runs.encoding import (
     Awaited,
     Form,
     Kept,
@@ -39,34 +39,57 @@ from dsc.sequencer.run_forms import (
     frame_form,
     frame_news,
 )
-from dsc.sequencer.run_standing import SnapshotRow
-from dsc.sequencer.run_tables import RunArchive, RunRow
+from dsc.runs.snapshot import SnapshotRow
 
 _Key = tuple[str, str]
 """Kind and name of something pending."""
 
 
+class ReactorState(Protocol):
+    """The part of a reactor that a restart needs.
+
+    Attributes:
+        machine: the chart's state.
+        emitted: outcome events of the plot so far.
+        in_vain: periods without any effect since the last other message.
+        problem: the reason for which the run cannot continue, if any.
+        settings: parameters of plots that an operator has set, by plot and parameter.
+        caused_by: numbers of the trace records about started skills, by action id.
+    """
+
+    machine: Machine
+    emitted: list[Event]
+    in_vain: set[tuple[int, int]]
+    problem: str | None
+    settings: dict[tuple[str, str], ParameterMessage]
+    caused_by: dict[str, int]
+
+
 class RunState:
-    """Frames, what is awaited, and what is in force; `short` puts the plots in it away."""
+    """Frames, pending actions and timers, and parameters and modes in effect.
+
+    Args:
+        short: stores each plot once, and puts its hash in its place.
+    """
 
     def __init__(self, short: Shortener) -> None:
         self._short = short
         self._frames: dict[int, FrameState] = {}
         self._root: FrameState | None = None
         self._remembered: tuple[Any, ...] = ()  # by the reactor
-        self._rows: dict[int, SnapshotRow] = {}  # what is pending, by place; the earliest first
+        self._rows: dict[int, SnapshotRow] = {}  # pending items by place; the earliest first
         self._places: dict[_Key, list[int]] = {}  # the earliest first
         self._activations: dict[int, set[_Key]] = {}
-        self._cancelled: list[int] = []  # places of what the last macrostep cancelled
+        self._cancelled: list[int] = []  # places of items that the last macrostep cancelled
         self._in_force: dict[_Key, int] = {}  # places of parameters and modes
-        self._outbox: dict[int, Told] = {}  # by place: of this it is not known whether it has been taken
+        self._outbox: dict[int, Told] = {}  # by place: commands that a component may not have taken
         self._last_place = 0
         self._memories: dict[str, str] = {}
         self._reactor: Form = {}
         self._news: Form = {}
 
-    def restored(self, kept: Kept) -> None:
-        """This is what is kept."""
+    def restore(self, kept: Kept) -> None:
+        """Take over the state of a kept run."""
         self._root = kept.state.root
         self._frames = _by_serial(self._root)
         self.remember(kept.memory.items())
@@ -81,11 +104,11 @@ class RunState:
             if one.cancelled:
                 self._cancelled += self._places.pop(_key(one.what))
 
-    def reached(self, reactor: Reactor) -> None:
-        """The machine's frames are these now, and this is what else the reactor remembers."""
+    def update(self, reactor: ReactorState) -> None:
+        """Note the machine's frames and the other state of the reactor after a macrostep."""
         state = reactor.machine.state
         if state.root is not self._root:
-            self._reached(state.root)
+            self._reach_frames(state.root)
         serial = None if state.root is None else state.root.serial
         # Most events change none of this; of outcome events there are only ever more.
         settings = reactor.settings.values()
@@ -98,14 +121,14 @@ class RunState:
             self._reactor = self._news["reactor"] = _reactor_form(reactor, self._short)
 
     def remember(self, memories: Iterable[tuple[str, Any]]) -> None:
-        """What components have to remember, by name; kept as text, since a component may go on with the very object."""
+        """Note the memories of components by name; as text, since a component may change the object later."""
         for component, memory in memories:
             text = text_of(memory)
             if self._memories.get(component) != text:
                 self._memories[component] = self._news.setdefault("memory", {})[component] = text
 
     def change(self, *, whole: bool = False) -> str:
-        """A line with what is different since the last time, or with all there is; empty if nothing is."""
+        """The change since the last call as a line of JSON, or with `whole` the whole state; empty without a change."""
         news, self._news = self._news, {}
         if whole:
             frames = {serial: frame_news(None, frame, self._short) for serial, frame in self._frames.items()}
@@ -113,10 +136,10 @@ class RunState:
             news["memory"] = self._memories
         return f"{text_of(news)}\n" if news else ""
 
-    def taken(self, message: Message) -> None:
-        """What came is awaited no longer."""
+    def take(self, message: Message) -> None:
+        """Drop the pending item that the message ends, or count a report of it."""
         match message:
-            case Event():  # which nobody waits for in particular
+            case Event():  # no pending item waits for it
                 pass
             case SkillMessage(start=start, final=False, conflated=conflated):
                 for place in self._places.get(_key(start), ()):
@@ -129,8 +152,8 @@ class RunState:
             case LateMessage() | SendLater():
                 self._forget(_key(message), 1)
 
-    def left(self, under_way: Collection[Told], refused: Collection[Told] = ()) -> None:
-        """What the macrostep before asked for has left; all that was told was taken, but for what is said here."""
+    def dispatched(self, under_way: Collection[Told], refused: Collection[Told] = ()) -> None:
+        """Note that earlier commands have left; components took all but `under_way` and `refused`."""
         for place in self._cancelled:
             self._drop_row(place)
         self._cancelled.clear()
@@ -146,8 +169,8 @@ class RunState:
                 else:
                     self._put_in_force(_key(told), place)
 
-    def asked(self, output: Iterable[Output], step: int, now: float, reactor: Reactor) -> None:
-        """What is awaited from now on, or no longer, and what is in force."""
+    def ask(self, output: Iterable[Output], step: int, now: float, reactor: ReactorState) -> None:
+        """Note the actions, timers and commands that a macrostep starts or cancels."""
         for one in output:
             match one:
                 case Start():
@@ -165,12 +188,12 @@ class RunState:
                         self._forget(key)
 
     def put(self, what: Awaited, step: int, at: float, cause: int = 0) -> None:
-        """One thing that is awaited, or in force."""
+        """Add a pending item."""
         place = self._last_place + 1
         self._note(what, place)
         self._put_row(place, SnapshotRow(type(what).__name__, step, at, awaited_form(what, self._short), 0, cause))
 
-    def _reached(self, root: FrameState | None) -> None:
+    def _reach_frames(self, root: FrameState | None) -> None:
         before, now = self._frames, _by_serial(root)
         self._root, self._frames = root, now
         news: dict[int, Form | None] = {}
@@ -201,7 +224,7 @@ class RunState:
             self._activations.setdefault(what.activation, set()).add(key)
 
     def _cancel(self, key: _Key) -> None:
-        """A timer is gone; an action that has not ended may have to be cancelled once more after a restart."""
+        """Drop a timer; keep a cancelled action, since a restart may have to cancel it again."""
         if key[0] != Start.__name__:
             self._forget(key)
             return
@@ -210,17 +233,17 @@ class RunState:
             self._cancelled.append(place)
 
     def _put_in_force(self, key: _Key, place: int) -> None:
-        """It was taken, in order: what was in force before is so no longer."""
+        """A component took the command: it replaces the one in effect before."""
         before = self._in_force.get(key)
         self._in_force[key] = place
-        if before == place:  # told again after a restart
+        if before == place:  # sent again after a restart
             return
         if before is not None:
             self._drop_row(before)
         self._put_row(place, self._rows[place]._replace(reports=1))
 
     def _forget(self, key: _Key, most: int | None = None) -> None:
-        """What is pending under that key is so no longer, or only the earliest so many."""
+        """Drop the pending items of that key, or only the earliest `most`."""
         places = self._places.pop(key, [])
         if most is not None and places[most:]:
             self._places[key] = places[most:]
@@ -229,11 +252,11 @@ class RunState:
 
 
 def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
-    """The unfinished run as it is kept.
+    """The unfinished run after its last kept macrostep.
 
     Raises:
         UnknownNameError: the library lacks one of the plots, or a plot one of the states.
-        DamagedStoreError: the run is not what was written.
+        DamagedStoreError: the run differs from the written one.
     """
     find = runs.form
     steps = list(runs.steps(run.number))
@@ -267,7 +290,7 @@ def _by_serial(root: FrameState | None) -> dict[int, FrameState]:
     return {} if root is None else {frame.serial: frame for frame in root.frames()}
 
 
-def _reactor_form(reactor: Reactor, short: Shortener) -> Form:
+def _reactor_form(reactor: ReactorState, short: Shortener) -> Form:
     state = reactor.machine.state
     return {
         "root": state.root.serial if state.root else None,
@@ -280,7 +303,7 @@ def _reactor_form(reactor: Reactor, short: Shortener) -> Form:
 
 
 def _key(what: Awaited) -> _Key:
-    """By which it is found again; only what the chart sends later, again and again, may have the key of another."""
+    """Kind and name of a pending item; only repeated `SendLater` of a chart share a key."""
     match what:
         case Start():
             name = what.action_id
@@ -292,8 +315,8 @@ def _key(what: Awaited) -> _Key:
             name = str(what.number)
         case SetParameter():
             name = f"{what.component} {what.parameter}"
-        case SwitchMode():  # whether it lives and what it does then are in force side by side
+        case SwitchMode():  # life and mode are in effect together
             name = f"{what.component} {'life' if what.mode in (Life.INIT, Life.SHUTDOWN) else 'mode'}"
-        case SendMessage():  # each one for itself
+        case SendMessage():  # each item by itself
             name = f"{what.component} {what.port}"
     return type(what).__name__, name

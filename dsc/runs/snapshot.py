@@ -1,8 +1,7 @@
-"""What stands after a macrostep, put together from what each one has changed.
+"""Snapshot of a run's state after a macrostep, put together from the changes of macrosteps.
 
-A macrostep writes only what is different since the one before, as a line of JSON in its own row: one row of one table
-is all that a commit has to write. Now and then one writes all there is (`whole`), so that nobody has to go back to the
-beginning.
+A macrostep writes only its change, as a line of JSON in its own row. So a commit writes one row of one table.
+Periodically a macrostep writes the whole state (`whole`), which bounds the rows that a reader needs.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ Form = dict[str, Any]
 
 
 class SnapshotRow(NamedTuple):
-    """Something that is awaited or in force, as plain data: what `run_forms.Pending` says of it."""
+    """A pending item as plain data, see `encoding.Pending`."""
 
     kind: str
     step: int
@@ -29,13 +28,13 @@ class SnapshotRow(NamedTuple):
 
 @dataclass(slots=True)
 class RunSnapshot:
-    """The present of a run, as plain data.
+    """State of a run, as plain data.
 
     Attributes:
-        reactor: what it remembers besides the machine's frames.
-        frames: running plots by serial number, as `run_forms.frame_news` gives them.
-        pending: what is awaited or in force by its number, as `SnapshotRow`.
-        memory: what components have to remember, as text by name.
+        reactor: its state besides the machine's frames.
+        frames: running plots by serial number, as `encoding.frame_news` gives them.
+        pending: pending items by number, as `SnapshotRow`.
+        memory: of components, as text by name.
     """
 
     reactor: Form = field(default_factory=dict)
@@ -43,8 +42,8 @@ class RunSnapshot:
     pending: dict[int, list[Any]] = field(default_factory=dict)
     memory: dict[str, str] = field(default_factory=dict)
 
-    def take(self, change: Form) -> None:
-        """Be as after that change: new values, `None` for what is gone."""
+    def apply(self, change: Form) -> None:
+        """Apply a change: new values, `None` for those that are gone."""
         if "reactor" in change:
             self.reactor = change["reactor"]
         for serial, news in change.get("frames", {}).items():
@@ -61,7 +60,7 @@ class RunSnapshot:
 
 
 def latest_snapshot(latest_first: Iterable[str]) -> RunSnapshot:
-    """What stands after the first of these macrosteps, each of them lines of changes; no more are read than needed."""
+    """The snapshot after the first of these macrosteps, each lines of changes; reads no more than needed."""
     needed: list[Form] = []
     for text in latest_first:
         changes = [json.loads(line) for line in text.split("\n") if line]
@@ -70,5 +69,5 @@ def latest_snapshot(latest_first: Iterable[str]) -> RunSnapshot:
             break
     found = RunSnapshot()
     for change in reversed(needed):
-        found.take(change)
+        found.apply(change)
     return found

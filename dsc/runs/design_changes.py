@@ -1,4 +1,4 @@
-"""Whether a run meets the plots and the domain with which it was begun; if not, what is different."""
+"""Comparison of plots and domain with those that a kept run began with."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.model.plot import ActionPlot
-from dsc.sequencer.run_tables import RunArchive, RunRow
+from dsc.runs.archive import RunArchive, RunRow
 from knowledge_base.errors import Place
 
 
 def require_unchanged(runs: RunArchive, run: RunRow, library: Library, domain: Mapping[str, str]) -> None:
-    """Raise `ChangedError` if any plot, or anything else that they rely on, is not as it was."""
+    """Raise `ChangedError` if a plot, or another thing that plots rely on, has changed since the run began."""
     found = [*_changed_plots(runs, run, library), *_changed_statements(run.domain, domain)]
     if found:
         raise ChangedError(found, place=Place(str(runs.path)))
@@ -24,7 +24,7 @@ def plots_of(runs: RunArchive, run: RunRow) -> Library:
 
 
 def _changed_plots(runs: RunArchive, run: RunRow, library: Library) -> Iterator[str]:
-    from dsc.text.plot_difference import differences  # noqa: PLC0415  draws as well, which a run that is resumed need not pay for
+    from dsc.text.plot_difference import differences  # noqa: PLC0415  loads the drawing, too; only a changed plot needs it
 
     before = plots_of(runs, run)
     for plot in before:

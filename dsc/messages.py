@@ -1,11 +1,11 @@
-"""What reaches the sequencer, in the order in which it comes."""
+"""Messages to the sequencer, and commands to components without an answer."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from dsc.calls import Outcome
-from dsc.engine.steps import SendLater, Start, StartTimer
+from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
 from knowledge_base.facts import Delta, Value
 
@@ -16,10 +16,10 @@ class SkillMessage:
 
     Attributes:
         start: of the skill.
-        outcome: what it said.
+        outcome: event, attributes and observed facts.
         final: whether the skill has ended with it.
-        goes_on: whether it has not, and only counts as ended: it has to be stopped.
-        conflated: how many older reports of the same event it stands for, see `dsc.components.reports`.
+        goes_on: whether the skill only counts as ended, and is to be cancelled.
+        conflated: number of older reports of the same event that it replaces, see `dsc.components.reports`.
     """
 
     start: Start
@@ -38,7 +38,7 @@ class TimerMessage:
 
 @dataclass(frozen=True, slots=True)
 class KnowledgeMessage:
-    """Somebody who is no skill of this run changes the knowledge."""
+    """An author outside of this run changes the knowledge."""
 
     delta: Delta
     author: str
@@ -46,12 +46,12 @@ class KnowledgeMessage:
 
 @dataclass(frozen=True, slots=True)
 class ParameterMessage:
-    """An operator says what a parameter is worth from now on.
+    """An operator sets a parameter.
 
     Attributes:
-        owner: the component, or the plot, that has it.
-        name, value: of the parameter; `None` takes back what was said of a component's.
-        of_plot: whether it is a plot's.
+        owner: the component or plot of the parameter.
+        name, value: of the parameter; `None` takes back the value set before, of a component's.
+        of_plot: whether the owner is a plot.
     """
 
     owner: str
@@ -62,13 +62,15 @@ class ParameterMessage:
 
 @dataclass(frozen=True, slots=True)
 class LateMessage:
-    """Something that was handed in from outside to come later, and now is there; `number` tells it from others."""
+    """A message from outside with a later time, which has come; `number` tells it from others."""
 
     message: FromOutside
     number: int
 
 
 FromOutside = Event | KnowledgeMessage | ParameterMessage
-"""What somebody hands in who is no part of the run."""
+"""Messages from outside of the run."""
 Message = SkillMessage | TimerMessage | KnowledgeMessage | ParameterMessage | LateMessage | SendLater | Event
 """A `SendLater` is the chart's own event whose time has come."""
+Told = SetParameter | SwitchMode | SendMessage
+"""Commands to components without an answer: parameters, modes and messages."""

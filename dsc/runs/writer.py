@@ -1,4 +1,4 @@
-"""The transactions of a kept run: who may write them, and who is told of their boundaries."""
+"""Transactions of a kept run, with a fence against a second writer, and listeners at their boundaries."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-from dsc.sequencer.run_tables import CHAIN, FORMAT, TABLES, require_tables_of_runs
+from dsc.runs.tables import CHAIN, FORMAT, TABLES, require_tables_of_runs
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.integrity import NOTHING, Tip, link, put_ends
 from knowledge_base.store import KnowledgeBase
@@ -25,24 +25,24 @@ _BEGIN = """INSERT INTO runs (run, plot, arguments, version, header, plots, doma
     VALUES (?, ?, ?, ?, ?, ?, ?, ?)"""
 _END = "UPDATE runs SET ended = ?, steps = ?, seal = ? WHERE run = ?"
 Boundary = Literal["before commit", "after commit"]
-"""Where a process that dies makes a difference: either nothing of the macrostep was, or nothing has left yet."""
+"""Points at which a crash makes a difference: nothing of the macrostep is kept, or none of its actions has left."""
 
 
 class RunWriter:
-    """A context manager for one transaction after the other; whoever makes one takes all earlier ones' right away.
+    """A context manager for one transaction after the other; a new writer takes the right of all earlier ones away.
 
     Args:
         knowledge: the knowledge base of the run, opened at `path`.
         path: its file.
 
     Attributes:
-        connection: to write with, inside; who writes no macrostep looks first whether it is still his right.
+        connection: to write with, inside; call `require_right` before other writes than a macrostep.
         before: version of the knowledge when the transaction began.
-        begun: whether anything was written.
-        lost: whether something could not be written: what is in memory is ahead of the file.
+        begun: whether a transaction was committed.
+        lost: whether a write failed: memory is ahead of the file.
 
     Raises:
-        StoreError: on entering or leaving, it cannot be written.
+        StoreError: on entering or leaving, the file cannot be written.
     """
 
     def __init__(self, knowledge: KnowledgeBase, path: Path) -> None:
@@ -66,7 +66,7 @@ class RunWriter:
             self.connection.execute("INSERT INTO fence VALUES (?, ?)", (self._epoch, FORMAT))
 
     def listen(self, listener: Callable[[Boundary], None]) -> None:
-        """Tell `listener` from now on when something is about to be committed, and when it has been."""
+        """Call `listener` before and after each commit from now on."""
         self._listeners.append(listener)
 
     def __enter__(self) -> None:
@@ -97,7 +97,7 @@ class RunWriter:
             raise self._taken_over()
 
     def begin(self, *row: Any) -> int:
-        """The row of a run without its number, which is returned; errors as for `require_right`."""
+        """Write the row of a run without its number, and return that; errors as for `require_right`."""
         self.require_right()
         last, seal = self.connection.execute(_SEAL).fetchone() or (0, NOTHING)
         self._digest = link(seal, last + 1, *row)
@@ -106,7 +106,7 @@ class RunWriter:
         return int(last) + 1
 
     def step(self, *row: Any) -> None:
-        """The row of a macrostep without its place; errors as for `require_right`, which it makes needless."""
+        """Write the row of a macrostep without its place; errors as for `require_right`, which it includes."""
         knowledge = self._knowledge.digest
         before = (self._digest or self._continued()) + knowledge
         digest = link(before, *row)
@@ -126,7 +126,7 @@ class RunWriter:
         self._last = before, row
 
     def end(self, run: int, ended: str, records: str) -> None:
-        """The end of a run, with the last records; errors as for `require_right`."""
+        """Write the end of a run, with the last records; errors as for `require_right`."""
         self.more(records=records)
         (steps,) = self.connection.execute("SELECT max(place) FROM steps").fetchone()
         seal = link(self._digest, steps, ended)
@@ -134,7 +134,7 @@ class RunWriter:
         put_ends(self.connection, [(CHAIN, Tip(steps, seal))])
 
     def _continued(self) -> bytes:
-        """The digest of the last macrostep that an earlier program has written, which is the last one now."""
+        """The digest of the last macrostep, which an earlier process has written."""
         *row, knowledge, place = self.connection.execute(_LAST).fetchone()
         (before,) = self.connection.execute(_BEFORE, (place - 1, row[0], row[0])).fetchone()
         self._last = before + knowledge, tuple(row)

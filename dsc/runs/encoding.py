@@ -1,7 +1,7 @@
-"""What a run store keeps, as plain JSON values and back: messages, what is awaited, and a machine's frames.
+"""Messages, pending items and frames of a machine as plain JSON values, and back.
 
-A plot that is a value (a plan, in a variable or an attribute) is long and comes again and again: it is kept once, by
-its hash, and stands as `{"$form": hash}` where it was.
+A plot that is a value (a plan, in a variable or an attribute) is long and recurs. It is kept once, by
+its hash, with `{"$form": hash}` in its place.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dsc.calls import Outcome
 from dsc.engine.machine_state import NOTHING, FrameState, MachineState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import NO_ATTRIBUTES, Event
-from dsc.sequencer.messages import (
+from dsc.messages import (
     FromOutside,
     KnowledgeMessage,
     LateMessage,
@@ -25,14 +25,14 @@ from dsc.sequencer.messages import (
     SkillMessage,
     TimerMessage,
 )
-from dsc.sequencer.run_tables import RunRow
+from dsc.runs.archive import RunRow
 from dsc.trace import Record
 from knowledge_base.exchange.json_forms import delta_form, delta_of
 
 Form = dict[str, Any]
 Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage
-"""What a run cannot do without after a restart. A parameter or mode that was set is in force until it is set anew; a
-message is awaited until the component has taken it."""
+"""Pending items: a restart needs them. A parameter or mode is in effect until it is set again; a message is pending
+until the component has taken it."""
 
 _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
@@ -42,16 +42,16 @@ _EVERYBODY = [Event._field_defaults[name] for name in _VISIBILITY]
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """Something that is still awaited, or in force.
+    """A pending item: an action, timer or message without its end yet, or a parameter or mode in effect.
 
     Attributes:
         place: of the row.
-        what: the output of the machine that asked for it, or what was handed in to come later.
+        what: the output of the machine that asked for it, or a message from outside with a later time.
         step: number of the macrostep that asked.
-        at: second of run time at which a skill was started, or at which anything else is due.
-        reports: how many intermediate events of a skill were taken; of a parameter or mode, 1 once it is in force.
+        at: second of run time at which a skill was started, or at which another item is due.
+        reports: number of intermediate events of a skill so far; of a parameter or mode, 1 once it is in effect.
         cause: number of the trace record about a skill's start.
-        cancelled: whether it is a skill that the last macrostep has cancelled.
+        cancelled: whether the last macrostep has cancelled the skill.
     """
 
     place: int
@@ -65,16 +65,16 @@ class Pending:
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A run as it was after its last macrostep.
+    """A run after its last macrostep.
 
     Attributes:
-        run: what was to be run, and with what.
+        run: its row, with plot and arguments.
         number: that of the macrostep.
         time: its second of run time.
         state: of the machine.
         emitted, in_vain, problem, settings: as of `Reactor`.
         pending: in the order in which it was asked for.
-        memory: what components have to remember, by name.
+        memory: of components, by name.
         records: of the trace, so far.
     """
 
@@ -92,29 +92,29 @@ class Kept:
 
     @property
     def last_record(self) -> int:
-        """Number of the last record; what was recorded after it was lost with what it was about."""
+        """Number of the last kept record."""
         return self.records[-1].seq if self.records else 0
 
 
 class Shortener:
-    """Puts hashes in the places of plots; `put` receives each one that was not there lately, as text."""
+    """Replaces plots by hashes; `put` receives each new plot as text."""
 
     def __init__(self, put: Callable[[str, str], None]) -> None:
         self._put = put
         self._known: dict[int, tuple[Any, str]] = {}  # by identity; the value is kept, so that none takes its place
 
     def __call__(self, values: Mapping[str, Any]) -> Form:
-        """The values, with hashes for those that are plots."""
+        """The values, with hashes in the places of plots."""
         return {name: self.short(value) if isinstance(value, dict) else value for name, value in values.items()}
 
     def short(self, value: Any) -> Any:
-        """A hash in the place of a plot, anything else as it is."""
+        """The hash of a plot, any other value unchanged."""
         if not isinstance(value, Mapping) or not ({"plot", "states"} <= value.keys() or _BY_HASH in value):
             return value
         return {_BY_HASH: self.hash(value)}
 
     def hash(self, value: Mapping[str, Any]) -> str:
-        """Put a plot away; the hash by which it is found again."""
+        """Store a plot; its hash."""
         known = self._known.get(id(value))
         if known is None:
             text = json.dumps(value)  # the order of states counts
@@ -127,7 +127,7 @@ class Shortener:
 
 
 def full(values: Mapping[str, Any], form: Callable[[str], Any]) -> Form:
-    """The inverse of `Shortener`; `form` finds what a hash stands for."""
+    """The inverse of `Shortener`; `form` finds the plot of a hash."""
     return {name: _full(value, form) for name, value in values.items()}
 
 
@@ -157,7 +157,7 @@ def message_form(message: Message, short: Shortener) -> Form:
 
 
 def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Callable[[str], Any]) -> Message:
-    """The inverse of `message_form`; `action` finds what an id stands for."""
+    """The inverse of `message_form`; `action` finds the start of an id."""
     match form:
         case {"action": action_id}:
             outcome = Outcome(form["outcome"], full(form["attributes"], find), delta_of(form["observed"]))
@@ -189,11 +189,11 @@ def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOuts
     return _event_of(form["event"], find)
 
 
-# -- what is awaited -----------------------------------------------------------------------------------------
+# -- pending items --------------------------------------------------------------------------------------------
 
 
 def awaited_form(what: Awaited, short: Shortener) -> Form:
-    """What is awaited, or in force."""
+    """A pending item."""
     match what:
         case Start():
             return _plain(what) | {"arguments": short(what.arguments), "names": dict(what.names)}
@@ -233,7 +233,7 @@ def _later_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> SendLater:
 
 
 def _event_form(event: Event, short: Shortener) -> Form:
-    """Only what is said of it: most events have nothing but a name."""
+    """Omits defaults: most events have only a name."""
     name, attributes, *visibility = event
     form: Form = {"name": name}
     if attributes:
@@ -261,7 +261,7 @@ def events_of(forms: Iterable[Mapping[str, Any]], find: Callable[[str], Any]) ->
 
 
 def frame_news(before: FrameState | None, frame: FrameState, short: Shortener) -> Form:
-    """What is different of one running plot, all of it if there was none; those inside are named by their numbers."""
+    """The change of a frame, or all of it if there was none; frames inside are named by their numbers."""
     if before is None or before.compiled is not frame.compiled:
         return {
             **frame._replace(children=NOTHING).to_json(),
@@ -284,7 +284,7 @@ def frame_news(before: FrameState | None, frame: FrameState, short: Shortener) -
 
 
 def frame_form(serial: int, frames: Mapping[int, Form], find: Callable[[str], Any]) -> Form:
-    """The frame of that number with all inside it, as `FrameState.to_json` gives it."""
+    """The frame of that number with all frames inside, as `FrameState.to_json` gives it."""
     form = dict(frames[serial])
     form["children"] = {host: frame_form(child, frames, find) for host, child in form["children"].items()}
     form["form"] = _full(form["form"], find)
@@ -297,5 +297,5 @@ def _inside(frame: FrameState) -> dict[str, int]:
 
 
 def _plain(value: Any) -> Form:
-    """A frozen dataclass of plain fields; `asdict` copies deeply, which is not needed here."""
+    """A frozen dataclass of plain fields; `asdict` copies deeply, which is slower."""
     return {name: getattr(value, name) for name in value.__dataclass_fields__}
