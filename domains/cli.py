@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from dsc.cli import app as plot_app
-from dsc.sequencer.cli import app as runs_app
-from dsc.viewer.cli import NoOpen, Port, view_command
+from dsc.cli.plots import app as plot_app
+from dsc.cli.runs import app as runs_app
+from dsc.cli.view import NoOpen, Port, view_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import readers
 from planning.cli import bundles_command, doctor_command, plan_command
@@ -168,8 +168,8 @@ def _viewed(
     deployed: CleanUpTable, follow: partial[Report], port: int, *, opens: bool, control: bool, wait: bool
 ) -> Report:
     """Run with a page in the browser, which stays when the run has ended."""
+    from dsc.cli.view import page, until_interrupt, viewer_installed
     from dsc.trace import header
-    from dsc.viewer.cli import page, until_interrupt, viewer_installed
 
     viewer_installed()
     from dsc.viewer.address import PageAddress

@@ -1,4 +1,4 @@
-"""A recorded run once more: the same messages through a fresh machine, and whether the same comes out."""
+"""Replay of a kept run: its messages go through a new reactor, and the results are compared."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from knowledge_base.world.schema import Schema
 
 @dataclass(frozen=True, slots=True)
 class Divergence:
-    """Where a replay came to something else than the run.
+    """The first difference between a replay and the run.
 
     Attributes:
         step: number of the macrostep.
-        what: which of its results.
-        recorded, replayed: what it was then and now.
+        what: name of the result.
+        recorded, replayed: the result in the run and in the replay.
     """
 
     step: int
@@ -45,7 +45,7 @@ class Divergence:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What came of a replay: how many macrosteps were made anew, and the first divergence, at which it ends."""
+    """Result of a replay: the number of equal macrosteps, and the divergence that ends it, if any."""
 
     run: int
     steps: int
@@ -55,34 +55,34 @@ class Replay:
 def replay(
     path: Path | str, run: int | None = None, *, library: Library | None = None, schema: Schema | None = None
 ) -> Replay:
-    """Make the macrosteps of a run anew from what was recorded, without skills, time or planner.
+    """Repeat the macrosteps of a run from its messages, without skills, time or planner.
 
     Args:
         path: the store, which is only read.
-        run: its number; the last one if left out.
-        library: plots to replay it with; those it was begun with if left out.
+        run: its number; the last one by default.
+        library: plots to replay it with; by default those that it began with.
         schema: an extension of the store's, where conditions use predicates that Python computes.
 
     Raises:
         StoreError: the store cannot be read, or has no such run.
-        HistoryError: the knowledge at the start of the run is not kept any more.
+        HistoryError: the knowledge at the start of the run is forgotten.
     """
     path = Path(path)
     with archive(path) as runs:
         row = runs.run(run)
         past = Archive(path.resolve(), schema)
-        again = _Again(runs, row, past, library or plots_of(runs, row))
+        replayed = _ReplayedRun(runs, row, past, library or plots_of(runs, row))
         steps = 0
         for step in runs.steps(row.number):
-            divergence = again.take(step)
+            divergence = replayed.take(step)
             if divergence is not None:
                 return Replay(row.number, steps, divergence)
             steps += 1
         return Replay(row.number, steps, None)
 
 
-class _Again:
-    """The run's reactor without anything around it; what it asks for is only noted."""
+class _ReplayedRun:
+    """A reactor without inbox and dispatcher; its actions are only noted."""
 
     def __init__(self, runs: RunArchive, row: RunRow, past: Archive, library: Library) -> None:
         self._runs = runs
@@ -94,7 +94,7 @@ class _Again:
         self._started: dict[str, Start] = {}
 
     def take(self, step: StepRow) -> Divergence | None:
-        """Make one macrostep; the first result that is not as it was."""
+        """Repeat one macrostep; return its first result that differs."""
         for change in self._past.changes(self._knowledge.version, step.before):  # made beside the run
             self._knowledge.apply(change.delta, change.author)
         action_id = step.message.get("action")

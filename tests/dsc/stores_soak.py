@@ -27,8 +27,8 @@ from dsc_crashes import Robot, Run, copied
 from dsc_kept_charts import CHARTS
 from typer.testing import CliRunner
 
+from dsc.cli.runs import app
 from dsc.runs.archive import archive, has_run
-from dsc.sequencer.cli import app
 from dsc.sequencer.replay import replay
 from dsc.viewer.record_sources import records_of
 from knowledge_base.errors import DamagedStoreError, InputError

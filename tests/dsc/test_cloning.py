@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from dsc import Library, load_plot, parse_plot
-from dsc.cli import app
+from dsc.cli.plots import app
 from dsc.text.cloning import clone_files, cloned, cloned_profile
 from dsc.text.profile_files import load_profile, parse_profile, profile_to_yaml
 from knowledge_base import InputError

@@ -12,10 +12,10 @@ from dsc_kept_charts import CHARTS
 from stores_soak import Judge, originals
 from typer.testing import CliRunner
 
+from dsc.cli.runs import app
 from dsc.dynamic.library import Library
 from dsc.runs.archive import archive, records_of
 from dsc.runs.store import RunStore
-from dsc.sequencer.cli import app
 from dsc.sequencer.replay import replay
 from knowledge_base.errors import DamagedStoreError
 from knowledge_base.store import KnowledgeBase

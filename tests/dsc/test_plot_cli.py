@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from dsc.cli import app
+from dsc.cli.plots import app
 from dsc.components.factories import robot_of
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
@@ -209,7 +209,7 @@ def test_the_schema_is_json_schema_of_plots() -> None:
 
 def test_help_is_light() -> None:
     heavy = ("pydantic", "networkx", "unified_planning", "ruamel.yaml", "dsc.model.plot")
-    code = f"import sys, dsc.cli; print([m for m in {heavy!r} if m in sys.modules])"
+    code = f"import sys, dsc.cli.plots; print([m for m in {heavy!r} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dsc_charts import plot
 from typer.testing import CliRunner
 
-from dsc.cli import app
+from dsc.cli.plots import app
 from dsc.text.plot_difference import differences, draw_difference
 
 OLD = """

@@ -11,7 +11,7 @@ from test_parameters import Base
 from typer.testing import CliRunner
 
 from dsc import Component, parse_plot
-from dsc.cli import app
+from dsc.cli.plots import app
 from dsc.profiles import adapted, configure
 from dsc.text.profile_files import find_profile, parse_profile, profile_schema
 from dsc.text.yaml import load_document

@@ -12,8 +12,8 @@ from dsc_kept_charts import CHARTS, handed_in
 from dsc_runs import SCHEMA
 from typer.testing import CliRunner
 
+from dsc.cli.runs import app
 from dsc.dynamic.library import Library
-from dsc.sequencer.cli import app
 from dsc.sequencer.replay import replay
 from knowledge_base.errors import StoreError
 from knowledge_base.facts import Delta, Fact

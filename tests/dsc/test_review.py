@@ -10,7 +10,7 @@ import pytest
 from dsc_charts import plot
 from typer.testing import CliRunner
 
-from dsc.cli import app
+from dsc.cli.plots import app
 from dsc.dynamic.library import Library
 from dsc.text.plot_files import load_plot, parse_plot
 from dsc.text.plot_folder import Neighbours

@@ -8,7 +8,7 @@ import pytest
 from dsc_charts import plot
 from typer.testing import CliRunner
 
-from dsc.cli import app
+from dsc.cli.plots import app
 from dsc.errors import NotExpressibleError
 from dsc.scxml.reader import parse_scxml
 from dsc.scxml.writer import to_scxml

@@ -16,8 +16,8 @@ from hostile_files import picture
 from typer.testing import CliRunner
 
 from dsc import Event, Library, Sequencer, parse_plot
+from dsc.cli.runs import app as runs
 from dsc.runs.store import RunStore
-from dsc.sequencer.cli import app as runs
 from dsc.sequencer.clock import LoopClock
 from dsc.viewer.record_sources import records_of
 from knowledge_base import Delta, KnowledgeBase, Schema, StoreError, fact

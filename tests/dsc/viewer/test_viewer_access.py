@@ -14,10 +14,10 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 httpx = pytest.importorskip("httpx", reason="the extra `viewer` is not installed")
 
+from dsc.cli.view import page  # noqa: E402
 from dsc.trace import header  # noqa: E402
 from dsc.viewer.access import CODE_LIFE_S, MOST_WRONG_CODES, Access, Keys  # noqa: E402
 from dsc.viewer.address import PageAddress  # noqa: E402
-from dsc.viewer.cli import page  # noqa: E402
 from dsc.viewer.live import LivePage  # noqa: E402
 from dsc.viewer.records import RecordLog  # noqa: E402
 from dsc.viewer.server import Viewer  # noqa: E402

@@ -1,4 +1,4 @@
-"""`dsc view`, and what `dsc run --view` needs: the page's address first, then whatever there is to see."""
+"""Command `dsc view`, and the parts of it that `dsc run --view` shares."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _complain(file: Path, log: RecordLog) -> None:
 
 
 class Page(Protocol):
-    """What answers at an address from `start` to `close`."""
+    """A page that answers at an address from `start` to `close`."""
 
     @property
     def url(self) -> str:
@@ -60,7 +60,7 @@ class Page(Protocol):
         """Answer from now on."""
 
     def wait(self) -> None:
-        """Until it is closed; an interrupt gets through."""
+        """Return when it is closed; an interrupt gets through."""
 
     def close(self) -> None:
         """Answer no longer."""
@@ -71,7 +71,7 @@ P = TypeVar("P", bound=Page)
 
 @contextmanager
 def page(shown: P, *, opens: bool) -> Iterator[P]:
-    """A page in a browser, while the block lasts; its address is printed first."""
+    """A page in a browser during the block; its address is printed first."""
     shown.start()
     typer.echo(shown.url)
     if opens:

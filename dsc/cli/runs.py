@@ -1,4 +1,4 @@
-"""`dsc runs`: what is in a run store; the file is only read, also while a run goes on."""
+"""Commands `dsc runs`: list, show, replay and check kept runs; they only read the store, also during a run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ app = typer.Typer(
     name="runs", rich_markup_mode=None, no_args_is_help=True, help="Look at runs that were kept with --store."
 )
 DIVERGED = 1
-"""Exit status of `replay` when something else came out."""
+"""Exit status of `replay` after a difference."""
 
 Store = Annotated[Path, typer.Argument(metavar="FILE", help="The store.")]
 Number = Annotated[int | None, typer.Option("--run", min=1, help="Which run.  [default: the last one]")]
@@ -25,7 +25,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 @app.command("list")
 def list_(file: Store, as_json: AsJson = False) -> None:
-    """Name the runs: what was run, how far it came, how it ended."""
+    """List the runs: plot, number of steps, time and end."""
     from dsc.runs.archive import archive
 
     with archive(file) as runs:
@@ -39,7 +39,7 @@ def list_(file: Store, as_json: AsJson = False) -> None:
 
 @app.command()
 def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
-    """Tell what happened in a run, one macrostep a line, and what is under way if it has not ended."""
+    """Print the macrosteps of a run, one a line, and the running skills of an unfinished run."""
     from dsc.runs.archive import archive
 
     with archive(file) as runs:
@@ -59,7 +59,7 @@ def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
 
 @app.command()
 def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
-    """Take everything that came in once more, and say whether the same comes out. Exit status: 0 it does, 1 not."""
+    """Replay the messages of a run and compare the results. Exit status: 0 the same, 1 a difference."""
     from dsc.sequencer.replay import replay as again
 
     done = again(file, run)
@@ -75,7 +75,7 @@ def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
 
 @app.command()
 def check(file: Store) -> None:
-    """Look whether a store, runs and knowledge, has what was written into it and nothing else; it reads all of it."""
+    """Check that each row of a store, runs and knowledge, is as written; it reads all rows."""
     from dsc.runs.archive import archive
     from knowledge_base.journal.archive import Archive
 
@@ -105,7 +105,7 @@ def _open(runs: RunArchive, run: RunRow) -> list[dict[str, Any]]:
 
 
 def _taken(step: StepRow) -> str:
-    """What the macrostep took, in the words of the trace."""
+    """The message of the macrostep, in the words of the trace."""
     events = [one.data for one in step.records if one.type == "event"]
     if events:
         return f"{events[-1]['name']} ({events[-1]['source']})"
@@ -116,7 +116,7 @@ def _taken(step: StepRow) -> str:
 
 
 def _innermost(configuration: Iterable[str]) -> Iterator[str]:
-    """The active states that have none inside."""
+    """The active states without active states inside."""
     active = list(configuration)
     yield from (path for path in active if not any(other.startswith(path + "/") for other in active))
 

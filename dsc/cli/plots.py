@@ -29,9 +29,9 @@ app = typer.Typer(
 BAD_INPUT = 2
 """Exit status of `check` with findings, and of bad input to any command."""
 UNKNOWN_PLOT = "known plot"
-"""The rule of findings that may be there because a neighbouring file cannot be read."""
+"""The rule of findings that an unreadable neighbouring file may cause."""
 MAX_BROKEN = 3
-"""Of those files, as many are named."""
+"""Number of those files that are named."""
 PIPE_WIDTH = 160
 """Columns of a tree that is not printed on a terminal."""
 
@@ -105,7 +105,7 @@ def show(
         shown = library.expanded(plot) if expanded else plot
         drawing = "" if out is None else draw(plot, library)
     except UnknownNameError as error:
-        # A plot that is not there may be in a file that cannot be read; then that is what to say.
+        # A missing plot may be in an unreadable file; then the error names the file.
         raise (broken or [error])[0] from None
     if out is not None:
         out.write(drawing)
@@ -122,7 +122,7 @@ def import_(
         str, typer.Option("--out", metavar="FILE.yaml", help="Where the plot goes; - is standard output.")
     ] = "-",
 ) -> None:
-    """Read an SCXML chart as a plot of dialect `scxml`; what plots cannot say is named."""
+    """Read an SCXML chart as a plot of dialect `scxml`; name constructs that a plot lacks."""
     from dsc.dynamic.library import Library
     from dsc.scxml.reader import parse_scxml
     from dsc.text.plot_files import plot_to_yaml
@@ -142,7 +142,7 @@ def export(
     to: Annotated[str, typer.Option("--to", metavar="FORM", help="scxml, mermaid, plantuml or svg.")],
     out: Annotated[str, typer.Option("--out", metavar="OUT", help="Where it goes; - is standard output.")] = "-",
 ) -> None:
-    """Write a plot in another form; what that form cannot say is named."""
+    """Write a plot in another form; name constructs that the form lacks."""
     from dsc.drawing import draw
     from dsc.scxml.writer import to_scxml
     from dsc.text.plot_files import load_plot
@@ -232,7 +232,7 @@ def schema(
 def _findings(
     file: Path, domain: Path | None, neighbours: Neighbours, components: tuple[Component, ...] | None
 ) -> list[Finding]:
-    """What is wrong with one file; what cannot be read at all is one finding."""
+    """Findings about one file; an unreadable file is one finding."""
     from dsc.errors import Finding
     from dsc.validation import review_plot, validate_plot
     from knowledge_base.errors import InputError
@@ -293,7 +293,7 @@ def _as_data(file: Path, finding: Finding) -> dict[str, Any]:
 
 
 def _files(library: Library) -> list[Path]:
-    """Where its plots were read."""
+    """Files of its plots."""
     places = [plot.place(("plot",)) for plot in library]
     return [Path(place.source) for place in places if place is not None and place.source]
 
