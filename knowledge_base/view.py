@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 
 from knowledge_base.errors import ConflictError, InputError
-from knowledge_base.exchange.problem_text import Metric
-from knowledge_base.exchange.problem_writer import problem_to_text
 from knowledge_base.exchange.world_json import to_json
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.evaluation import Explanation, explain
@@ -15,6 +13,8 @@ from knowledge_base.language.expression import TRUE, Expression
 from knowledge_base.language.inputs import require_params, shown
 from knowledge_base.language.query_plan import QueryPlan, plan_query
 from knowledge_base.language.question_bounds import BoundedWorld, Bounds, Meter
+from knowledge_base.pddl.problem_text import Metric
+from knowledge_base.pddl.problem_writer import problem_to_text
 from knowledge_base.prepared import Binding, Prepared, ReadyQuestions
 from knowledge_base.questions import Questions
 from knowledge_base.world.graph import Graph, WorldGraph

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import InputError, Place, UnknownNameError
-from knowledge_base.exchange.domain_writer import action_to_text, axiom_to_text, domain_to_text
 from knowledge_base.language.durative import Duration
 from knowledge_base.language.effect import Effect, substitute_effect
 from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
@@ -28,6 +27,7 @@ from knowledge_base.language.typed_list import TypedName
 from knowledge_base.language.vocabulary import ROOT_TYPE, Signature
 from knowledge_base.pddl.action_text import ActionText
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.pddl.domain_writer import action_to_text, axiom_to_text, domain_to_text
 from knowledge_base.world.schema import Schema
 from planning.fragments import merged_text, searched
 from planning.planning_actions import Axiom, PlanningAction, checked, checked_axiom, refuse_changed

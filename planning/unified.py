@@ -13,7 +13,7 @@ from unified_planning.io import PDDLReader, PDDLWriter
 from unified_planning.model import Problem as UpProblem
 
 from knowledge_base.errors import InputError
-from knowledge_base.exchange.pddl import Metric, ProblemText, read_problem
+from knowledge_base.pddl import Metric, ProblemText, read_problem
 from planning.domain import PlanningDomain
 from planning.problem.costs import TOTAL_COST
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from knowledge_base.exchange.problem_text import read_problem
 from knowledge_base.facts import Delta
 from knowledge_base.language.effect_application import apply_effect
 from knowledge_base.language.parser import parse_effect
 from knowledge_base.language.terms import Bindings
 from knowledge_base.pddl.domain_text import read_domain
+from knowledge_base.pddl.problem_text import read_problem
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 

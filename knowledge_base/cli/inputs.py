@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 if TYPE_CHECKING:
-    from knowledge_base.exchange.pddl import ProblemText
+    from knowledge_base.pddl import ProblemText
     from knowledge_base.store import KnowledgeBase
 
 Source = Annotated[
@@ -99,7 +99,7 @@ def _opened(source: Path, domain: Path | None) -> Opened:
 
 
 def _problem(text: str, source: Path, domain: Path | None) -> Opened:
-    from knowledge_base.exchange.pddl import parse_problem
+    from knowledge_base.pddl import parse_problem
     from knowledge_base.store import KnowledgeBase
     from knowledge_base.world.schema import Schema
 

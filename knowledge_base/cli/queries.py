@@ -13,9 +13,9 @@ from knowledge_base.cli.printing import print_json, print_json_list, print_table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from knowledge_base.exchange.pddl import ProblemText
     from knowledge_base.facts import Value
     from knowledge_base.language.expression import Expression
+    from knowledge_base.pddl import ProblemText
     from knowledge_base.view import View
 
 Expr = Annotated[str, typer.Argument(metavar="EXPR", help="A condition; ?x is asked for.")]

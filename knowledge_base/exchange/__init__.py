@@ -1,1 +1,1 @@
-"""The knowledge base's texts in and out: PDDL domain and problem files."""
+"""Worlds, changes and schemas as JSON, for stores and for other programs."""

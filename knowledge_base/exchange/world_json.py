@@ -33,7 +33,7 @@ _PARTS = ("format", "version", "schema_hash", "schema", "nodes", "facts", "value
 
 
 def to_json(state: WorldState, version: int) -> str:
-    """The world as JSON text; see `exchange.forms` for how facts and values are written."""
+    """The world as JSON text; `exchange.json_forms` describes facts and values."""
     said = {
         "format": FORMAT,
         "version": version,

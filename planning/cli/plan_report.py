@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from knowledge_base.exchange.pddl import ProblemText
+    from knowledge_base.pddl import ProblemText
     from planning.domain import PlanningDomain
     from planning.ordering.partial_order import PartialOrder
     from planning.plan import Plan, PlanningOutcome

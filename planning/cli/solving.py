@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from knowledge_base.exchange.pddl import ProblemText
+    from knowledge_base.pddl import ProblemText
     from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
     from planning.engines.planner import PlannerProcess
@@ -28,7 +28,7 @@ def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, Knowledg
         InputError: a file cannot be read or has a mistake, or there is no problem or no goal.
     """
     from knowledge_base.errors import InputError, Place
-    from knowledge_base.exchange.pddl import read_problem
+    from knowledge_base.pddl import read_problem
     from knowledge_base.store import KnowledgeBase
     from planning.cli.plan_report import without_derived
     from planning.domain import PlanningDomain

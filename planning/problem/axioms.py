@@ -26,8 +26,8 @@ from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.language.evaluation import World
+    from knowledge_base.pddl.problem_text import Metric
     from planning.cancellable_work import WorkLimit
     from planning.domain import Axiom, PlanningDomain
     from planning.problem.derived import Derivation

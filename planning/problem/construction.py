@@ -37,8 +37,8 @@ from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.language.evaluation import World
+    from knowledge_base.pddl.problem_text import Metric
     from planning.domain import PlanningDomain
     from planning.problem.numbering import Numbering
 

@@ -9,18 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from knowledge_base.exchange.problem_text import TOTAL_TIME
 from knowledge_base.language.expression import Arithmetic, Call, Term
 from knowledge_base.language.printer import to_text
+from knowledge_base.pddl.problem_text import TOTAL_TIME
 from planning.problem.relevance import names_of
 from planning.quantities import Assignment, linear
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from knowledge_base.exchange.problem_text import Metric
     from knowledge_base.facts import Fact
     from knowledge_base.language.vocabulary import Vocabulary
+    from knowledge_base.pddl.problem_text import Metric
     from planning.problem.conditions import Grounder
 
 TOTAL_COST = Call("total-cost")

@@ -27,8 +27,8 @@ from unified_planning.plans import ActionInstance, SequentialPlan, TimeTriggered
 from unified_planning.test.examples import get_example_problems
 
 from knowledge_base.errors import InputError, UnsupportedConstructError
-from knowledge_base.exchange.pddl import ProblemText, read_problem
 from knowledge_base.language.evaluation import evaluate_term
+from knowledge_base.pddl import ProblemText, read_problem
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.engines import registry

@@ -17,8 +17,8 @@ from knowledge_base import (
     UnsupportedConstructError,
     fact,
 )
-from knowledge_base.exchange.pddl import read_domain, read_problem
 from knowledge_base.language.parser import parse_condition, parse_effect
+from knowledge_base.pddl import read_domain, read_problem
 
 QUESTIONS = [
     # text, kind of error, line:column, nearest name

@@ -19,10 +19,10 @@ from knowledge_base import (
     UnknownNameError,
     fact,
 )
-from knowledge_base.exchange.pddl import read_problem
 from knowledge_base.language.check import check_effect
 from knowledge_base.language.evaluation import apply_effect
 from knowledge_base.language.parser import parse_effect
+from knowledge_base.pddl import read_problem
 
 KITCHEN = Schema.parse(
     """(define (domain kitchen)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from knowledge_base import InputError, KnowledgeBase, Schema, fact
-from knowledge_base.exchange.pddl import read_domain, read_problem
 from knowledge_base.language.expression import TRUE
 from knowledge_base.language.printer import to_text
+from knowledge_base.pddl import read_domain, read_problem
 
 SMALL = Schema.parse(
     "(define (domain small) (:types cup can) (:predicates (full ?c - cup) (dry)) (:functions (f ?c) (g)))"

@@ -157,7 +157,7 @@ TEXTS = {
 
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS.keys())
 def test_reading_a_problem_takes_time_in_proportion(text):
-    from knowledge_base.exchange.pddl import parse_problem
+    from knowledge_base.pddl import parse_problem
 
     schema = Schema.parse(DOMAIN)
     one, two = (steps_of(lambda n=n: parse_problem(text(n), schema)) for n in (150, 300))

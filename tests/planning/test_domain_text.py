@@ -10,8 +10,8 @@ from hypothesis import given
 from random_domains import ACTIONS, domain_of
 
 from knowledge_base import InputError, Schema, UnsupportedConstructError
-from knowledge_base.exchange.domain_writer import domain_to_text
-from knowledge_base.exchange.pddl import parse_domain
+from knowledge_base.pddl import parse_domain
+from knowledge_base.pddl.domain_writer import domain_to_text
 from planning import PlanningDomain
 
 ROOT = Path(__file__).parents[2]

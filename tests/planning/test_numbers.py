@@ -8,9 +8,9 @@ import shutil
 import pytest
 from searching import breadth_first, cheapest, solution
 
-from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.parser import parse_condition, parse_term
+from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.engines.request import read, written

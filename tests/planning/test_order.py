@@ -184,7 +184,7 @@ def test_no_more_pairs_are_kept_than_by_unified_planning(texts, domain_file, cle
     from unified_planning.io import PDDLReader
     from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan
 
-    from knowledge_base.exchange.pddl import read_problem
+    from knowledge_base.pddl import read_problem
 
     problem = PDDLReader().parse_problem_string(domain_file.read_text(), ORACLE_PROBLEM)
     things = problem.environment.expression_manager.ObjectExp

@@ -71,7 +71,7 @@ def oracle(domain_file, clean_up):
     from unified_planning.io import PDDLReader
     from unified_planning.plans import ActionInstance, SequentialPlan
 
-    from knowledge_base.exchange.pddl import read_problem
+    from knowledge_base.pddl import read_problem
 
     problem = PDDLReader().parse_problem_string(domain_file.read_text(), PROBLEM)
     things = problem.environment.expression_manager.ObjectExp

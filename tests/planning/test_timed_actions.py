@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_base.errors import InputError, UnsupportedConstructError
-from knowledge_base.exchange.pddl import read_problem
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.evaluation import apply_effect, holds
 from knowledge_base.language.expression import Constant
 from knowledge_base.language.printer import to_text
+from knowledge_base.pddl import read_problem
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.plan import PlanStep

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from knowledge_base.content import GEOMETRY, require_content
 from knowledge_base.errors import ParseError, Place, SchemaError, UnknownNameError
@@ -25,18 +25,25 @@ from knowledge_base.language.expression import (
 from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.language.sexpr import Group, Node, Word
 from knowledge_base.language.typed_list import TypedName, parse_names
-from knowledge_base.language.vocabulary import ROOT_TYPE, Signature
+from knowledge_base.language.vocabulary import ROOT_TYPE, Signature, Vocabulary
 from knowledge_base.pddl.beyond import TIMED_INITIAL, refuse_forms, refused
 from knowledge_base.pddl.files import text_and_source
 from knowledge_base.pddl.sections import Definition, read_definition, word
 from knowledge_base.spelling import is_number
-from knowledge_base.world.schema import Schema
 
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
 TOTAL_TIME = Call("total-time")
 """In a metric: how long the whole plan takes. No domain declares it."""
-_TOTAL_TIME_DECLARED = Schema(functions={TOTAL_TIME.function: Signature(TOTAL_TIME.function)})
+_TOTAL_TIME_DECLARED = Signature(TOTAL_TIME.function, result="number")
 _DIRECTIONS = ("minimize", "maximize")
+
+
+class DomainVocabulary(Vocabulary, Protocol):
+    """A vocabulary that a problem can extend; a `Schema` is one."""
+
+    def with_functions(self, *functions: Signature) -> Vocabulary:
+        """The vocabulary with these functions too."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +86,7 @@ class ProblemText:
 
 
 def read_problem(
-    text_or_path: str | Path, schema: Schema, source: str | None = None, domain: str | None = None
+    text_or_path: str | Path, schema: DomainVocabulary, source: str | None = None, domain: str | None = None
 ) -> ProblemText:
     """Read a PDDL problem: a `Path` or a file's name, or the text itself.
 
@@ -103,7 +110,9 @@ def read_problem(
     return parse_problem(text, schema, source, domain)
 
 
-def parse_problem(text: str, schema: Schema, source: str | None = None, domain: str | None = None) -> ProblemText:
+def parse_problem(
+    text: str, schema: DomainVocabulary, source: str | None = None, domain: str | None = None
+) -> ProblemText:
     """Read a PDDL problem from its text; arguments and errors as for `read_problem`."""
     definition = read_definition(text, source, "problem", _SECTIONS)
     named = _domain(definition)
@@ -126,7 +135,7 @@ def _domain(definition: Definition) -> Word:
     return word(nodes[0], "the domain's name")
 
 
-def _problem(definition: Definition, named: Word, schema: Schema) -> ProblemText:
+def _problem(definition: Definition, named: Word, schema: DomainVocabulary) -> ProblemText:
     objects = _objects(parse_names(definition.nodes(":objects")), schema)
     init = _Init(schema, {**schema.constants, **objects})
     for node in definition.nodes(":init"):
@@ -144,7 +153,7 @@ def _problem(definition: Definition, named: Word, schema: Schema) -> ProblemText
     )
 
 
-def _objects(names: Sequence[TypedName], schema: Schema) -> dict[str, str]:
+def _objects(names: Sequence[TypedName], schema: DomainVocabulary) -> dict[str, str]:
     objects: dict[str, str] = {}
     for name, types, place in names:
         if len(types) > 1:
@@ -158,7 +167,7 @@ def _objects(names: Sequence[TypedName], schema: Schema) -> dict[str, str]:
     return objects
 
 
-def _goal(definition: Definition, schema: Schema, objects: Mapping[str, str]) -> Expression:
+def _goal(definition: Definition, schema: DomainVocabulary, objects: Mapping[str, str]) -> Expression:
     nodes = definition.nodes(":goal")
     if not nodes:
         return TRUE
@@ -170,7 +179,7 @@ def _goal(definition: Definition, schema: Schema, objects: Mapping[str, str]) ->
     return goal
 
 
-def _metric(definition: Definition, schema: Schema, objects: Mapping[str, str]) -> Metric | None:
+def _metric(definition: Definition, schema: DomainVocabulary, objects: Mapping[str, str]) -> Metric | None:
     nodes = definition.nodes(":metric")
     if not nodes:
         return None
@@ -183,7 +192,7 @@ def _metric(definition: Definition, schema: Schema, objects: Mapping[str, str]) 
     if len(nodes) != 2:
         raise ParseError("a metric is written (:metric minimize NUMBER)", place=direction.place)
     term = _with_total_time(parse_term(nodes[1]))
-    checked = schema if TOTAL_TIME.function in schema.functions else schema.merged(_TOTAL_TIME_DECLARED)
+    checked = schema if TOTAL_TIME.function in schema.functions else schema.with_functions(_TOTAL_TIME_DECLARED)
     check(Comparison("<=", term, Constant(0), place=definition.place), checked, objects=objects)
     return Metric("minimize" if direction.folded() == "minimize" else "maximize", term)
 
@@ -202,7 +211,7 @@ def _with_total_time(term: Term) -> Term:
 class _Init:
     """Collects the first state, one element of `:init` after the other."""
 
-    def __init__(self, schema: Schema, objects: Mapping[str, str]) -> None:
+    def __init__(self, schema: Vocabulary, objects: Mapping[str, str]) -> None:
         self.schema = schema
         self.objects = objects
         self.facts: dict[Fact, None] = {}

@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from typing import Protocol
+
 from knowledge_base.errors import InputError
-from knowledge_base.exchange.problem_text import Metric
 from knowledge_base.facts import Content, Fact
 from knowledge_base.language.expression import KEYWORDS, TRUE, Expression
 from knowledge_base.language.parser import LONGEST_NUMBER
 from knowledge_base.language.printer import to_text
-from knowledge_base.language.vocabulary import Signature
+from knowledge_base.language.vocabulary import Signature, Vocabulary
+from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.spelling import is_name, value_text
-from knowledge_base.world.state import WorldState
+
+
+class WrittenWorld(Protocol):
+    """The content of a world; a `WorldState` is one."""
+
+    @property
+    def schema(self) -> Vocabulary:
+        """Its declarations."""
+        ...
+
+    @property
+    def nodes(self) -> Mapping[str, str]:
+        """Its objects with their types, constants too."""
+        ...
+
+    @property
+    def facts(self) -> Iterable[Fact]:
+        """Its facts."""
+        ...
+
+    @property
+    def values(self) -> Mapping[Fact, Content]:
+        """The values of its functions."""
+        ...
 
 
 def problem_to_text(
-    state: WorldState, name: str, domain: str, goal: Expression = TRUE, metric: Metric | None = None
+    state: WrittenWorld, name: str, domain: str, goal: Expression = TRUE, metric: Metric | None = None
 ) -> str:
     """The world as the start of a problem.
 
