@@ -90,14 +90,15 @@ def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, se
     import asyncio
 
     from planning.cancellable_work import WorkLimit, WorkLimitError, aside
+    from planning.explanation.unsolvability import why_unsolvable
     from planning.problem.axioms import Derivable
-    from planning.problem.unsolvability import why_unsolvable
 
     patience = WorkLimit(seconds)
 
     def why() -> tuple[str, ...]:
         form = Derivable.of(domain)
-        return form.why_none(world, read.goal, patience) if form else why_unsolvable(domain, world, read.goal, patience)
+        asked = form.without_axioms(world, read.goal) if form else (domain, world, read.goal)
+        return why_unsolvable(*asked, patience)
 
     try:
         return list(asyncio.run(aside(why, patience)))

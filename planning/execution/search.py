@@ -15,11 +15,11 @@ from planning.engines.registry import timing
 from planning.execution.local_repair import mending
 from planning.execution.planner_call import Answer, Asking
 from planning.execution.repair import EXCLUDED_SECONDS, without
+from planning.explanation.unsolvability import why_unsolvable
 from planning.ordering.partial_order import deordered
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.problem.construction import build_problem
 from planning.problem.constructs import why_no_engine
-from planning.problem.unsolvability import why_unsolvable
 from planning.validation import Validation, validate
 
 if TYPE_CHECKING:

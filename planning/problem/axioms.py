@@ -20,7 +20,6 @@ from planning.planning_actions import PlanningAction
 from planning.problem.construction import build_problem
 from planning.problem.derived import denied, derivation
 from planning.problem.relevance import name_of, names_of, relevant
-from planning.problem.unsolvability import why_unsolvable
 from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ class Derivable:
         durations: bool = False,
         patience: WorkLimit | None = None,
     ) -> Problem:
-        """As `planning.problem.construction.pose`; steps that derive something are bookkeeping, which no plan shows.
+        """As `planning.problem.construction.build_problem`; plans show no steps that derive facts.
 
         Raises:
             UnsupportedGoalError, UnsupportedActionError: also if it is asked for that a predicate does not follow.
@@ -98,9 +97,9 @@ class Derivable:
             build_problem(self.domain, self.world(world), wanted, metric, durations=durations, patience=patience)
         )
 
-    def why_none(self, world: World, goal: Expression, patience: WorkLimit | None = None) -> tuple[str, ...]:
-        """As `planning.problem.unsolvability.why_unsolvable`."""
-        return why_unsolvable(self.domain, self.world(world), self.original.expand(goal), patience)
+    def without_axioms(self, world: World, goal: Expression) -> tuple[PlanningDomain, World, Expression]:
+        """Domain, world and goal without derived predicates; an explanation of 'no plan' speaks of these."""
+        return self.domain, self.world(world), self.original.expand(goal)
 
     def _refuse_denied(self, goal: Expression) -> None:
         """What is derived step by step is known to hold when it does, and never not to."""

@@ -13,10 +13,10 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
+from planning.explanation.unsolvability import why_unsolvable
 from planning.plan import Plan, PlanStep
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
-from planning.problem.unsolvability import why_unsolvable
 from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from knowledge_base.facts import Fact
 from planning.cancellable_work import WorkLimit
+from planning.explanation.mutexes import goal_mutexes
 from planning.plan import PlanStep
-from planning.problem.unsolvability import excluding
 from planning.strips import GroundAction, Problem
 
 FACTS = tuple(Fact("p", (i,)) for i in range(5))
@@ -17,7 +17,7 @@ GO = GroundAction(PlanStep("go"), (HOME,), (AWAY, TIRED), (HOME,))
 
 
 def pairs(problem):
-    return list(excluding(problem, WorkLimit()))
+    return list(goal_mutexes(problem, WorkLimit()))
 
 
 def test_what_one_action_takes_for_giving_the_other_excludes_it():

@@ -6,8 +6,8 @@ from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.parser import parse_condition
 from planning.domain import PlanningDomain
+from planning.explanation.unsolvability import why_unsolvable
 from planning.problem.construction import build_problem
-from planning.problem.unsolvability import why_unsolvable
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
 

@@ -14,9 +14,9 @@ from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.engines.request import read, written
+from planning.explanation.unsolvability import why_unsolvable
 from planning.plan import PlanStep
 from planning.problem.construction import build_problem
-from planning.problem.unsolvability import why_unsolvable
 from planning.quantities import Assignment, NumericBound, Operation, linear, text
 from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate

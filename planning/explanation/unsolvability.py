@@ -1,4 +1,4 @@
-"""Unsolvability: goal facts out of reach, mutexes (h²), and the missing facts of the nearest action."""
+"""Unsolvability: one sentence for each goal fact out of reach, down to the missing facts of the nearest action."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from knowledge_base.language.evaluation import World, explain
 from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
 from knowledge_base.language.printer import to_text
 from planning.cancellable_work import WorkLimit
+from planning.explanation.mutexes import goal_mutexes
 from planning.plan import PlanStep
 from planning.problem.conditions import Every, Grounder, Literal, Residual, Some, is_so
 from planning.problem.construction import ProblemBuilder, check_goal
@@ -28,77 +29,6 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Fact
     from planning.cancellable_work import WorkLimit
     from planning.domain import PlanningAction, PlanningDomain
-    from planning.strips import Problem
-
-
-@dataclass(frozen=True, slots=True)
-class _Action:
-    """Facts by number; sets of them as bits."""
-
-    needs: tuple[int, ...]
-    needed: int
-    adds: tuple[int, ...]
-    added: int
-    kept: int
-
-
-def excluding(problem: Problem, patience: WorkLimit) -> Iterator[tuple[Fact, Fact]]:
-    """The pairs of goal facts that can never hold together, though each may by itself.
-
-    Raises:
-        OutOfPatienceError: it takes too long.
-    """
-    number = {fact: i for i, fact in enumerate(dict.fromkeys([*problem.init, *problem.goal, *_mentioned(problem)]))}
-    actions = []
-    for action in problem.actions:
-        adds, deletes = ([number[fact] for fact in facts] for facts in (action.adds, action.deletes))
-        needs = tuple(number[fact] for fact in action.precondition)
-        actions.append(_Action(needs, _bits(needs), tuple(adds), _bits(adds), ~(_bits(adds) | _bits(deletes))))
-    together = _reached(actions, [number[fact] for fact in problem.init], len(number), patience)
-    for one, other in itertools.combinations(problem.goal, 2):
-        if not together[number[one]] >> number[other] & 1:
-            yield one, other
-
-
-def _mentioned(problem: Problem) -> Iterator[Fact]:
-    for action in problem.actions:
-        yield from action.facts()
-
-
-def _bits(numbers: Iterable[int]) -> int:
-    found = 0
-    for number in numbers:
-        found |= 1 << number
-    return found
-
-
-def _reached(actions: list[_Action], init: list[int], size: int, patience: WorkLimit) -> list[int]:
-    """For each fact those that it can hold together with, as bits; with itself, if it can hold at all."""
-    possible = _bits(init)
-    together = [possible if possible >> i & 1 else 0 for i in range(size)]
-    before: list[int] = []
-    while before != together:
-        before = together.copy()
-        for action in actions:
-            patience.spend()
-            if any(action.needed & ~together[need] for need in action.needs):
-                continue
-            beside = action.kept & possible
-            for need in action.needs:
-                beside &= together[need]
-            for one in action.adds:
-                fresh = (beside | action.added) & ~together[one]
-                together[one] |= fresh
-                _mirror(one, fresh, together)
-            possible |= action.added
-    return together
-
-
-def _mirror(one: int, fresh: int, together: list[int]) -> None:
-    while fresh:
-        lowest = fresh & -fresh
-        together[lowest.bit_length() - 1] |= 1 << one
-        fresh ^= lowest
 
 
 _LONGEST_CHAIN = 6
@@ -107,13 +37,13 @@ _LONGEST_CHAIN = 6
 def why_unsolvable(
     domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit | None = None
 ) -> tuple[str, ...]:
-    """One sentence for each goal fact that no action sequence can reach even if nothing became false.
+    """One sentence for each goal fact that no action sequence can reach even without deletions.
 
-    Each follows the nearest action back to what is missing in the end. If every fact is reachable alone,
-    the one sentence says so: then it is the deletions that stand in the way.
+    Each sentence follows the nearest actions back to missing facts. If every fact is reachable alone, the answer names
+    the mutexes among them.
 
     Raises:
-        InputError, OutOfPatienceError: as for `planning.problem.construction.pose`.
+        InputError, WorkLimitError: as for `planning.problem.construction.build_problem`.
     """
     check_goal(goal, world)
     derived = derivation(domain)
@@ -132,17 +62,17 @@ def why_unsolvable(
 
 
 def _not_together(domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit) -> tuple[str, ...]:
-    """Which goal facts exclude each other; that there must be some, if no two of them do."""
+    """The mutexes among the goal facts, or a sentence for more than two facts that exclude each other."""
     patience.doing = "looking for goal facts that exclude each other"
     problem = ProblemBuilder(domain).build_problem(world, goal, patience=patience)
-    pairs = [] if problem.one_at_a_time else list(excluding(problem.whole or problem, patience))
+    pairs = [] if problem.one_at_a_time else list(goal_mutexes(problem.whole or problem, patience))
     told = [(one, other) for one, other in pairs if _declared(one) and _declared(other)]
     said = [f"{_as_written(one)} and {_as_written(other)} can never hold together" for one, other in told]
     return tuple(said) or ("each goal fact can be reached by itself, but not all of them together",)
 
 
 def _declared(fact: Fact) -> bool:
-    """Not one that stands for a disjunction, whose name has a blank."""
+    """Whether the domain declares the fact; the name of one for a disjunction has a blank."""
     return " " not in fact.predicate.removeprefix(NOT)
 
 
@@ -153,11 +83,11 @@ def _as_written(fact: Fact) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Reach:
-    """What can hold if nothing ever became false.
+    """The facts and numbers that relaxed reachability allows.
 
     Attributes:
         facts: in positive normal form.
-        changes: how numbers can change.
+        changes: possible changes of numbers.
         world: the present.
     """
 
@@ -194,12 +124,11 @@ class _Reach:
 
 @dataclass(frozen=True, slots=True)
 class _Nearest:
-    """A step that would add a fact, with what it lacks: facts, conditions, and how many are unchangeable."""
+    """A step that adds a fact, with its missing facts and conditions, and the number of unchangeable ones."""
 
     step: PlanStep
     facts: tuple[Fact, ...]
     conditions: tuple[str, ...]
-
     fixed: int
 
 
@@ -230,7 +159,7 @@ class _Causes:
                     yield from itertools.chain.from_iterable(causes)
 
     def chain(self, fact: Fact) -> str:
-        """From the fact through the nearest actions to what cannot be had."""
+        """A sentence from the fact through the nearest actions to unreachable facts."""
         said: list[str] = []
         agenda, seen, rooted = [fact], {fact}, False
         while agenda and len(said) < _LONGEST_CHAIN:
@@ -248,12 +177,12 @@ class _Causes:
         return "; ".join(said if rooted or agenda else [*said, "none of these can come first"])
 
     def nearest(self, fact: Fact) -> _Nearest | None:
-        """The action that lacks least for adding the fact; the first of the domain among equals."""
+        """The action with the fewest missing facts that adds the fact; the first of the domain among equals."""
         found = [near for rule in self.rules for near in self.ways(rule, fact)]
         return min(found, key=_distance, default=None)
 
     def ways(self, rule: JoinRule, fact: Fact) -> Iterator[_Nearest]:
-        """For each effect of the action that can be the fact, the arguments that lack least."""
+        """For each effect of the action that can be the fact, the arguments with the fewest missing facts."""
         for leaf in effect_leaves(rule.action.effect):
             if isinstance(leaf, Add) and leaf.atom.predicate == fact.predicate:
                 start = rule.unify(leaf.atom, fact, {})
@@ -262,7 +191,7 @@ class _Causes:
                     yield closest
 
     def closest(self, rule: JoinRule, start: dict[str, Value]) -> _Nearest | None:
-        """Give up ever more of the positive preconditions until arguments are found for the others."""
+        """Drop one more positive precondition at a time until the others have arguments."""
         for given_up in range(len(rule.atoms) + 1):
             found = [
                 self.lacking(rule, full)
@@ -275,7 +204,7 @@ class _Causes:
         return None
 
     def completed(self, rule: JoinRule, bindings: dict[str, Value]) -> dict[str, Value] | None:
-        """Parameters that nothing decides stand for the first object of their type."""
+        """Bind undecided parameters to the first object of their type."""
         first = {name: next(iter(objects), None) for name, objects in rule.allowed.items()}
         full = {name: bindings.get(name, value) for name, value in first.items()}
         return {k: v for k, v in full.items() if v is not None} if None not in full.values() else None
@@ -294,7 +223,7 @@ class _Causes:
 
 
 def _cases(action: PlanningAction) -> Iterator[PlanningAction]:
-    """One action for each effect, with what the effect depends on as parameters and precondition."""
+    """One action for each effect, with the variables and conditions of the effect as parameters and precondition."""
     for leaf, variables, conditions in _effects(action.effect):
         needed = (*_parts(action.precondition), *(part for one in conditions for part in _parts(one)))
         yield replace(action, parameters=(*action.parameters, *variables), precondition=And(needed), effect=leaf)
