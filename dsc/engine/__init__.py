@@ -1,1 +1,1 @@
-"""How a plot runs: a pure step from one state of the machine to the next, actions handed out as data."""
+"""Engine: a pure step function from one machine state to the next. External actions are returned as data."""

@@ -1,4 +1,4 @@
-"""From a plot to its tables."""
+"""Compiler: turns a plot into its tables."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
     """Lay out the plot's states as nodes and its transitions as edges.
 
     Raises:
-        UnknownNameError: a transition or a scope names a state that is not there.
-        SchemaError: targets that cannot be active together, or a history that does not lead to a state beside it.
+        UnknownNameError: a transition or a scope names a missing state.
+        SchemaError: targets cannot be active together, or a history leads to a state outside its own scope.
     """
     layout = _Layout(plot)
     for node in layout.nodes:
@@ -28,7 +28,7 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
 
 
 class _Layout:
-    """The nodes of a plot; edges are added when all nodes have their places."""
+    """Builds the nodes of a plot, then the edges between them."""
 
     def __init__(self, plot: ActionPlot) -> None:
         self._scxml = plot.dialect == "scxml"
@@ -53,7 +53,7 @@ class _Layout:
     def _add_regions(self, node: StateNode, state: OrthogonalState) -> None:
         for name, region in state.regions.items():
             inner = self._append(f"#{len(self.nodes)}", node, None)
-            # What was made only to hold one state, which it is named after, is no scope of its own in SCXML.
+            # SCXML has no region elements: a region that is named after its only state stands for this state.
             inner.transparent = self._scxml and [*region.states] == [name]
             self._add_states(inner, region)
         for name, history in state.connectors.items():
@@ -80,18 +80,18 @@ class _Layout:
         return found
 
     def defaults(self) -> dict[int, Default]:
-        """What each history stands for at first."""
+        """Return the default target and effect of each history, by node."""
         histories = [(node, node.state) for node in self.nodes if isinstance(node.state, HistoryState)]
         return {node.index: self._default(node, history) for node, history in histories}
 
     def _default(self, node: StateNode, history: HistoryState) -> Default:
         target = self._target(node, history.target)
         if isinstance(self.nodes[target].state, HistoryState) or node.parent not in self.nodes[target].around:
-            raise SchemaError(f"the history '{node.name}' does not lead to a state beside it", found=node.name)
+            raise SchemaError(f"the history '{node.name}' does not lead to a state in its scope", found=node.name)
         return Default(target, history.do)
 
     def prepare(self, node: StateNode) -> None:
-        """Lay out now what can be wrong with the transitions of a node, and the others when they are reached."""
+        """Build the edges now if they may contain errors; else build them on first use."""
         if isinstance(node.state, State | Connector):
             node.lay_out = self._lay_out
             if isinstance(node.state, Connector) or not self._is_plain(node.state):
@@ -99,18 +99,18 @@ class _Layout:
         node.settle()
 
     def _is_plain(self, state: State) -> bool:
-        """Whether each transition has one target, which is there, or none."""
+        """Return whether each transition has at most one target, and this target exists."""
         for one in chain(chain.from_iterable(state.on.values()), state.after, state.every, state.always):
             if one.also or one.clear or (one.target is not None and one.target not in self.index):
                 return False
         return True
 
     def _lay_out(self, node: StateNode) -> None:
-        """The transitions of one state, in all tables of its node."""
+        """Build the transitions of one state in all tables of its node."""
         state = node.state
         if not isinstance(state, State | Connector):
             return
-        # They come in the order of the tables, so none is looked up by its place: large plots have many.
+        # Transitions and tables have the same order. A search by place would be slow in large plots.
         edges = (self._edge(node, place, trigger, one) for place, trigger, one in state.placed_transitions())
         if isinstance(state, State):
             node.edges = {event: tuple(islice(edges, len(many))) for event, many in state.on.items()}
@@ -133,7 +133,7 @@ class _Layout:
         )  # fmt: skip
 
     def _together(self, targets: Sequence[int]) -> bool:
-        """Whether all targets can be active at once: any two are in different regions (SCXML 3.11)."""
+        """Return whether all targets can be active together: any two are in different regions (SCXML 3.11)."""
         ways = [[*reversed(self.nodes[target].around), target] for target in targets]
         for first, second in combinations(ways, 2):
             split = sum(1 for one, other in zip(first, second, strict=False) if one == other)
@@ -150,7 +150,7 @@ class _Layout:
         return found
 
     def _cleared(self, source: StateNode, transition: Transition) -> Iterator[int]:
-        """The histories that forget: of the state, with `*` also those of all states inside it."""
+        """Yield the histories that a transition clears: those of the state, and with `*` those of all states inside."""
         for name in transition.clear:
             node = self.nodes[self._target(source, name.removesuffix("*"))]
             regions = [self.nodes[child] for child in node.children] if node.orthogonal else []

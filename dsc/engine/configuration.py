@@ -1,7 +1,7 @@
-"""Configurations of one plot, each made once and shared by all instances, with what was worked out about it.
+"""Configurations of one plot; all instances share them and the reactions computed for them.
 
-A configuration's reactions are found when they are first needed and kept (lazy determinisation): from then on
-a step is a look-up. What is kept is bounded, and forgetting it changes nothing but the time that a step takes.
+A configuration computes a reaction on first use and keeps it (lazy determinisation): from then on a step is a look-up.
+The number of kept reactions is bounded. A dropped reaction is computed again.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from typing import Any
 from dsc.engine.tables import CompiledPlot
 
 Remembered = tuple[tuple[int, tuple[int, ...]], ...]
-"""History node and the nodes that were active when the node around it was last left, in order."""
+"""Pairs of a history node and the nodes that were active when the node around it was last exited, in order."""
 
 MOST_CONFIGURATIONS = 4096
-"""Kept for one plot: four regions of eight states each; a few KiB each."""
+"""Upper bound for one plot, enough for four regions of eight states each; a configuration takes a few KiB."""
 MOST_TRIGGERS = 256
-"""Kept for one configuration: names of events come from outside, and there is no end to them."""
+"""Upper bound for one configuration: event names come from outside and are unlimited."""
 
 
 class Configuration:
-    """The active nodes of a plot and all else that decides which transitions can be taken.
+    """The active nodes of a plot, with the rest of the state that determines its enabled transitions.
 
-    What the modules above work out about it they keep here: it is the one thing that all of them share.
+    The modules `reaction_choice`, `determinisation` and `machine` store their computed results here.
 
     Attributes:
         active: the active nodes, in document order, without the plot itself.
-        waiting: those of them whose transitions have to wait, because their least time has not passed.
-        history: what the plot's history states remember.
-        choices: trigger -> what is decided there (see `choice`).
-        reactions: transitions taken together -> what follows (see `determinisation`).
-        questions: how many guards `choices` ask.
-        bare: the `MachineState` in which this is all there is, if it was ever reached.
-        steps: the last `Step` from there for each event that only moves on.
+        waiting: active nodes whose `at_least` has not passed; their transitions wait.
+        history: the nodes that each history state remembers.
+        choices: trigger -> reaction or next question (see `reaction_choice`).
+        reactions: transitions taken together -> their reaction (see `determinisation`).
+        questions: the number of guards that `choices` evaluates.
+        bare: the `MachineState` that holds this configuration and nothing else, once one was reached.
+        steps: event -> the last `Step` from `bare`, for events that only change the configuration.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Configuration:
         self.steps: dict[str, Any] = {}
 
     def __eq__(self, other: object) -> bool:
-        """Whether the same is active, waiting and remembered; of which plot, the frame says."""
+        """Compare the active nodes, waiting nodes and history; the frames compare the plots."""
         return self is other or (isinstance(other, Configuration) and self._key == other._key)
 
     def __hash__(self) -> int:
@@ -77,7 +77,7 @@ class Configuration:
 
     @cached_property
     def form(self) -> Mapping[str, Any]:
-        """As plain data, which nobody may change."""
+        """The configuration as plain data, read-only."""
         names = [node.name for node in self.compiled.nodes]
         return {
             "active": [names[index] for index in self.active],
@@ -93,25 +93,25 @@ class Configuration:
 
     @cached_property
     def spontaneous(self) -> bool:
-        """Whether a transition without trigger may be enabled."""
+        """Return whether an active node has a transition without trigger."""
         return any(self.compiled.nodes[index].always for index in self.active)
 
     def forget(self) -> None:
-        """Drop what was worked out; it is worked out again when it is needed."""
+        """Drop all computed reactions; later steps compute them again."""
         self.choices.clear()
         self.reactions.clear()
         self.steps.clear()
         self.questions = 0
 
     def is_active(self, state: str) -> bool:
-        """Whether the state of that name is active."""
+        """Return whether the state of that name is active."""
         return self.compiled.index.get(state) in self.members
 
 
 def configuration_of(
     compiled: CompiledPlot, active: tuple[int, ...], waiting: frozenset[int] = frozenset(), history: Remembered = ()
 ) -> Configuration:
-    """The plot's configuration with these contents: always the same one, as long as it is kept."""
+    """Return the plot's configuration with these contents: the same object while it is kept."""
     key = (active, waiting, history)
     found: Configuration | None = compiled.cache.get(key)
     if found is None:

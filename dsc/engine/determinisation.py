@@ -1,4 +1,4 @@
-"""Reactions worked out, once for each configuration and set of transitions (lazy determinisation).
+"""Reactions, computed once for each configuration and set of transitions (lazy determinisation).
 
 SCXML 1.0, appendix D: microstep, computeExitSet, exitStates, enterStates.
 """
@@ -26,7 +26,7 @@ _AnyAction = TypeVar("_AnyAction", bound=Action)
 def reaction_of(
     configuration: Configuration, edges: tuple[TransitionEdge, ...], keeps: tuple[str, ...] = ()
 ) -> CompiledReaction:
-    """The reaction of a configuration in which these transitions are taken."""
+    """Return the reaction of a configuration when these transitions are taken."""
     found: CompiledReaction | None = configuration.reactions.get((edges, keeps))
     if found is None:
         found = configuration.reactions[edges, keeps] = _Work(configuration).taking(edges, keeps)
@@ -34,7 +34,7 @@ def reaction_of(
 
 
 def initial_reaction(compiled: CompiledPlot) -> CompiledReaction:
-    """How a plot is entered."""
+    """Return the reaction that enters a plot by default."""
     found: CompiledReaction | None = compiled.cache.get(None)
     if found is None:
         found = _Work(configuration_of(compiled, ())).entering()
@@ -43,7 +43,7 @@ def initial_reaction(compiled: CompiledPlot) -> CompiledReaction:
 
 
 def leaving_reaction(configuration: Configuration) -> CompiledReaction:
-    """How a plot is left because the state around it is, or because the run ends: all its states are interrupted."""
+    """Return the reaction that exits all states of a plot, as interrupted: its host was exited or the run ends."""
     found: CompiledReaction | None = configuration.reactions.get(None)
     if found is None:
         found = configuration.reactions[None] = _Work(configuration).leaving()
@@ -52,7 +52,7 @@ def leaving_reaction(configuration: Configuration) -> CompiledReaction:
 
 @dataclass(slots=True)
 class _Work:
-    """The configuration as it changes on the way."""
+    """Working copy of a configuration that changes during a microstep."""
 
     configuration: Configuration
     present: set[int] = field(init=False)
@@ -111,7 +111,7 @@ class _Work:
         )  # fmt: skip
 
     def _exits(self, left: set[int], own: set[int]) -> tuple[Exit, ...]:
-        """Inner before outer, later before earlier; all but those in `own` are interrupted."""
+        """Order exits inner before outer, later before earlier; nodes outside `own` are interrupted."""
         ordered = sorted(left, reverse=True)
         for index in ordered:
             self._remember(index)
@@ -126,7 +126,7 @@ class _Work:
         return tuple(exits)
 
     def _remember(self, index: int) -> None:
-        """Record what is active inside a node that is about to be left, for its histories (SCXML 3.10)."""
+        """Record the active nodes inside a node before its exit, for its histories (SCXML 3.10)."""
         nodes, configuration = self.compiled.nodes, self.configuration
         for history in nodes[index].histories:
             state = nodes[history].state
@@ -155,7 +155,7 @@ class _Work:
         return tuple(entrances)
 
     def _settled(self, actions: Iterable[_AnyAction]) -> Iterator[_AnyAction]:
-        """The actions; what they ask about active states is answered as of now."""
+        """Replace each `in-state` question in the actions by its present answer."""
         for action in actions:
             if isinstance(action, Choose):
                 yield self._settled_choose(action)  # type: ignore[misc]  # a Choose for a Choose
@@ -173,7 +173,7 @@ class _Work:
         return self.compiled.index.get(state) in self.present
 
     def _completed(self, node: StateNode) -> Iterator[int]:
-        """The nodes whose content is complete now that this one is entered, if anybody wants to know."""
+        """Yield the nodes whose content is complete after this entry, if a transition or a parent depends on it."""
         nodes, scxml = self.compiled.nodes, self.compiled.scxml
         return (one for one in self._around_complete(node) if not one or scxml or DONE in nodes[one].edges)
 
@@ -190,12 +190,12 @@ class _Work:
         ends = around.index > 0 and (region is around or region.transparent)
         while ends and all(map(self._is_finished, nodes[region.parent].children)):
             yield region.parent
-            # A parallel whose children are all in final states is itself in one (SCXML 3.4).
+            # A parallel state is complete when all its children are in final states (SCXML 3.4).
             region = nodes[nodes[region.parent].parent]
             ends = region.transparent
 
     def _is_finished(self, region: int) -> bool:
-        """Whether a final state is reached there; a transparent region is as finished as the state it stands for.
+        """Return whether a final state is active in the region; a transparent region delegates to its only state.
 
         SCXML appendix D: isInFinalState.
         """

@@ -1,4 +1,4 @@
-"""What is entered on the way to targets, as a pure function of the tables and of what histories remember.
+"""Entry set of target states, as a pure function of the tables and of the remembered histories.
 
 SCXML 1.0, appendix D: computeEntrySet, addDescendantStatesToEnter, addAncestorStatesToEnter.
 """
@@ -12,16 +12,16 @@ from dsc.engine.tables import CompiledPlot
 from dsc.model.actions import Internal
 
 Remembered = Mapping[int, tuple[int, ...]]
-"""History node -> the nodes that were active when the node around it was last left."""
+"""History node -> the nodes that were active when the node around it was last exited."""
 
 
 @dataclass(slots=True)
 class Entry:
-    """What will be entered.
+    """The nodes to enter.
 
     Attributes:
-        nodes: indices; in document order they are the order of entry.
-        after: internal actions that follow the entry of a node: those of a history's default (appendix D).
+        nodes: indices; document order is the order of entry.
+        after: internal actions that follow the entry of a node: the effect of a history's default (appendix D).
     """
 
     nodes: set[int] = field(default_factory=set)
@@ -29,20 +29,20 @@ class Entry:
 
 
 def entry_set(compiled: CompiledPlot, domain: int, targets: tuple[int, ...], remembered: Remembered) -> Entry:
-    """Everything to enter inside `domain` to reach all targets."""
+    """Return all nodes to enter inside `domain` to reach all targets."""
     work = _Work(compiled, remembered)
     reached = [real for target in targets for real in work.resolved(target)]
     for target in reached:
         work.way(domain, target)
     for target in reached:
         work.inside(target)
-    for index in sorted(work.entry.nodes):  # what a default brings has its regions already
+    for index in sorted(work.entry.nodes):  # the content of a default already includes its regions
         work.regions(index)
     return work.entry
 
 
 def effective_targets(compiled: CompiledPlot, targets: Iterable[int], remembered: Remembered) -> list[int]:
-    """The targets with histories replaced by what they stand for (getEffectiveTargetStates)."""
+    """Replace each history by the nodes it remembers, or by its default (getEffectiveTargetStates)."""
     if not compiled.defaults:
         return list(targets)
     work = _Work(compiled, remembered)
@@ -56,7 +56,7 @@ class _Work:
         self.entry = Entry()
 
     def resolved(self, target: int) -> list[int]:
-        """What a target stands for; other histories in a history's default are looked up too."""
+        """Return the nodes that a target leads to; a history's default may name further histories."""
         default = self._compiled.defaults.get(target)
         if default is None:
             return [target]
@@ -69,7 +69,7 @@ class _Work:
         self.entry.nodes.update(self._compiled.way(around, index))
 
     def inside(self, index: int) -> None:
-        """The default content of a target, unless another target is inside it."""
+        """Add the default content of a target, unless another target is inside it."""
         node = self._compiled.nodes[index]
         if node.orthogonal or any(child in self.entry.nodes for child in node.children):
             return
@@ -83,7 +83,7 @@ class _Work:
                 self.regions(inner)
 
     def regions(self, index: int) -> None:
-        """The regions of an orthogonal state that no target has reached."""
+        """Add the regions of an orthogonal state that no target has reached."""
         node = self._compiled.nodes[index]
         if node.orthogonal:
             for child in node.children:

@@ -1,4 +1,4 @@
-"""From actions to values: arguments worked out, external actions as output."""
+"""Evaluation of terms, plot arguments and the arguments of external actions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from knowledge_base.language.expression import Constant, Term, Variable
 
 
 def evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> Any:
-    """What a term stands for; a lone variable may hold anything, e.g. a plot.
+    """Return the value of a term; a variable may hold a value of any type, such as a plot.
 
     Raises:
         InputError: a variable is not bound, or the term is not a number where one is needed.
@@ -33,7 +33,7 @@ def evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> A
 
 
 def delay_of(seconds: Any, least: float = 0) -> float:
-    """Seconds of a timer; raises `InputError` if the value is no duration, or shorter than `least`."""
+    """Return the seconds of a timer; raise `InputError` if the value is not a duration or is below `least`."""
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not least <= seconds < math.inf:
         bound = f" of at least {least:g}" if least else ""
         raise InputError(f"a timer needs a number of seconds{bound}; found {seconds!r}")
@@ -41,7 +41,7 @@ def delay_of(seconds: Any, least: float = 0) -> float:
 
 
 def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: Situation) -> Mapping[str, Any]:
-    """The variables of a new instance: arguments, defaults, and initial values.
+    """Return the variables of a new instance: arguments, defaults and initial values.
 
     Raises:
         InputError: a parameter is missing or out of its range, or an argument is not a parameter.
@@ -66,7 +66,7 @@ def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: S
 
 
 def output_of(action: ExternalAction, activation: int, number: int, value: Callable[[Term], Any]) -> Output:
-    """An external action with its arguments worked out."""
+    """Return an external action with the values of its arguments."""
     if isinstance(action, Trigger):
         component, skill = action.trigger.split(".")
         arguments = {name: value(term) for name, term in action.arguments.items()}

@@ -1,4 +1,4 @@
-"""Reactions carried out: plots' states are left and entered, plots bound and unbound (SCXML appendix D)."""
+"""Execution of reactions: exit and enter states, bind and unbind plots (SCXML appendix D)."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Variable
 
 MAX_NESTING = 40
-"""Plots inside plots; deeper than that, a plot contains itself without end."""
+"""Upper bound of plots inside plots; a deeper chart nests a plot in itself without end."""
 
 
 class Execution(Performer):
-    """Changes running plots as reactions say.
+    """Changes running plots according to reactions.
 
     Attributes:
-        chart: where plots are found.
+        chart: provider of plots.
         finished: whether the outermost plot has reached its final state.
     """
 
@@ -40,17 +40,17 @@ class Execution(Performer):
         self.finished = False
 
     def enter_plot(self, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> Frame:
-        """A plot as the outermost one; raises `InputError` if the arguments do not fit."""
+        """Enter a plot as the outermost one; raise `InputError` if the arguments do not fit."""
         frame = self._new_frame(compiled, arguments)
         self._enter_initial(frame)
         return frame
 
     def leave_plot(self, frame: Frame) -> None:
-        """Leave all states of a plot and of the plots inside."""
+        """Exit all states of a plot and of the plots inside."""
         self.exit(frame, leaving_reaction(frame.configuration).exits)
 
     def take(self, frame: Frame, reaction: CompiledReaction) -> None:
-        """Leave, act and enter as a reaction of one plot says."""
+        """Exit states, execute actions and enter states for a reaction of one plot."""
         if reaction.exits:
             self.exit(frame, reaction.exits)
         frame.configuration = reaction.following
@@ -59,7 +59,7 @@ class Execution(Performer):
     def take_together(
         self, reactions: Mapping[Frame, CompiledReaction], parts: Sequence[tuple[Frame, ReactionPart]]
     ) -> None:
-        """The same for several plots at once; `parts` are those of all of them, in the order in which they act."""
+        """Take reactions of several plots together; `parts` lists the parts of all, in execution order."""
         leaving = [(frame, one) for frame, reaction in reactions.items() for one in reaction.exits]
         for frame, one in sorted(leaving, key=lambda at: at[0].position(at[1].node.index), reverse=True):
             self.exit(frame, (one,))
@@ -68,14 +68,14 @@ class Execution(Performer):
         self._act_and_enter(parts)
 
     def _act_and_enter(self, parts: Sequence[tuple[Frame, ReactionPart]]) -> None:
-        """All transitions act before anything is entered."""
+        """Execute the actions of all transitions before any entry."""
         passed = [self._act(frame, part) if part.acts else NOTHING for frame, part in parts]
         for (frame, part), arguments in zip(parts, passed, strict=True):
             self._enter_part(frame, part, arguments)
 
     def _act(self, frame: Frame, part: ReactionPart) -> Mapping[str, Any]:
-        """The internal actions of a transition; returns what it passes to its target."""
-        assert part.edge is not None  # noqa: S101  # what has no transition does not act
+        """Execute the internal actions of a transition; return the arguments for its target."""
+        assert part.edge is not None  # noqa: S101  # only a part with a transition has actions
         source = frame.compiled.nodes[part.edge.source].name
         self.act(frame, source, part.effect)
         try:
@@ -87,7 +87,7 @@ class Execution(Performer):
     # -- leaving -----------------------------------------------------------------------------------------
 
     def exit(self, frame: Frame, exits: Iterable[Exit]) -> None:
-        """Leave nodes in this order; what runs inside one is left just before it."""
+        """Exit nodes in this order; a plot inside a node is exited just before the node."""
         for one in exits:
             node, name = one.node, one.node.name
             if node.holds_plot:
@@ -100,7 +100,7 @@ class Execution(Performer):
                 self.act(frame, name, one.actions)
 
     def _empty(self, frame: Frame, host: str) -> None:
-        """Leave what runs inside a state; where that is no more than leaving, nothing has to be thawed for it."""
+        """Exit the plots inside a state; a plot without exit actions is not thawed."""
         resting = frame.resting.get(host)
         if resting is not None and not resting.children:
             reaction = leaving_reaction(resting.configuration)

@@ -1,4 +1,4 @@
-"""Running plots while a step works on them: the mutable counterpart of `FrameState`."""
+"""Frames: running plots during a step, as the mutable counterpart of `FrameState`."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from dsc.events import Event
 
 
 class Frame:
-    """One running plot; see `FrameState`. Mappings are replaced, not changed: the state keeps the old ones.
+    """One running plot; see `FrameState`. Its mappings are replaced, never changed, because the state shares them.
 
     Attributes:
-        children: the plots inside that this step has to do with, by the name of the state that holds each.
-        resting: the other plots inside, as they were.
-        parent, host: the frame around it and the name of the state there that holds it.
-        prefix: what its states' paths begin with.
-        depth: how many plots it is inside of.
-        gone: whether the state that holds it was left.
+        children: the plots inside that this step uses, by the name of their host state.
+        resting: the other plots inside, unchanged and frozen.
+        parent, host: the frame around it, and the name of the state there that holds it.
+        prefix: the beginning of its states' paths.
+        depth: the number of plots around it.
+        gone: whether its host state was exited.
     """
 
     __slots__ = (
@@ -47,24 +47,24 @@ class Frame:
         self.was: FrameState | None = None
 
     def put_into(self, parent: Frame, host: str) -> None:
-        """Make it the content of a state of another frame."""
+        """Put this frame into a state of another frame."""
         self.parent, self.host = parent, host
         self.prefix = f"{parent.prefix}{host}/"
         self.depth = parent.depth + 1
         parent.children[host] = self
 
     def take_out(self) -> None:
-        """Its state was left."""
+        """Remove this frame after the exit of its host state."""
         self.gone = True
         if self.parent is not None:
             del self.parent.children[self.host]
 
     def forget(self, host: str) -> None:
-        """A plot inside at rest was left, without this step having to do anything in it."""
+        """Drop an idle plot inside; this step executed nothing in it."""
         self.resting = {name: state for name, state in self.resting.items() if name != host}
 
     def child(self, host: str) -> Frame | None:
-        """The plot inside that state, if there is one."""
+        """Return the plot inside that state, or `None`."""
         found = self.children.get(host)
         if found is None and host in self.resting:
             found = thaw(self.resting[host], self, host)
@@ -72,7 +72,7 @@ class Frame:
         return found
 
     def inner(self) -> list[Frame]:
-        """The frames directly inside, in document order."""
+        """Return the frames directly inside, in document order."""
         for host in self.resting:
             self.child(host)
         found = list(self.children.values())
@@ -81,17 +81,17 @@ class Frame:
         return found
 
     def frames(self) -> list[Frame]:
-        """This frame and all inside it, in document order."""
+        """Return this frame and all frames inside it, in document order."""
         return [self, *(frame for child in self.inner() for frame in child.frames())]
 
     def position(self, index: int) -> tuple[int, ...]:
-        """Its place in document order through all plots: what is inside comes after, with a longer tuple."""
+        """Return a node's position in document order through all plots; nodes of inner plots have longer tuples."""
         if self.parent is None:
             return (index,)
         return (*self.parent.position(self.parent.compiled.index[self.host]), index)
 
     def that(self, wanted: Callable[[Frame | FrameState], bool]) -> list[Frame]:
-        """This frame and those inside it, as far as they are wanted; only these are thawed."""
+        """Return this frame and those inside it that satisfy `wanted`; thaw only these."""
         found = [self] if wanted(self) else []
         if self.children:
             for child in self.children.values():
@@ -104,7 +104,7 @@ class Frame:
 
 
 def thaw(state: FrameState, parent: Frame | None = None, host: str = "") -> Frame:
-    """A frame to work on; what runs inside it stays at rest until it is asked for."""
+    """Return a mutable frame; its inner plots stay frozen until they are used."""
     frame = Frame(state.serial, state.compiled, state.configuration, state.variables)
     if parent is not None:
         frame.put_into(parent, host)
@@ -116,7 +116,7 @@ def thaw(state: FrameState, parent: Frame | None = None, host: str = "") -> Fram
 
 
 def freeze(frame: Frame) -> FrameState:
-    """The frame as a value: the very one it was made from, if nothing has changed."""
+    """Return the frame as a value: the original object if nothing has changed."""
     children = _frozen(frame) if frame.children else frame.resting
     was = frame.was
     if (
@@ -134,7 +134,7 @@ def freeze(frame: Frame) -> FrameState:
 
 
 def _frozen(frame: Frame) -> Mapping[str, FrameState]:
-    """The plots inside, in document order."""
+    """Return the plots inside, in document order."""
     children = {**frame.resting, **{host: freeze(child) for host, child in frame.children.items()}}
     if len(children) > 1:
         index = frame.compiled.index

@@ -1,4 +1,4 @@
-"""Machine holds a state and applies the step function to it."""
+"""Machine: holds a state and applies the step function to it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from dsc.events import Event
 from knowledge_base.errors import InputError
 
 _new = tuple.__new__
-"""Makes named tuples; their constructors take as long again, to put keywords and defaults into their places."""
+"""Creates named tuples directly; their constructors take twice as long, to handle keywords and defaults."""
 
 
 def move(state: MachineState, root: FrameState, event: Event, situation: Situation) -> Step | None:
-    """The step, if it is known and as short as that; `None` says that it has to be worked out."""
+    """Return a kept step or a step that changes only the configuration; `None` requires a full macrostep."""
     before = root.configuration
     known: Step | None = before.steps.get(event.name)
     if known is not None and known.event is event and before.bare is state:
@@ -51,7 +51,7 @@ def _answered(question: Question, root: FrameState, event: Event, situation: Sit
     while isinstance(choice, Question):
         try:
             choice = choice.follow(situation.holds(choice.condition, bindings))
-        except InputError:  # to be reported by the full macrostep, which asks again
+        except InputError:  # the full macrostep evaluates the guard again and reports the error
             return None
     return choice
 
@@ -60,15 +60,15 @@ def start(chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situ
     """Enter the plot and run to completion.
 
     Args:
-        chart: where plots are found.
+        chart: provider of plots.
         plot: its name.
         arguments: values for its parameters.
         situation: the world.
-        serials: the last serial number that was given out before, so that no action id is used twice.
+        serials: the last serial number used before, so that no action id is used twice.
 
     Raises:
         InputError: the plot is unknown, or a parameter is missing or unknown.
-        RunawayError: the chart does not come to rest.
+        RunawayError: the macrostep does not end.
     """
     macrostep = Macrostep(chart, situation, MachineState(serials=serials))
     macrostep.start(plot, arguments)
@@ -78,10 +78,10 @@ def start(chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situ
 def step(chart: Chart, state: MachineState, event: Event | None, situation: Situation) -> Step:
     """React to one event and run to completion: a pure function of its arguments.
 
-    With `event=None` only transitions without trigger are looked at: the world may have changed.
+    With `event=None` only transitions without trigger are considered, because the world may have changed.
 
     Raises:
-        RunawayError: the chart does not come to rest.
+        RunawayError: the macrostep does not end.
     """
     if state.root is None:
         return Step(state, event, handled=False)
@@ -95,7 +95,7 @@ def step(chart: Chart, state: MachineState, event: Event | None, situation: Situ
 
 
 def leave(chart: Chart, state: MachineState, situation: Situation) -> Step:
-    """Leave all active states without reaching the end: their exit actions put the skills at rest (S0.15)."""
+    """Exit all active states before the end of the plot; their exit actions stop the skills (S0.15)."""
     if state.root is None:
         return Step(state, None, handled=False)
     macrostep = Macrostep(chart, situation, state)
@@ -105,10 +105,10 @@ def leave(chart: Chart, state: MachineState, situation: Situation) -> Step:
 
 @dataclass(slots=True)
 class Machine:
-    """Holds the state of one running chart; everything else is in `step`.
+    """Holds the state of one running chart; `step` does the rest.
 
     Attributes:
-        chart: where plots are found.
+        chart: provider of plots.
         state: the state after the last step.
     """
 
@@ -116,7 +116,7 @@ class Machine:
     state: MachineState = field(default_factory=MachineState)
 
     def start(self, plot: str, arguments: Mapping[str, Any], situation: Situation) -> Step:
-        """See `start`; serial numbers go on from those of the state."""
+        """See `start`; serial numbers continue those of the state."""
         done = start(self.chart, plot, arguments, situation, self.state.serials)
         self.state = done.state
         return done

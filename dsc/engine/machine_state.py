@@ -1,4 +1,4 @@
-"""The machine's state as a value that goes to JSON and back exactly."""
+"""Machine state: an immutable value with an exact JSON form."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class _EventForm(_Form):
 class _FrameForm(_Form):
     serial: int
     plot: str
-    form: Any  # of a plot that was made; `None` for one of the chart's
+    form: Any  # the text of a plot that was bound as data; `None` for a plot of the chart
     active: list[str]
     waiting: list[str]
     history: dict[str, list[str]]
@@ -52,14 +52,14 @@ _F = TypeVar("_F", bound=_Form)
 
 
 class FrameState(NamedTuple):
-    """One running plot; a named tuple, since steps make many and a frozen dataclass takes four times as long.
+    """One running plot. Steps make many of them: a frozen dataclass takes four times as long as a named tuple.
 
     Attributes:
         serial: number of this instance, never used again in the same run.
         compiled: the plot.
         configuration: its active states.
         variables: parameters, variables and outputs with their values.
-        activations: serial numbers of the states that somebody may send events to, by name.
+        activations: serial numbers of the states that receive addressed events, by name.
         children: plots inside active submachine and dynamic states, by the state's name.
         kept: events that wait until a state's least time has passed, with its name.
     """
@@ -74,17 +74,17 @@ class FrameState(NamedTuple):
 
     @property
     def active(self) -> Mapping[str, int]:
-        """The active states by name, in document order, with their serial numbers; 0 where nobody needs one."""
+        """Serial numbers of the active states by name, in document order; 0 for states without addressed events."""
         return {name: self.activations.get(name, 0) for name in self.configuration.names}
 
     def frames(self) -> Iterator[FrameState]:
-        """This plot and all inside it."""
+        """Yield this plot and all plots inside it."""
         yield self
         for child in self.children.values():
             yield from child.frames()
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return the frame as plain data."""
         return {
             "serial": self.serial,
             "plot": self.compiled.plot.name,
@@ -97,17 +97,17 @@ class FrameState(NamedTuple):
         }
 
     def kept_form(self) -> list[list[Any]]:
-        """The events that wait, as plain data."""
+        """Return the waiting events as plain data."""
         return [[name, {**event._asdict(), "attributes": dict(event.attributes)}] for name, event in self.kept]
 
     @staticmethod
     def from_json(data: Mapping[str, Any], chart: Chart) -> FrameState:
-        """The inverse of `to_json`; errors as for `MachineState.from_json`."""
+        """Return the frame of such data, the inverse of `to_json`; errors as for `MachineState.from_json`."""
         return _frame_of(_read(_FrameForm, data), chart)
 
 
 class _Index:
-    """The node of that name; regions, which have none, are stored by their place."""
+    """Maps a name to its node; regions have no name and are stored by their place."""
 
     def __init__(self, compiled: CompiledPlot) -> None:
         self._plot = compiled.plot.name
@@ -123,7 +123,7 @@ class _Index:
 
 
 class MachineState(NamedTuple):
-    """Everything a machine has to remember between two events.
+    """The complete state of a machine between two events.
 
     Attributes:
         root: the outermost plot; `None` before the start and after the end.
@@ -136,34 +136,34 @@ class MachineState(NamedTuple):
     finished: bool = False
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return the state as plain data."""
         root = self.root.to_json() if self.root else None
         return {"root": root, "serials": self.serials, "finished": self.finished}
 
     @staticmethod
     def from_json(data: Mapping[str, Any], chart: Chart) -> MachineState:
-        """The inverse of `to_json`, with the plots of a chart.
+        """Return the state of such data with the plots of a chart, the inverse of `to_json`.
 
         Raises:
             ParseError: the data do not have that form.
-            InputError: a plot that was made is none.
+            InputError: the data of a bound plot are not a plot.
             UnknownNameError: the chart lacks one of the plots, or a plot one of the states.
         """
         form = _read(_MachineForm, data)
         return MachineState(None if form.root is None else _frame_of(form.root, chart), form.serials, form.finished)
 
     def configuration(self) -> tuple[str, ...]:
-        """Paths of all active states, outermost first."""
+        """Return the paths of all active states, outermost first."""
         if self.root is None or not self.root.children:
             return () if self.root is None else self.root.configuration.names
         return tuple(_paths(self.root, ""))
 
     def has_activation(self, serial: int) -> bool:
-        """Whether the state that was entered with this serial number is still active."""
+        """Return whether the state that was entered with this serial number is still active."""
         return self.root is not None and any(serial in one.activations.values() for one in self.root.frames())
 
     def activations_inside(self, serial: int) -> frozenset[int]:
-        """The serial numbers of everything active inside that activation's content, and its own."""
+        """Return the serial numbers of that activation and of all activations inside it."""
         for frame in self.root.frames() if self.root else ():
             for name, own in frame.activations.items():
                 if own == serial:
@@ -172,12 +172,12 @@ class MachineState(NamedTuple):
         return frozenset()
 
     def is_active(self, state: str) -> bool:
-        """Whether a state of that name or path is active."""
+        """Return whether a state of that name or path is active."""
         return any(path == state or path.endswith("/" + state) for path in self.configuration())
 
 
 def at_rest(root: FrameState, serials: int) -> MachineState:
-    """The state of a machine that waits for events; one and the same wherever a configuration is all there is."""
+    """Return the state of a machine that waits for events; equal configurations without other data share one object."""
     frame_serial = 1  # the outermost plot has the first number
     if serials > frame_serial or root.variables or root.children:
         return MachineState(root, serials)
@@ -200,7 +200,7 @@ def _read(form: type[_F], data: object) -> _F:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         path = ".".join(map(str, first["loc"])) or "the whole"
-        raise ParseError(f"this is no state of a machine: {path}: {first['msg']}") from None
+        raise ParseError(f"this is not a state of a machine: {path}: {first['msg']}") from None
 
 
 def _frame_of(form: _FrameForm, chart: Chart) -> FrameState:

@@ -1,4 +1,4 @@
-"""One macrostep: microsteps and internal events until the chart rests (SCXML 3.13, appendix D: mainEventLoop)."""
+"""Macrostep: microsteps and internal events until no transition is enabled (SCXML 3.13, appendix D: mainEventLoop)."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.expression import Expression
 
 MAX_MICROSTEPS = 1000
-"""A macrostep that takes more is going round in circles."""
+"""Upper bound; a macrostep with more microsteps does not end."""
 
 
 class Macrostep(Execution):
-    """Works on thawed frames; `finish` freezes them into the next state.
+    """Runs on thawed frames; `finish` freezes them into the next state.
 
-    What it can do is in layers, one a file, of one object: a step has no time for several.
+    One object inherits each layer from its own module: separate objects would slow down each step.
     """
 
     __slots__ = ("_broken_guards", "_root", "_turn")
@@ -40,13 +40,13 @@ class Macrostep(Execution):
         self._turn = 0
 
     def start(self, plot: str, arguments: Mapping[str, Any]) -> None:
-        """Enter the outermost plot; raises `InputError` if there is none of that name or its arguments do not fit."""
+        """Enter the outermost plot; raise `InputError` if the plot is unknown or its arguments do not fit."""
         self._root = self.enter_plot(self.chart.compiled(plot), arguments)
         self.end_microstep(None, ())
         self._rest()
 
     def react(self, event: Event | None) -> bool:
-        """Take the event, then run to completion; returns whether anybody took the event, or keeps it."""
+        """Take the event, then run to completion; return whether a transition took the event, or a state keeps it."""
         handled = event is not None and self._take(event)
         if event is not None and event.name == EVERY:
             self._next_period(event)
@@ -54,8 +54,8 @@ class Macrostep(Execution):
         return handled
 
     def leave(self) -> None:
-        """Leave all active states of all plots."""
-        assert self._root is not None  # noqa: S101  # there is nothing to leave before the start
+        """Exit all active states of all plots."""
+        assert self._root is not None  # noqa: S101  # `start` has set it
         self.leave_plot(self._root)
         self.end_microstep(None, ())
         for event in self.internal:
@@ -64,7 +64,7 @@ class Macrostep(Execution):
         self._root = None
 
     def finish(self, event: Event | None, *, handled: bool) -> Step:
-        """The step as a value."""
+        """Return the step as a value."""
         if self.finished and self._root is not None:
             self.leave()
         root, serials = self._root, self.serials
@@ -92,7 +92,7 @@ class Macrostep(Execution):
                 self._unhandled(event)
 
     def _unhandled(self, error: Event) -> None:
-        """An error that nobody takes ends a run, but in SCXML it is an event like others (SCXML 3.12, 5.10.1)."""
+        """Record an untaken error event: it ends a DSC run; in SCXML it is an ordinary event (SCXML 3.12, 5.10.1)."""
         if error.name == EXECUTION_ERROR or any(one.compiled.scxml for one in self._that(_is_frame(error.frame))):
             self.output.append(Note(error.name, _reason(error)))
         else:
@@ -101,9 +101,9 @@ class Macrostep(Execution):
     # -- one event ---------------------------------------------------------------------------------------
 
     def _take(self, event: Event) -> bool:
-        """One microstep, if anybody listens to the event and can take it; or somebody keeps it for later."""
+        """Run one microstep if a transition on the event is enabled, or keep the event for a waiting state."""
         self.event = event
-        if event.name not in ERRORS:  # a guard that fails for its own error would go round without end
+        if event.name not in ERRORS:  # a guard that fails for its own error event would repeat without end
             self._turn += 1
         if event.to is not None:
             return self._take_addressed(event, event.to)
@@ -130,7 +130,7 @@ class Macrostep(Execution):
         return goes_outwards(event.name) and self._take_around(frame, event)
 
     def _take_around(self, frame: Frame, event: Event) -> bool:
-        """What a plot does not take is offered to the state that holds the plot, and so on outwards."""
+        """Offer an event that a plot does not take to its host state, and so on outwards."""
         while frame.parent is not None:
             host, frame = frame.host, frame.parent
             trigger = Addressed(event.name, frame.compiled.index[host], exact=False, number=None)
@@ -139,18 +139,18 @@ class Macrostep(Execution):
         return False
 
     def _take_spontaneous(self) -> bool:
-        """One microstep, if a change of the world enables any transition."""
+        """Run one microstep if a transition without trigger is enabled."""
         concerned = self._that(_is_spontaneous)
         if len(concerned) == 1:
             return self._take_alone(concerned[0], None, None)
         return bool(concerned) and self._take_together(None, None)
 
     def _that(self, wanted: Callable[[Frame | FrameState], bool]) -> list[Frame]:
-        assert self._root is not None  # noqa: S101  # `step` answers for a machine that has ended
+        assert self._root is not None  # noqa: S101  # `step` returns early for an ended machine
         return self._root.that(wanted)
 
     def _find(self, activation: int) -> tuple[Frame, str] | None:
-        """The frame and state that were given this number, if they are still active."""
+        """Return the frame and state of this serial number, if they are still active."""
         for frame in self._that(lambda one: activation in one.activations.values()):
             return frame, next(state for state, serial in frame.activations.items() if serial == activation)
         return None
@@ -170,7 +170,7 @@ class Macrostep(Execution):
         return True
 
     def _take_together(self, trigger: Trigger, event: Event | None) -> bool:
-        """Several plots listen: what is enabled in one may preempt what is enabled in another (SCXML 3.13)."""
+        """Select transitions across several plots: one in an inner plot may preempt one outside (SCXML 3.13)."""
         assert self._root is not None  # noqa: S101
         taken, late = select(self._root, trigger, self._guard)
         kept = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
@@ -203,8 +203,8 @@ class Macrostep(Execution):
         try:
             return self.holds(frame, condition)
         except InputError as error:
-            # Once in a macrostep: a guard without trigger is looked at again after every microstep. In SCXML one with
-            # a trigger fails for each event (SCXML 5.9.1).
+            # A guard's error is reported once in a macrostep: guards without trigger are evaluated after every
+            # microstep. In SCXML a guard with a trigger fails for each event (SCXML 5.9.1).
             each = frame.compiled.scxml and edge.place[0] == "on"
             broken = (frame.serial, edge, self._turn if each else 0)
             if broken not in self._broken_guards:
@@ -216,14 +216,14 @@ class Macrostep(Execution):
     # -- time --------------------------------------------------------------------------------------------
 
     def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> bool:
-        """An event that a state would take if it could be left already waits with it; a period comes again."""
+        """Keep an event that a waiting state would take; drop duplicates, and restart a period."""
         if event is None or event.name == EVERY:
             return False
         frame.kept = (*frame.kept, *((state, event) for state in states))
         return True
 
     def _least_time_passed(self, frame: Frame, state: str) -> bool:
-        """The state can be left from now on; what it kept is offered again, to it alone and before anything new."""
+        """Allow transitions of the state from now on; offer the kept events to it alone, before new ones."""
         before = frame.configuration
         waiting = before.waiting - {frame.compiled.index[state]}
         frame.configuration = configuration_of(frame.compiled, before.active, waiting, before.history)
@@ -254,5 +254,5 @@ def _part_of(one: Enabled, reaction: CompiledReaction) -> ReactionPart:
 
 
 def _reason(error: Event) -> str:
-    # A chart may fire `error` itself, and say nothing.
+    # A chart may fire `error` itself, without a reason.
     return str(error.attributes.get("reason", "the chart fired 'error' without a reason"))

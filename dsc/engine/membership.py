@@ -1,4 +1,4 @@
-"""`(in-state NAME)`: whether a state of the same plot is active, SCXML's `In()` (5.9.1). Only in dialect `scxml`."""
+"""`(in-state NAME)`: tests whether a state of the same plot is active, SCXML's `In()` (5.9.1). Dialect `scxml` only."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FALSE = Or(())
 
 
 def asked_states(e: Expression) -> list[str]:
-    """Names of the states whose activity the condition asks for."""
+    """Return the names of the states that the condition tests with `in-state`."""
     if isinstance(e, Atom):
         return [str(e.args[0].value)] if _asks(e) and isinstance(e.args[0], Constant) else []
     inner = [part for part in parts_of(e) if isinstance(part, Expression)]
@@ -33,7 +33,7 @@ def asked_states(e: Expression) -> list[str]:
 
 
 def settle(e: Expression, active: Callable[[str], bool]) -> Expression:
-    """The condition with every `in-state` replaced by its truth; the rest is for the knowledge base."""
+    """Replace every `in-state` in the condition by its truth value; the knowledge base evaluates the rest."""
     match e:
         case Atom(_, args) if _asks(e):
             return TRUE if isinstance(args[0], Constant) and active(str(args[0].value)) else FALSE

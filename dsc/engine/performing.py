@@ -1,4 +1,4 @@
-"""Actions carried out in a running plot: variables, knowledge, events, and what is handed to components."""
+"""Execution of actions in a running plot: variables, knowledge, events, and output to components."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from knowledge_base.language.expression import Expression
 
 Action = ExternalAction | Internal
 _EXPONENT_FROM = 1e21
-"""From here on ECMAScript writes numbers with an exponent."""
+"""ECMAScript writes larger numbers with an exponent."""
 SHORTEST_PERIOD = 0.001
-"""Seconds; a period of nothing would leave no time for anything else."""
+"""Seconds; a shorter period would block all other events."""
 
 
 class Performer(MacrostepRecord):
-    """Carries out actions.
+    """Executes actions.
 
     Attributes:
         situation: the world as the chart sees it.
-        event: the last one taken, whose attributes actions read.
+        event: the last event taken; actions read its attributes.
     """
 
     __slots__ = ("event", "situation")
@@ -41,33 +41,33 @@ class Performer(MacrostepRecord):
         self.event: Event | None = None
 
     def holds(self, frame: Frame, condition: Expression) -> bool:
-        """Whether a condition is true in a frame; raises `InputError`."""
+        """Return whether a condition is true in a frame; raise `InputError`."""
         return self.situation.holds(condition, self.bindings(frame))
 
     def value(self, frame: Frame, term: TermField) -> Any:
-        """What a term stands for in a frame; raises `InputError`."""
+        """Return the value of a term in a frame; raise `InputError`."""
         return evaluate(term, self.bindings(frame), self.situation)
 
     def values(self, frame: Frame, terms: Mapping[str, TermField]) -> dict[str, Any]:
-        """What several terms stand for; raises `InputError`."""
+        """Return the values of several terms; raise `InputError`."""
         return {name: self.value(frame, term) for name, term in terms.items()}
 
     def bindings(self, frame: Frame) -> Mapping[str, Any]:
-        """The frame's variables and the event's attributes."""
+        """Return the frame's variables and the event's attributes."""
         if self.event is None or not self.event.attributes:
             return frame.variables
         return {**frame.variables, **self.event.bindings()}
 
     def fail(self, frame: Frame, reason: str) -> None:
-        """Let the plot know that something could not be evaluated."""
+        """Fire an `error` event in the plot for a failed evaluation."""
         name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
         self.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
 
     def act(self, frame: Frame, state: str, actions: Iterable[Action], activation: int = 0, first: int = 0) -> None:
-        """Carry out a block of actions of a state, numbered from `first` within its activation.
+        """Execute a block of actions of a state, numbered from `first` within its activation.
 
-        What cannot be evaluated fires an error; the others are carried out, in dialect `scxml` only those
-        before it (SCXML 4.9). A condition of a branch that cannot be evaluated is false (SCXML 5.9.1).
+        An action that fails to evaluate fires an error. The other actions still run; in dialect `scxml` the rest of the
+        block is skipped (SCXML 4.9). A branch condition that fails to evaluate is false (SCXML 5.9.1).
         """
         for number, action in enumerate(actions, first):
             try:
@@ -82,7 +82,7 @@ class Performer(MacrostepRecord):
                     return
 
     def start_timers(self, frame: Frame, node: StateNode, activation: int) -> None:
-        """Ask for all timers of a state that was entered."""
+        """Start all timers of an entered state."""
         if node.at_least is not None:
             self.start_timer(frame, node, activation, AT_LEAST, 0, node.at_least)
         for index, timed in enumerate(node.timeouts):
@@ -93,7 +93,7 @@ class Performer(MacrostepRecord):
     def start_timer(
         self, frame: Frame, node: StateNode, activation: int, event: str, index: int, seconds: TermField
     ) -> None:
-        """Ask for one timer of a state; a delay that cannot be worked out is a failure like others."""
+        """Start one timer of a state; a delay that fails to evaluate fires an error."""
         try:
             delay = delay_of(self.value(frame, seconds), least=SHORTEST_PERIOD if event == EVERY else 0)
         except InputError as error:
@@ -147,11 +147,11 @@ class Performer(MacrostepRecord):
             self.emitted.append(Event(name, attributes))
         elif not frame.gone:
             self.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
-        # Else the host was left by another transition of this microstep: nobody waits for an outcome any more.
+        # Otherwise another transition of this microstep exited the host, and the outcome is dropped.
 
 
 def _shown(value: Any) -> str:
-    """A value as ECMAScript shows it."""
+    """Return a value as ECMAScript prints it."""
     if value is None:
         return "undefined"
     if isinstance(value, bool):

@@ -1,6 +1,6 @@
-"""What transitions taken together do to a plot: exits, actions, entries, the next configuration.
+"""Reactions: exits, actions, entries and the next configuration after a set of transitions of one plot.
 
-A submachine or dynamic state is one node here; what runs inside it has reactions of its own.
+A submachine or dynamic state is one node here; the plot inside it has separate reactions.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from dsc.model.actions import Emit, ExternalAction, Internal
 
 Action = ExternalAction | Internal
 MOST_REPORTS = 64
-"""Places kept for which a reaction is reported."""
+"""Upper bound of host paths with a kept report of a reaction."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exit:
-    """A node to be left, and what it does then.
+    """A node to exit, with its exit actions.
 
     Attributes:
-        cancels: whether it started what has to be stopped.
+        cancels: whether it started skills or timers that the exit cancels.
     """
 
     node: StateNode
@@ -31,18 +31,18 @@ class Exit:
 
     @property
     def quiet(self) -> bool:
-        """Whether the node is only left."""
+        """Whether the exit has no actions."""
         return not self.actions and not self.node.addressed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StateEntry:
-    """A node to be entered, and what it does then.
+    """A node to enter, with its entry actions.
 
     Attributes:
-        actions: those of its entry.
-        after: those of a history's default that leads to it (a block of its own, appendix D).
-        completes: indices of the nodes whose content is complete with it; 0 for the plot itself.
+        actions: its entry actions.
+        after: the effect of a history's default that leads to it, as a separate block (appendix D).
+        completes: indices of the nodes that it completes; 0 for the plot itself.
         emits: the outcome of a final state.
     """
 
@@ -54,14 +54,14 @@ class StateEntry:
 
     @property
     def quiet(self) -> bool:
-        """Whether the node is only entered."""
+        """Whether the entry has no actions or further effects."""
         acts = self.actions or self.after or self.emits
         return not acts and not self.completes and not self.node.addressed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReactionPart:
-    """What one transition contributes: its internal actions, and what is entered because of it, in order.
+    """One transition's internal actions and entries, in order.
 
     Attributes:
         acts: whether it has actions, or arguments to pass.
@@ -74,23 +74,23 @@ class ReactionPart:
 
     @property
     def quiet(self) -> bool:
-        """Whether nodes are entered and that is all."""
+        """Whether the part only enters nodes."""
         return not self.acts and all(entrance.quiet for entrance in self.entrances)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CompiledReaction:
-    """What happens in one plot.
+    """The effect of one microstep on one plot.
 
     Attributes:
-        parts: of each transition, in the order in which they are taken.
-        exits: everything that is left, in order.
+        parts: one for each transition, in the order in which they are taken.
+        exits: all exits, in order.
         following: the configuration after it.
         keeps: names of states that keep the event until their least time has passed.
-        taken, exited, entered: how it is reported for the outermost plot.
-        silent: whether nothing happens but that states are left.
-        still: whether nothing but the configuration changes.
-        reports: what was taken, for plots inside, by the path of the state that holds them.
+        taken, exited, entered: its report for the outermost plot.
+        silent: whether it only exits states.
+        still: whether it only changes the configuration.
+        reports: transitions taken, for plots inside, by the path of their host state.
     """
 
     parts: tuple[ReactionPart, ...]
@@ -105,7 +105,7 @@ class CompiledReaction:
     reports: dict[str, tuple[Taken, ...]] = field(default_factory=dict)
 
     def taken_in(self, compiled: CompiledPlot, prefix: str) -> tuple[Taken, ...]:
-        """How the transitions are reported in a plot whose states' paths begin with the prefix."""
+        """Return the report of the transitions in a plot whose states' paths begin with the prefix."""
         if not prefix:
             return self.taken
         found = self.reports.get(prefix)
@@ -117,7 +117,7 @@ class CompiledReaction:
 
 
 def report(edge: TransitionEdge, compiled: CompiledPlot, prefix: str = "") -> Taken:
-    """How a transition that is taken is reported."""
+    """Return the report of a taken transition."""
     nodes = compiled.nodes
     target = prefix + nodes[edge.targets[0]].name if edge.targets else None
     return Taken(prefix + nodes[edge.source].name, edge.trigger, target, edge.rule, compiled.plot.name, edge.place)

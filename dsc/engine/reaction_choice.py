@@ -1,4 +1,4 @@
-"""Which reaction a configuration has to a trigger, found once for every outcome of the guards on the way."""
+"""Choice of the reaction to a trigger, computed once for each combination of guard results."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from dsc.engine.transition_selection import Enabled, Trigger, edges_of, select
 from knowledge_base.language.expression import TRUE, Expression
 
 MOST_QUESTIONS = 1024
-"""Kept for one configuration: n guards that are asked in every case have 2**n outcomes."""
+"""Upper bound for one configuration: n independent guards have 2**n outcomes."""
 
 
 @dataclass(slots=True, eq=False)
 class Question:
-    """A guard that has to be asked before more can be said; its answer leads on.
+    """A guard to evaluate next; each result leads to another question or to a reaction.
 
     Attributes:
-        edge: the transition that is guarded.
-        condition: its guard; what it asks about active states is answered.
+        edge: the guarded transition.
+        condition: its guard, with `in-state` questions already answered.
     """
 
     configuration: Configuration
@@ -35,8 +35,8 @@ class Question:
     answers: Mapping[TransitionEdge, bool]
     _branches: dict[bool, Choice] = field(default_factory=dict)
 
-    def follow(self, answer: bool) -> Choice:  # noqa: FBT001  # a truth value is what the question asks for
-        """What is known after the answer."""
+    def follow(self, answer: bool) -> Choice:  # noqa: FBT001  # the guard's truth value
+        """Return the reaction or the next question after this result."""
         found = self._branches.get(answer)
         if found is None:
             answers = {**self.answers, self.edge: answer}
@@ -45,13 +45,13 @@ class Question:
 
 
 Choice = CompiledReaction | Question
-"""What is known about a trigger: what happens, or what to ask next."""
+"""The reaction to a trigger, or the guard to evaluate next."""
 
 _UNKNOWN = object()
 
 
 def choice_of(configuration: Configuration, trigger: Trigger) -> Choice | None:
-    """What is known about a trigger in a configuration; `None` if no active state listens to it."""
+    """Return the reaction to a trigger or the first question; `None` if no active state has a transition on it."""
     found = configuration.choices.get(trigger, _UNKNOWN)
     if found is _UNKNOWN:
         if len(configuration.choices) >= MOST_TRIGGERS:
@@ -67,11 +67,11 @@ def _first_choice(configuration: Configuration, trigger: Trigger) -> Choice | No
 
 
 def settled(guard: Expression, configuration: Configuration) -> Expression:
-    """A guard of the configuration's plot; what it asks about active states is answered."""
+    """Return a guard of the configuration's plot with its `in-state` questions answered."""
     return settle(guard, configuration.is_active) if configuration.compiled.scxml else guard
 
 
-class _Open(Exception):  # noqa: N818  # no error: the search stops at a question
+class _Open(Exception):  # noqa: N818  # control flow: the search stops at a question
     def __init__(self, edge: TransitionEdge, condition: Expression) -> None:
         super().__init__()
         self.edge = edge

@@ -1,4 +1,4 @@
-"""What a macrostep has done so far."""
+"""Record of a macrostep in progress."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from dsc.events import Event
 
 
 class MacrostepRecord:
-    """Collects what will be the step.
+    """Collects the contents of the step.
 
     Attributes:
         serials: the last serial number given out.
-        internal: events that the chart has still to take.
-        outputs: what the outermost plot hands back, once it has reached its end.
-        exited, entered, bound: of the microstep that is going on.
+        internal: pending internal events.
+        outputs: values that the outermost plot returns, once it has reached its end.
+        exited, entered, bound: changes of the current microstep.
     """
 
     __slots__ = (
@@ -41,12 +41,12 @@ class MacrostepRecord:
         self.bound: list[PlotBound] = []
 
     def next_serial(self) -> int:
-        """A number never given out before in this run."""
+        """Return a number never given out before in this run."""
         self.serials += 1
         return self.serials
 
     def end_microstep(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
-        """What was left, entered and bound since the last one becomes a microstep."""
+        """Close a microstep: the exits, entries and bindings since the last one."""
         bound = tuple(self.bound)
         self.microsteps.append(Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))
         self.exited, self.entered, self.bound = [], [], []

@@ -1,4 +1,4 @@
-"""What the engine asks the world: the one window through which a macrostep sees knowledge and candidates."""
+"""Situation: the engine's only interface to knowledge and candidates."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Bindings = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Why one candidate was, or was not, chosen.
+    """The judgement of one candidate, with its reason.
 
     Attributes:
         plot: the candidate.
@@ -34,14 +34,14 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """The decision record of one entry into a dynamic state (S0.4): what was chosen, and why.
+    """The decision record of one entry into a dynamic state (S0.4): the chosen plot and the reasons.
 
     Attributes:
         chosen: the plot to be bound; `None` if none fits.
         arguments: values for its parameters.
-        satisfied: the state's goal holds already, so nothing is bound and the state is done.
+        satisfied: the state's goal holds already; nothing is bound and the state is done.
         verdicts: one for each candidate, in the order of preference.
-        version: version of the knowledge it was taken on.
+        version: version of the knowledge at the decision.
     """
 
     chosen: str | None
@@ -52,24 +52,24 @@ class Decision:
 
 
 class Situation(Protocol):
-    """The knowledge at one version plus what this macrostep itself told.
+    """The knowledge at one version plus the changes of this macrostep.
 
-    Deterministic: equal calls in an equal order give equal answers. Made anew for every macrostep.
-    Every method raises `InputError` for a name that is unknown or unbound.
+    Deterministic: equal calls in an equal order give equal answers. Each macrostep gets a new one. Every method raises
+    `InputError` for an unknown or unbound name.
     """
 
     def holds(self, expression: Expression, bindings: Bindings) -> bool:
-        """Whether the condition is true."""
+        """Return whether the condition is true."""
         ...
 
     def value(self, term: Term, bindings: Bindings) -> Any:
-        """What the term stands for."""
+        """Return the value of the term."""
         ...
 
     def tell(self, effect: Effect, bindings: Bindings) -> Delta:
-        """The change the effect makes here; visible to the following calls, committed by the caller."""
+        """Return the change of the effect in this world; later calls see it, the caller commits it."""
         ...
 
     def choose(self, state: DynamicState, holder: str, bindings: Bindings) -> Decision:
-        """The content of a dynamic state that stands in the plot named `holder`."""
+        """Choose the content of a dynamic state of the plot named `holder`."""
         ...

@@ -1,4 +1,4 @@
-"""What a step is and what it hands out: values only, so that tests, trace and replay read one record."""
+"""Steps and their outputs: values only, so that tests, trace and replay read one record."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from knowledge_base.facts import Delta
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Start a skill for an activation; `action_id` names this execution for ever."""
+    """Start a skill for an activation; `action_id` identifies this execution permanently."""
 
     action_id: str
     activation: int
@@ -28,7 +28,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Cancel:
-    """The state was left: skills it started that still run have to stop, and its timers with them."""
+    """Stop the running skills and the timers of a state that was exited."""
 
     activation: int
 
@@ -61,9 +61,9 @@ class SendMessage:
 
 @dataclass(frozen=True, slots=True)
 class StartTimer:
-    """Send the activation the event, for its timeout or period number `index`, after `seconds`.
+    """Send the activation an event after `seconds`, for its timeout or period number `index`.
 
-    It is dropped if the state was left by then.
+    The event is dropped if the state was exited before.
     """
 
     activation: int
@@ -74,7 +74,7 @@ class StartTimer:
 
 @dataclass(frozen=True, slots=True)
 class SendLater:
-    """Hand the event in from outside after `seconds`; it is dropped if its plot is gone by then (SCXML 6.2)."""
+    """Send an event from outside after `seconds`; it is dropped if its plot has ended before (SCXML 6.2)."""
 
     event: Event
     seconds: float
@@ -83,7 +83,7 @@ class SendLater:
 
 @dataclass(frozen=True, slots=True)
 class Revoke:
-    """Do not hand in the events of that id that are still to come for the plot instance `frame` (SCXML 6.3)."""
+    """Drop the pending events of that id for the plot instance `frame` (SCXML 6.3)."""
 
     frame: int
     id: str
@@ -91,14 +91,14 @@ class Revoke:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Something to be written into the trace: a log (SCXML 4.7), or an error event of an SCXML chart not taken."""
+    """An entry for the trace: a log (SCXML 4.7), or an error event that an SCXML chart did not take."""
 
     label: str
     text: str
 
 
 Output = Start | Cancel | SetParameter | SwitchMode | SendMessage | StartTimer | SendLater | Revoke | Note
-"""What leaves the machine, in order."""
+"""The machine's output, in order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ class Taken:
         trigger: the event, `after` or `always`.
         rule: label of the contingency rule it comes from.
         plot: name of the plot that has it.
-        place: where it stands in its source state, e.g. `("on", "grasped", 0)`.
+        place: its place in its source state, e.g. `("on", "grasped", 0)`.
     """
 
     source: str
@@ -122,7 +122,7 @@ class Taken:
 
 
 class PlotBound(NamedTuple):
-    """A plot that became the content of a state (named by its path; empty for the outermost plot), as it runs."""
+    """A running plot that became a state's content; `state` is the state's path, empty for the outermost plot."""
 
     state: str
     plot: ActionPlot
@@ -143,7 +143,7 @@ class Microstep(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DecisionMade:
-    """A dynamic state, by path, with its decision record."""
+    """A decision record with the path of its dynamic state."""
 
     state: str
     decision: Decision
@@ -154,16 +154,16 @@ class Step(NamedTuple):
 
     Attributes:
         state: the machine's next state.
-        event: what it reacted to; `None` for the start.
-        handled: whether any transition took the event itself.
-        microsteps: what happened, in order.
-        decisions: what dynamic states chose.
-        knowledge: what the chart told the knowledge base.
+        event: the event; `None` for the start.
+        handled: whether a transition took the event itself.
+        microsteps: the microsteps, in order.
+        decisions: the decisions of dynamic states.
+        knowledge: the changes of the chart to the knowledge base.
         output: external actions and timers, in order.
         emitted: outcome events of the outermost plot.
-        errors: actions or guards that could not be evaluated and that no transition on `error` took; those of
-            plots in dialect `scxml`, which go on, are notes in `output`.
-        outputs: what the outermost plot hands back, as it has reached its end with this step.
+        errors: failed evaluations of actions or guards without a transition on `error`. In dialect `scxml` they are
+            notes in `output`, and the plot continues.
+        outputs: values that the outermost plot returns, if this step ends it.
     """
 
     state: MachineState
@@ -179,15 +179,15 @@ class Step(NamedTuple):
 
     @property
     def moved(self) -> bool:
-        """Whether anything happened at all."""
+        """Whether the step changed or sent anything."""
         return bool(self.microsteps)
 
     def entered(self, state: str) -> bool:
-        """Whether a state of that name or path was entered."""
+        """Return whether a state of that name or path was entered."""
         return any(_is(path, state) for micro in self.microsteps for path in micro.entered)
 
     def exited(self, state: str) -> bool:
-        """Whether a state of that name or path was left."""
+        """Return whether a state of that name or path was exited."""
         return any(_is(path, state) for micro in self.microsteps for path in micro.exited)
 
 

@@ -1,4 +1,4 @@
-"""A plot as tables: nodes in document order, edges by event. Made once for a plot, shared by all its instances."""
+"""Tables of a plot: nodes in document order, edges by event. Compiled once, shared by all instances."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from dsc.model.states import AnyState, DynamicState, FinalState, OrthogonalState
 from knowledge_base.language.expression import Expression
 
 
-@dataclass(slots=True, eq=False)  # never changed; frozen, it would take five times as long to make
+@dataclass(slots=True, eq=False)  # never changed; a frozen one takes five times as long to create
 class TransitionEdge:
-    """A transition between nodes, by their indices; without targets nothing is left or entered.
+    """A transition between nodes, by their indices; without targets no state is exited or entered.
 
     Attributes:
         source, targets: the nodes that it leads from and to.
         trigger, guard, effect, rule: as in the model.
-        internal: whether a composite source is not left, if all targets turn out to be inside it (SCXML 3.5).
-        place: where it stands in its source, e.g. `("on", "grasped", 0)`.
+        internal: whether a composite source stays active if all targets are inside it (SCXML 3.5).
+        place: its place in its source, e.g. `("on", "grasped", 0)`.
         passed: arguments for the plot inside the target.
         cleared: history nodes that forget.
     """
@@ -41,7 +41,7 @@ class TransitionEdge:
 
 @dataclass(frozen=True, slots=True)
 class Default:
-    """Where a history leads that remembers nothing, and what happens on the way."""
+    """The default target of a history that remembers nothing, with its effect."""
 
     target: int
     effect: tuple[Internal, ...]
@@ -49,14 +49,14 @@ class Default:
 
 @dataclass(frozen=True, slots=True)
 class TimedEdge:
-    """A transition that time triggers."""
+    """A transition triggered by time."""
 
     seconds: TermField
     edge: TransitionEdge
 
 
 def _nothing(_node: StateNode) -> None:
-    """It has no transitions."""
+    """Build no tables: the node has no transitions."""
 
 
 _TABLES = frozenset({"edges", "timeouts", "cycles", "always"})
@@ -66,8 +66,8 @@ _TABLES = frozenset({"edges", "timeouts", "cycles", "always"})
 class StateNode:
     """A state, a region or (index 0) the plot itself.
 
-    The tables of its transitions are made when one of them is first asked for: of a long plot, as those that are made
-    from plans, a run may reach only the beginning.
+    The tables of its transitions are built on first use. A run may reach only the beginning of a long plot, as of one
+    made from a plan.
 
     Attributes:
         index: position in document order.
@@ -75,22 +75,22 @@ class StateNode:
         around: indices of the nodes around it, innermost first, the plot last.
         last: index of the last node inside it; its own if there is none.
         children: indices of the nodes directly inside.
-        initial: the child entered by default; -1 where none or all are.
+        initial: the child entered by default; -1 if there is none or all are entered.
         state: the model value; `None` for the plot and for regions.
-        entry, exit, broken: actions on entering, on leaving, and on leaving by a transition of another state.
+        entry, exit, broken: actions at entry, at exit, and at an exit by a transition of another state.
         edges: event name -> transitions in order.
         timeouts, cycles: transitions after a time, and each time it has passed again.
-        at_least: how long its transitions have to wait.
-        lay_out: makes these tables.
+        at_least: the least time before its transitions are enabled.
+        lay_out: builds these tables.
         always: transitions without trigger.
-        histories: indices of the history nodes that remember what is inside.
-        transparent: a region that stands for its only state (dialect `scxml`), no scope for transitions.
+        histories: indices of the history nodes that remember its content.
+        transparent: a region that stands for its only state (dialect `scxml`), not a scope for transitions.
         parent: index of the node around it; -1 for the plot.
         final: whether it is a final state.
         orthogonal: whether all its children are active together.
         holds_plot: whether its content is another plot.
-        timed: whether entering it starts a timer.
-        addressed: whether anybody will send events to one of its activations, so that they need numbers.
+        timed: whether its entry starts a timer.
+        addressed: whether events are sent to one of its activations, so that they need numbers.
     """
 
     index: int
@@ -120,7 +120,7 @@ class StateNode:
     addressed: bool = False
 
     def __post_init__(self) -> None:
-        # Worked out once: a step asks for it too often.
+        # Each step reads these, so they are computed once.
         self.parent = self.around[0] if self.around else -1
         kind = type(self.state)
         self.final = kind is FinalState
@@ -128,7 +128,7 @@ class StateNode:
         self.holds_plot = kind is SubmachineState or kind is DynamicState
 
     def settle(self) -> None:
-        """Work out what follows from its transitions and actions."""
+        """Derive `timed` and `addressed` from the transitions and actions."""
         state = self.state if isinstance(self.state, State) else None
         self.timed = state is not None and (bool(state.after or state.every) or self.at_least is not None)
         actions = (*self.entry, *self.exit, *self.broken)
@@ -139,7 +139,7 @@ class StateNode:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> object:
-            """Called for a table that is not there yet; later ones are found like any attribute."""
+            """Build a missing table on first access; later accesses find the attribute."""
             if name not in _TABLES:
                 raise AttributeError(name)
             self.edges, self.timeouts, self.cycles, self.always = {}, (), (), ()
@@ -156,9 +156,9 @@ class CompiledPlot:
         nodes: all nodes in document order; a node comes after the one around it.
         index: state name -> node index.
         form: the plot as data if it was bound as a value, else `None`.
-        defaults: history node -> what it stands for at first.
+        defaults: history node -> its default.
         scxml: whether the plot is in dialect `scxml`: events match by prefix and keep SCXML's names.
-        cache: what the engine has worked out about its configurations (see `configuration`).
+        cache: the kept configurations and the initial reaction (see `configuration`).
     """
 
     plot: ActionPlot
@@ -173,7 +173,7 @@ class CompiledPlot:
         return f"CompiledPlot({self.plot.name})"
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are made from the same plot in the same way."""
+        """Compare the plots and their forms."""
         if self is other:
             return True
         return isinstance(other, CompiledPlot) and self.form == other.form and self.plot == other.plot
@@ -182,22 +182,22 @@ class CompiledPlot:
         return hash(self.plot.name)
 
     def way(self, around: int, index: int) -> list[int]:
-        """The nodes from one around it, which is not part of the way, down to a node."""
+        """Return the nodes from an ancestor, exclusive, down to a node, inclusive."""
         ancestors = self.nodes[index].around
         return [*reversed(ancestors[: ancestors.index(around)]), index]
 
     def inside(self, index: int, around: int) -> bool:
-        """Whether a node is (properly) inside another: what is inside follows it in document order."""
+        """Return whether a node is inside another, which it follows in document order."""
         return around < index <= self.nodes[around].last
 
 
 class Chart(Protocol):
-    """Where the engine finds plots: by name, or bound as a value."""
+    """Provider of plots: by name, or bound as a value."""
 
     def compiled(self, name: str) -> CompiledPlot:
-        """The plot of that name; raises `UnknownNameError`."""
+        """Return the plot of that name; raise `UnknownNameError`."""
         ...
 
     def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
-        """A plot given as data, e.g. one made from a plan; raises `InputError`."""
+        """Compile a plot given as data, e.g. one made from a plan; raise `InputError`."""
         ...

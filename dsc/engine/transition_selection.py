@@ -1,7 +1,7 @@
-"""Which transitions are taken: inner before outer, document order, over running plots inside each other at once.
+"""Selection of transitions: inner before outer, document order, across all nested running plots together.
 
-SCXML 1.0, section 3.13 (selectTransitions, removeConflictingTransitions), with plots inside plots as part of
-one tree and with the scopes of events (S0.6, S2.5).
+SCXML 1.0, section 3.13 (selectTransitions, removeConflictingTransitions). Nested plots form one tree; events have
+scopes (S0.6, S2.5).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
 from dsc.events import AFTER, EVERY
 
 Guard = Callable[[Frame, TransitionEdge], bool]
-"""Whether an edge's guard holds in its frame."""
+"""Returns whether an edge's guard holds in its frame."""
 
 
 class Addressed(NamedTuple):
-    """The trigger that is an event for one state: that state alone may take it, or those around it as well."""
+    """A trigger for one state: an event that only this state may take, or also the states around it."""
 
     event: str
     node: int
@@ -29,18 +29,20 @@ class Addressed(NamedTuple):
 
 
 Trigger = str | Addressed | None
-"""What sets transitions off in a plot: an event that all its states see, one for a state, or a change of the world."""
+"""The trigger of a plot's transitions: an event for all its states, one for a state, or `None` for a change of the
+world.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Enabled:
-    """A transition that will be taken in a running plot."""
+    """A selected transition of a running plot."""
 
     frame: Frame
     edge: TransitionEdge
 
     def left(self) -> set[tuple[Frame, int]]:
-        """Everything that is exited: active states inside the domain, and all plots inside those."""
+        """Return the exit set: active states inside the domain, and all plots inside those."""
         compiled, configuration = self.frame.compiled, self.frame.configuration
         indices = left_by(compiled, self.edge, configuration.active, dict(configuration.history))
         found = {(self.frame, index) for index in indices}
@@ -53,7 +55,7 @@ class Enabled:
 def left_by(
     compiled: CompiledPlot, edge: TransitionEdge, active: Iterable[int], remembered: dict[int, tuple[int, ...]]
 ) -> set[int]:
-    """The active nodes of its own plot that an edge leaves."""
+    """Return the active nodes of the edge's own plot that it exits."""
     if not edge.targets:
         return set()
     around = domain(compiled, edge, remembered)
@@ -61,9 +63,9 @@ def left_by(
 
 
 def domain(compiled: CompiledPlot, edge: TransitionEdge, remembered: dict[int, tuple[int, ...]]) -> int:
-    """Index of the innermost composite (or plot) around source and targets.
+    """Return the index of the innermost composite (or plot) around source and targets.
 
-    SCXML appendix D: getTransitionDomain, findLCCA. A source that is only left internally is its own domain.
+    SCXML appendix D: getTransitionDomain, findLCCA. The source of an internal transition is its own domain.
     """
     known = {history: kept for history, kept in remembered.items() if history not in edge.cleared}
     real = effective_targets(compiled, edge.targets, known)
@@ -80,15 +82,15 @@ def _is_scope(node: StateNode) -> bool:
 
 
 def everything(frame: Frame) -> Iterable[tuple[Frame, int]]:
-    """All active states of a frame and of the frames inside it."""
+    """Return all active states of a frame and of the frames inside it."""
     return [(inner, index) for inner in frame.frames() for index in inner.configuration.active]
 
 
 def select(root: Frame, trigger: Trigger, guard: Guard) -> tuple[list[Enabled], list[Enabled]]:
-    """The transitions that a trigger enables in a frame and all frames inside it.
+    """Select the transitions that a trigger enables in a frame and all frames inside it.
 
     Returns:
-        Those that are taken, free of conflicts; and those whose states have to wait before they can be left.
+        The transitions to take, free of conflicts; and those whose states wait for their least time.
     """
     enabled: dict[tuple[Frame, TransitionEdge], Enabled] = {}
     for frame, leaf in _leaves(root):
@@ -109,7 +111,7 @@ def _has_to_wait(one: Enabled) -> bool:
 
 
 def _leaves(frame: Frame) -> Iterator[tuple[Frame, int]]:
-    """All active states, here and in plots inside, that have no active state inside; document order."""
+    """Yield all active states without an active state inside, through all plots, in document order."""
     for index in frame.configuration.leaves:
         inner = frame.child(frame.compiled.nodes[index].name)
         if inner is None:
@@ -128,7 +130,7 @@ def _first_enabled(frame: Frame, leaf: int, trigger: Trigger, guard: Guard) -> E
 
 
 def _outwards(frame: Frame, index: int) -> Iterator[tuple[Frame, int]]:
-    """The node, then the state that holds its plot, and so on to the outermost plot."""
+    """Yield the node, then the host state of its plot, and so on to the outermost plot."""
     yield frame, index
     while frame.parent is not None:
         index, frame = frame.parent.compiled.index[frame.host], frame.parent
@@ -136,7 +138,7 @@ def _outwards(frame: Frame, index: int) -> Iterator[tuple[Frame, int]]:
 
 
 def edges_of(compiled: CompiledPlot, index: int, trigger: Trigger) -> tuple[TransitionEdge, ...]:
-    """The transitions of a node that have the trigger, in order."""
+    """Return the transitions of a node that have the trigger, in order."""
     node = compiled.nodes[index]
     if trigger is None:
         return node.always
@@ -158,7 +160,7 @@ def _addressed_edges(compiled: CompiledPlot, index: int, trigger: Addressed) -> 
 
 
 def matches(descriptors: str, event: str) -> bool:
-    """Whether one of the descriptors is the event's name or a prefix of its tokens (SCXML 3.12.1)."""
+    """Return whether one of the descriptors is the event's name or a prefix of its tokens (SCXML 3.12.1)."""
     for descriptor in descriptors.split():
         prefix = descriptor.removesuffix(".*").removesuffix(".")
         if prefix in {"*", event} or event.startswith(prefix + "."):
