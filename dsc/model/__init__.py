@@ -1,1 +1,1 @@
-"""What an action plot is: frozen values, no behaviour. Nothing here knows a store, a clock, a skill or a file."""
+"""Model of action plots: frozen values without behaviour. It imports no store, clock, skill or file access."""

@@ -1,4 +1,4 @@
-"""Actions. ExternalAction ones reach components and stand in entry or exit; internal ones stay in the chart (S0.5)."""
+"""Actions. `ExternalAction`s reach components, from entry and exit only; internal ones stay in the chart (S0.5)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from dsc.model.language import ConditionField, EffectField, Frozen, TermField, b
 
 
 class Trigger(Frozen):
-    """Start a skill; its outcome events reach the state that asked, and leaving that state cancels it.
+    """Start a skill; its outcome events reach the state that started it. An exit from that state cancels it.
 
     Attributes:
         trigger: `component.skill`, by the name the deployment gave the component.
         arguments: values for the skill's parameters (`with`).
-        names: skill event -> the name it shall have in this chart (`as`, S0.6).
+        names: skill event -> its name in this chart (`as`, S0.6).
         within: seconds after which the skill is cancelled and ends with the event `timed_out`.
     """
 
@@ -41,18 +41,18 @@ class Switch(Frozen):
 
 
 class Send(Frozen):
-    """Send a component a message that nobody answers: `send: voice.say`, `with: {text: hello}` (S1.1)."""
+    """Send a component a one-way message: `send: voice.say`, `with: {text: hello}` (S1.1)."""
 
     send: str = Field(pattern=r"^[\w\-]+\.[\w\-]+$")
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
 
 
 ExternalAction = Trigger | Configure | Switch | Send
-"""What acts on components; the rest stays in the chart."""
+"""Actions on components."""
 
 
 class Assign(Frozen):
-    """Give variables of this plot new values."""
+    """Assign new values to variables of this plot."""
 
     assign: dict[str, TermField]
 
@@ -66,8 +66,8 @@ class Tell(Frozen):
 class Emit(Frozen):
     """Fire an event: a declared outcome goes to the state that holds this plot, any other stays inside.
 
-    With `delay` (seconds; only in dialect `scxml`) it comes as an event from outside, after whatever comes before;
-    until then it can be withdrawn by its `id`. `into` is a variable that gets an id made for it (SCXML 6.2).
+    With `delay` (seconds; only in dialect `scxml`) it arrives later as an event from outside. Until then a `Withdraw`
+    with its `id` drops it. `into` is a variable that receives a generated id (SCXML 6.2).
     """
 
     emit: str
@@ -84,13 +84,13 @@ class Emit(Frozen):
 
 
 class Withdraw(Frozen):
-    """Let the delayed events of that id, fired in this plot, not come (SCXML 6.3; only in dialect `scxml`)."""
+    """Drop the pending delayed events of that id, fired in this plot (SCXML 6.3; only in dialect `scxml`)."""
 
     withdraw: TermField
 
 
 class Log(Frozen):
-    """Tell the trace: constants and variables, shown one after the other (SCXML 4.7; only in dialect `scxml`)."""
+    """Write constants and variables to the trace, in order (SCXML 4.7; only in dialect `scxml`)."""
 
     log: tuple[TermField, ...]
     label: str = ""
@@ -100,9 +100,9 @@ class Choose(Frozen):
     """The actions of one branch (SCXML 4.3; only in dialect `scxml`).
 
     Attributes:
-        condition: what decides (`if`).
-        then: what happens if it holds.
-        otherwise: what happens if it does not (`else`).
+        condition: selects the branch (`if`).
+        then: actions if it holds.
+        otherwise: actions if it does not (`else`).
     """
 
     condition: ConditionField = Field(alias="if")
@@ -111,7 +111,7 @@ class Choose(Frozen):
 
 
 class Block(Frozen):
-    """Actions of which an error skips the rest, and nothing after the block (SCXML 4.9; only in dialect `scxml`).
+    """A sequence of actions: an error skips its rest, but nothing after it (SCXML 4.9; only in dialect `scxml`).
 
     A state with several `onentry` or `onexit` has one for each (SCXML 3.8, 3.9).
     """
@@ -129,12 +129,12 @@ InternalAction = Annotated[
     | Annotated[Block, Tag("block")],
     by_key("assign", "tell", "emit", "withdraw", "log", "if", "block"),
 ]
-"""What transitions may hold."""
+"""Actions of a transition."""
 Choose.model_rebuild()
 Block.model_rebuild()
 
 Internal = Assign | Tell | Emit | Withdraw | Log | Choose | Block
-"""The internal actions, to be told from the external ones."""
+"""The internal actions as a union of types, for tests of an action's kind."""
 
 Action = Annotated[
     Annotated[Trigger, Tag("trigger")]
@@ -150,11 +150,11 @@ Action = Annotated[
     | Annotated[Block, Tag("block")],
     by_key("trigger", "set", "switch", "send", "assign", "tell", "emit", "withdraw", "log", "if", "block"),
 ]
-"""What entry and exit may hold; internal actions only in dialect `scxml` (SCXML 3.8)."""
+"""Actions of entry and exit; internal ones only in dialect `scxml` (SCXML 3.8)."""
 
 
 def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalAction | Internal]:
-    """All actions, also those inside branches and blocks."""
+    """Yield all actions, also those inside branches and blocks."""
     for action in actions:
         yield action
         if isinstance(action, Choose):
@@ -164,7 +164,7 @@ def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalActio
 
 
 def component_of(action: ExternalAction | Internal) -> str | None:
-    """Name of the component that an action acts on, if it does."""
+    """Return the name of the component that an action acts on, or `None`."""
     match action:
         case Trigger(trigger=port) | Configure(set=port) | Send(send=port):
             return port.partition(".")[0]

@@ -1,4 +1,4 @@
-"""Connectors: a way in that leads on at once, by conditions or by a value (S3.1). Nothing ever rests there."""
+"""Connectors: pseudostates that select a transition by conditions or by a value (S3.1). No connector is ever active."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CHOICE = "choice"
 
 
 class Connector(TransitionSource):
-    """What is passed through on the way to a state; its transitions are tried in order, and the last one holds."""
+    """A pseudostate on the way to a state; its transitions are tried in order, and the last one always holds."""
 
     @model_validator(mode="after")
     def _leads_on(self) -> Connector:
@@ -33,12 +33,12 @@ class Connector(TransitionSource):
 
 
 class ChoiceState(Connector):
-    """Goes on by conditions: `choice: [{when: G, to: a}, z]`; the last branch has no `when`."""
+    """Selects by conditions: `choice: [{when: G, to: a}, z]`; the last branch has no `when`."""
 
     choice: Transitions = Field(min_length=1)
 
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
-        """The branches in order; paths are `("choice", number)`."""
+        """Yield the branches in order; paths are `("choice", number)`."""
         for number, branch in enumerate(self.choice):
             yield ("choice", number), CHOICE, branch
 
@@ -53,7 +53,7 @@ def _as_cases(value: Any) -> Any:
 
 
 def _case_text(key: Any) -> str:
-    """The key as text; one spelling for each number, so that a plot that was written and read is the same plot."""
+    """Return the key as text, with one spelling for each number, so that writing and reading keep the plot equal."""
     if isinstance(key, bool):
         return "true" if key else "false"
     if isinstance(key, str) and not is_number(key):
@@ -65,7 +65,7 @@ def _case_text(key: Any) -> str:
 
 
 def case_value(key: str) -> Value:
-    """The constant that a case's key stands for: `1` a number, `true` a truth value, `"1"` and `cup` texts."""
+    """Return the constant of a case's key: `1` a number, `true` a truth value, `"1"` and `cup` texts."""
     if is_number(key):
         return _number(key)
     quoted = len(key) > 1 and key[0] == key[-1] == '"'
@@ -81,12 +81,12 @@ def _number(text: str) -> int | float:
 
 
 class SelectState(Connector):
-    """Goes on by value: `select: ?event.kind`, `cases: {cup: wash, can: throw}`, `else: ask`.
+    """Selects by value: `select: ?event.kind`, `cases: {cup: wash, can: throw}`, `else: ask`.
 
     Attributes:
-        select: the value that decides.
-        cases: constant -> transition. Keys are kept as text, since JSON has no others, and mean what `case_value`
-            says. A `when` in a case must hold as well.
+        select: the value to compare.
+        cases: constant -> transition. Keys are kept as text, the only kind in JSON; `case_value` reads them. A `when`
+            in a case must hold as well.
         otherwise: the transition for all other values (`else`).
     """
 
@@ -95,10 +95,10 @@ class SelectState(Connector):
     otherwise: Annotated[Transition, BeforeValidator(as_transition)] = Field(alias="else")
 
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
-        """The cases as guarded transitions, then the rest; paths are `("cases", key)` and `("else",)`."""
+        """Yield the cases as guarded transitions, then the rest; paths are `("cases", key)` and `("else",)`."""
         for key, case in self.cases.items():
             value = case_value(key)
-            # A whole number or truth value is a key of that kind in YAML.
+            # YAML reads a whole number or a truth value as a key of that type.
             place = value if isinstance(value, int) else key
             yield ("cases", place), CHOICE, self._guarded(value, case)
         yield ("else",), CHOICE, self.otherwise

@@ -1,7 +1,7 @@
 """Conditions, terms and effects as fields of a model: written as text in the one language, kept parsed.
 
-A field accepts text or an already parsed value and is written back as text, so that a plot read from YAML,
-built in Python and dumped to JSON is the same plot.
+A field accepts text or a parsed value and is written back as text. A plot read from YAML, built in Python or dumped to
+JSON is therefore the same plot.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _SYMBOL = re.compile(r"[a-z0-9_][a-z0-9_\-#~.]*", re.IGNORECASE)
 
 
 class Frozen(Form):
-    """Base of all model values: immutable, no unknown keys, both spellings of an aliased field."""
+    """Base of all model values: immutable, without unknown keys; aliased fields accept both spellings."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, arbitrary_types_allowed=True, allow_inf_nan=False
@@ -38,7 +38,7 @@ class Frozen(Form):
 
 
 def by_key(*keys: str) -> Discriminator:
-    """A discriminator for unions whose members each have one telling key."""
+    """Return a discriminator for unions whose members each have one distinctive key."""
     return Discriminator(
         kind_by_key(*keys),
         custom_error_type=UNKNOWN_FORM,
@@ -48,7 +48,7 @@ def by_key(*keys: str) -> Discriminator:
 
 
 def kind_by_key(*keys: str) -> Callable[[Any], str | None]:
-    """The first of the keys that the data have."""
+    """Return a function that finds the first of the keys that the data have."""
 
     def kind(value: Any) -> str | None:
         present = value if isinstance(value, Mapping) else _written_keys(type(value))
@@ -98,7 +98,7 @@ def _term(value: Any) -> Term:
         raise ValueError(str(error)) from error
 
 
-@lru_cache(maxsize=4096)  # in plots one after the other, as those made from plans, most names come again
+@lru_cache(maxsize=4096)  # most names repeat in a sequence of plots, e.g. those made from plans
 def _named(text: str) -> Constant:
     return Constant(text, quoted=not _SYMBOL.fullmatch(text))
 
@@ -120,7 +120,7 @@ _texts: IdentityCache[Expression | Effect, str] = IdentityCache()
 
 
 def _text_out(part: Expression | Effect) -> str:
-    """Kept by identity: a plot, and the same with its rules carried out, share their conditions."""
+    """Return the text of a condition or effect, cached by identity: a plot and its expansion share conditions."""
     return _texts.find(part, None) or _texts.keep(part, None, to_text(part))
 
 
@@ -129,7 +129,7 @@ def _term_out(term: Term) -> Any:
 
 
 def constant(value: Value) -> Constant:
-    """A value as a term; a text that is no name is quoted."""
+    """Return a value as a term; quote a text that is not a name."""
     return Constant(value, quoted=isinstance(value, str) and not _SYMBOL.fullmatch(value))
 
 
@@ -150,7 +150,7 @@ ConditionField = Annotated[
     PlainSerializer(_text_out),
     WithJsonSchema({"type": "string", "description": "a condition, e.g. (and (on ?o table) (cup ?o))"}),
 ]
-"""A condition that chart variables, parameters and event attributes bind completely."""
+"""A condition; chart variables, parameters and event attributes bind all its variables."""
 
 TermField = Annotated[
     Term,

@@ -28,11 +28,11 @@ from knowledge_base.errors import Place, UnknownNameError
 from knowledge_base.spelling import is_plain_name
 
 Path = tuple[str | int, ...]
-"""Where in a plot's form something stands, e.g. `("states", "look", "on", "recognised")`."""
+"""Path of a part in a plot's form, e.g. `("states", "look", "on", "recognised")`."""
 
 
 _STATE_NAME = re.compile(r"[^/#][^/]*")
-# Names of states stand in paths, between slashes; what begins with # is a region's place in a stored state.
+# Paths contain state names between slashes; in a stored state, a name that begins with # is a region's index.
 
 
 class PlotParameter(Frozen):
@@ -40,11 +40,12 @@ class PlotParameter(Frozen):
 
     Attributes:
         type: a type of the knowledge base's schema, or `number`, `boolean`, `text`, `symbol`.
-        default: its value if nobody says another.
+        default: its value without another setting.
         least, most: the range of a number.
-        among: the values of which it is one; empty means any.
-        changed_by: who may say another value, each one also what those after it may: `nobody`; a `profile`, before a
-            run; an `operator`, while it goes on; `rules` and handlers that use the plot; all `plots` that do.
+        among: the allowed values; empty means any.
+        changed_by: the last role that may set another value; all roles before it may, too. In order: `nobody`;
+            `profile`, before a run; `operator`, during a run; `rules` and handlers that use the plot; all `plots` that
+            use it.
     """
 
     type: str
@@ -56,12 +57,12 @@ class PlotParameter(Frozen):
 
     @property
     def range(self) -> Range:
-        """The values that it may have."""
+        """The allowed values."""
         return Range(self.type, self.least, self.most, self.among)
 
     @property
     def bounded(self) -> bool:
-        """Whether it may have fewer values than its type has."""
+        """Return whether its range is narrower than its type."""
         return self.least is not None or self.most is not None or bool(self.among)
 
     @model_validator(mode="before")
@@ -71,7 +72,7 @@ class PlotParameter(Frozen):
 
 
 class PlotVariable(Frozen):
-    """A variable or output of the plot's scope; gone when the plot is left (S0.7)."""
+    """A variable or output in the plot's scope; it ends with the plot (S0.7)."""
 
     type: str
     initial: TermField | None = None
@@ -87,22 +88,22 @@ class ActionPlot(Frozen):
 
     Attributes:
         name: its name in the library (`plot`).
-        parameters: values handed in.
+        parameters: input values.
         variables: its own variables.
-        receives: events from outside (an operator, a user interface) that it listens to, with their attributes.
-        outputs: typed values handed back: inside, they are assigned and read like variables; when the plot reaches
-            its final state, they are the attributes of the holder's `done` (S2.1).
-        emits: outcome events with their attributes and types; whoever holds the plot must wire them all.
+        receives: events from outside (an operator, a user interface) that it accepts, with their attributes.
+        outputs: typed values that it returns (S2.1). Inside, they are assigned and read like variables. At the final
+            state they become the attributes of the holder's `done`.
+        emits: outcome events with their attributes and types; the holder of the plot must wire them all.
         when: as a candidate, the condition under which it fits (bottom-up, S0.4).
-        implements: the planning action it carries out; its parameters are named as that action's.
+        implements: the planning action that it executes; its parameters are named as that action's.
         effects: whether the action's effects must be `observed` before the next step, or are `assumed`.
         confirm: seconds to wait for them to be observed.
         states: the top-level states by name; names are unique in the whole plot.
-        initial: the state to enter first; the first one if left out.
+        initial: the state to enter first; by default the first one.
         rules: contingency rules, in order of priority.
         handlers: event handlers, in order of priority.
         generated: whether it was made from a plan.
-        dialect: `dsc`, or `scxml` for charts that use what only SCXML has: transitions across borders, history,
+        dialect: `dsc`, or `scxml` for charts with features of SCXML alone: transitions across borders, history,
             events matched by prefix, internal actions in entry and exit.
     """
 
@@ -127,11 +128,11 @@ class ActionPlot(Frozen):
     _text: str | None = PrivateAttr(default=None)
 
     def with_default(self, name: str, value: object, who: Who) -> ActionPlot:
-        """The same plot with another default of a parameter.
+        """Return the plot with another default of a parameter.
 
         Raises:
             UnknownNameError: it has no such parameter.
-            InputError: the value is of another type or out of range, or it is not for `who` to say.
+            InputError: the value is of another type or out of range, or `who` may not set it.
         """
         if name not in self.parameters:
             raise UnknownNameError(f"plot '{self.name}' has no parameter '{name}'", found=name, valid=self.parameters)
@@ -141,17 +142,17 @@ class ActionPlot(Frozen):
         return self.model_copy(update={"parameters": {**self.parameters, name: changed}})
 
     def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
-        """The same plot that remembers where its parts stand in the text it was read from."""
+        """Return the plot with the places of its parts in the text it was read from."""
         self._places = places
         return self
 
     def place(self, path: Path) -> Place | None:
-        """Where the part at `path`, or the closest part around it that is known, was written."""
+        """Return the place in the text of the part at `path`, or of the closest known part around it."""
         known: Path = ()
         for element in path:
             if (*known, element) in self._places:
                 known = (*known, element)
-            elif not isinstance(element, int):  # a position is left out where the short form is used
+            elif not isinstance(element, int):  # the short form of a list has no position
                 break
         return self._places.get(known)
 
@@ -160,7 +161,7 @@ class ActionPlot(Frozen):
         seen: set[str] = set()
         for name, _, path in self.walk():
             if _STATE_NAME.fullmatch(name) is None:
-                wrong = "'{name}' is no name for a state: it has a slash, begins with # or is empty"
+                wrong = "'{name}' is not a name for a state: it has a slash, begins with # or is empty"
                 raise PydanticCustomError(LOCATED, wrong, {"name": name, "path": path})
             if name in seen:
                 twice = "two states are named '{name}'; names are unique in a plot"
@@ -173,7 +174,7 @@ class ActionPlot(Frozen):
         for path in self._variable_paths():
             name = path[-1]
             if not is_plain_name(str(name)):
-                wrong = "'{name}' is no name for a variable: the language folds names to lower case"
+                wrong = "'{name}' is not a name for a variable: the language folds names to lower case"
                 raise PydanticCustomError(LOCATED, wrong, {"name": name, "path": path})
         self._is_declared_once("variable", self.variables, {"parameter": self.parameters})
         self._is_declared_once("output", self.outputs, {"parameter": self.parameters, "variable": self.variables})
@@ -187,7 +188,7 @@ class ActionPlot(Frozen):
                     raise PydanticCustomError(LOCATED, "'{name}' is declared twice: as {other} and as {kind}", context)
 
     def _variable_paths(self) -> Iterator[Path]:
-        """Everything that conditions and terms can only read as `?name` or `?event.name`."""
+        """Yield the paths of all names that conditions and terms read as `?name` or `?event.name`."""
         yield from (("parameters", name) for name in self.parameters)
         yield from (("variables", name) for name in self.variables)
         yield from (("outputs", name) for name in self.outputs)
@@ -195,11 +196,11 @@ class ActionPlot(Frozen):
             yield from ((group, event, name) for event, attributes in events.items() for name in attributes or ())
 
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
-        """All states in document order, with their names and paths."""
+        """Yield all states in document order, with their names and paths."""
         yield from _walk(self.states, ("states",))
 
     def scopes(self) -> Iterator[Scope]:
-        """What holds states side by side: the plot, each composite and region; transitions stay in one."""
+        """Yield the scopes: the plot, each composite and region; each transition stays in one."""
         yield self
         for _, state, _ in self.walk():
             if isinstance(state, CompositeState):
@@ -208,19 +209,19 @@ class ActionPlot(Frozen):
                 yield from state.regions.values()
 
     def state(self, name: str) -> AnyState:
-        """The state of that name anywhere in the plot.
+        """Return the state of that name anywhere in the plot.
 
         Raises:
-            KeyError: there is none.
+            KeyError: the plot has no such state.
         """
         return next(state for found, state, _ in self.walk() if found == name)
 
     def uses(self) -> frozenset[str]:
-        """Names of the plots it refers to."""
+        """Return the names of the plots it refers to."""
         return frozenset(name for _, name in self.references())
 
     def references(self) -> Iterator[tuple[Path, str]]:
-        """Where it refers to another plot, and to which."""
+        """Yield each reference to another plot: its path and the plot's name."""
         for _, state, path in self.walk():
             if isinstance(state, SubmachineState) and not state.use.startswith("?"):
                 yield (*path, "use"), state.use
@@ -232,31 +233,31 @@ class ActionPlot(Frozen):
                     yield (group, number, "do", "use"), do.use
 
     def to_form(self) -> dict[str, Any]:
-        """The plot as plain data, in the form in which people write it; `ActionPlot.model_validate` reads it."""
+        """Return the plot as plain data in its written form; `ActionPlot.model_validate` reads it."""
         form: dict[str, Any] = json.loads(self.text)
         return form
 
     @property
     def text(self) -> str:
-        """`to_form` as JSON; worked out once, since a trace asks for it whenever a plot is bound."""
+        """`to_form` as JSON, cached, because a trace needs it whenever a plot is bound."""
         if self._text is None:
             self._text = json.dumps(self.model_dump(mode="json", by_alias=True, exclude_defaults=True))
         return self._text
 
     @property
     def digest(self) -> str:
-        """A hash of its content, of which the order of states is a part: equal plots have equal digests."""
+        """A hash of the content, including the order of states: equal plots have equal digests."""
         return hashlib.sha256(self.text.encode()).hexdigest()[:12]
 
     def __eq__(self, other: object) -> bool:
-        """Whether both say the same, wherever they were written."""
+        """Compare the contents, without the places in text."""
         return self is other or (isinstance(other, ActionPlot) and self.text == other.text)
 
     def __hash__(self) -> int:
         return hash(self.text)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """See pydantic; what was worked out about the content is not copied with it."""
+        """See pydantic; the copy drops the cached text and digest."""
         copied = super().model_copy(update=update, deep=deep)
         copied._text = None  # noqa: SLF001  a plot, like this one
         return copied
@@ -275,10 +276,10 @@ def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, Any
 
 
 Scope = ActionPlot | CompositeState | Region
-"""Whatever holds states and has an initial one."""
+"""A part that contains states and has an initial one."""
 
 
 def initial_of(scope: Scope) -> str:
-    """The name of the state to enter first; in dialect `scxml` it may be deeper inside (SCXML 3.3)."""
+    """Return the name of the state to enter first; in dialect `scxml` it may be deeper inside (SCXML 3.3)."""
     proper = (name for name, state in scope.states.items() if not isinstance(state, HistoryState))
     return scope.initial or next(proper, next(iter(scope.states)))

@@ -17,13 +17,13 @@ Settings = dict[str, dict[str, Setting]]
 
 
 class Profile(Frozen):
-    """Which robot is used, and what its parameters are worth.
+    """A robot and the values of its parameters.
 
     Attributes:
         name: its name (`profile`).
-        robot: which of the robots that a world has; its usual one if left out.
-        components: component -> parameter -> value, within what its builder declares.
-        plots: plot -> parameter -> value, in place of the parameter's default; who uses the plot may say another.
+        robot: one of the world's robots; by default its usual one.
+        components: component -> parameter -> value, within the range that its builder declares.
+        plots: plot -> parameter -> value, as the parameter's new default; users of the plot may set another value.
     """
 
     name: str = Field(alias="profile", pattern=r"^[a-zA-Z_][\w\-]*$")
@@ -34,16 +34,16 @@ class Profile(Frozen):
     _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
 
     def written_at(self, places: Mapping[Path, Place]) -> Profile:
-        """The same profile that remembers where its parts stand in the text it was read from."""
+        """Return the profile with the places of its parts in the text it was read from."""
         self._places = places
         return self
 
     @property
     def digest(self) -> str:
-        """A hash of what it says."""
+        """A hash of the content."""
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
 
     def place(self, *path: str) -> Place | None:
-        """Where the part at `path`, or the closest part around it that is known, was written."""
+        """Return the place in the text of the part at `path`, or of the closest known part around it."""
         known = (path[:length] for length in range(len(path), -1, -1))
         return next((self._places[part] for part in known if part in self._places), None)

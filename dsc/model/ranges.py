@@ -1,4 +1,4 @@
-"""Roles of parameters: a builder's range, an integrator's default, and who may say another value (S1.11)."""
+"""Roles of parameters: a builder's range, an integrator's default, and the roles that may set a value (S1.11)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _RANKS: tuple[Who, ...] = ("nobody", "profile", "operator", "rules", "plots")
 
 
 def may_change(who: Who, changed_by: Who) -> bool:
-    """Whether `who` may give another value to what is `changed_by` somebody: each one may what those after it may."""
+    """Return whether the role `who` may set a value; `changed_by` is the last role that may."""
     return _RANKS.index(who) <= _RANKS.index(changed_by)
 
 
@@ -27,12 +27,12 @@ def refuse_change(name: str, who: Who, changed_by: Who) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The values that a parameter may have.
+    """The allowed values of a parameter.
 
     Attributes:
         type: `number` or `boolean`; anything else is a word.
-        least, most: the bounds of a number, both inside.
-        among: the values of which it is one; empty means any.
+        least, most: the bounds of a number, inclusive.
+        among: the allowed values; empty means any.
     """
 
     type: str
@@ -41,7 +41,7 @@ class Range:
     among: tuple[Value, ...] = ()
 
     def __str__(self) -> str:
-        """In words."""
+        """Return the range in words."""
         if self.among:
             return "one of " + ", ".join(map(written, self.among))
         if self.least is not None and self.most is not None:
@@ -53,11 +53,11 @@ class Range:
         return f"{'an' if self.type[:1] in 'aeiou' else 'a'} {self.type}"
 
     def check(self, name: str, value: object) -> Value:
-        """The value, if it fits.
+        """Return the value if it is in the range.
 
         Args:
-            name: what the parameter is called in messages.
-            value: what it shall be.
+            name: the parameter's name in messages.
+            value: its new value.
 
         Raises:
             InputError: it is of another type or out of range; the message has the range and the nearest word.
@@ -68,7 +68,7 @@ class Range:
         raise InputError(message, found=str(value), valid=map(str, self.among))
 
     def problems(self) -> Iterable[str]:
-        """What is wrong with the range itself."""
+        """Yield the contradictions inside the range itself."""
         if self.type != "number" and (self.least is not None or self.most is not None):
             yield f"`least` and `most` are about numbers, and this is a {self.type}"
         elif self.least is not None and self.most is not None and self.least > self.most:
@@ -84,7 +84,7 @@ class Range:
     def _fits(self, value: Value) -> bool:
         if kind_of(value) != self._kind or (self.among and value not in self.among):
             return False
-        if isinstance(value, float) and math.isnan(value):  # it is neither below nor above anything
+        if isinstance(value, float) and math.isnan(value):  # comparisons with NaN are all false
             return False
         too_low = self.least is not None and not isinstance(value, str) and value < self.least
         too_high = self.most is not None and not isinstance(value, str) and value > self.most
@@ -92,10 +92,10 @@ class Range:
 
 
 def kind_of(value: Value) -> str:
-    """Of which kind a value is: `number`, `boolean`, or `word`."""
+    """Return the kind of a value: `number`, `boolean` or `word`."""
     return "boolean" if isinstance(value, bool) else "word" if isinstance(value, str) else "number"
 
 
 def written(value: object) -> str:
-    """A value as people write it."""
+    """Return a value in its written form."""
     return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Data that people wrote, as values of a model: what is wrong is said with its path and the nearest key."""
+"""Reading of written data as model values; errors name the path in the data and the nearest valid key."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from pydantic_core import ErrorDetails
 from knowledge_base.errors import InputError, UnknownNameError, shortened
 
 UNKNOWN_FORM = "unknown_form"
-"""Type of the validation error for data with none of a union's telling keys."""
+"""Type of the validation error for data without any of a union's distinctive keys."""
 LOCATED = "located"
-"""Type of the validation error whose context has the `path` of what is wrong inside the form."""
+"""Type of the validation error whose context has the `path` of the wrong part inside the form."""
 
 FormPath = tuple[str | int, ...]
 """Names of keys and positions in lists."""
 _Schema = Mapping[str, Any]
 _Location = tuple[str | int, ...]
-"""Where pydantic found something: keys and positions, mixed with tags of unions."""
+"""Location of a pydantic error: keys and positions, mixed with tags of unions."""
 
 
 class Form(BaseModel):
-    """Base of what people write as data, in files or in Python."""
+    """Base of data that people write, in files or in Python."""
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """The data as a value of this class; options as of pydantic.
+        """Return the data as a value of this class; options as of pydantic.
 
         Raises:
-            InputError: something does not fit; the message says where in the data, and the nearest valid key.
+            InputError: the data do not match; the message names the path in the data and the nearest valid key.
         """
         try:
             return super().model_validate(obj, **options)
@@ -42,8 +42,8 @@ class Form(BaseModel):
 
 
 def misread(error: ValidationError, model: type[BaseModel], data: Any) -> tuple[InputError, FormPath]:
-    """What pydantic found in data that shall be a value of `model`, in our words, and where it stands in them."""
-    # The deepest complaint is the most specific one.
+    """Return a pydantic error about data for `model` as an `InputError`, with its path in the data."""
+    # The deepest error is the most specific one.
     details = max(error.errors(include_url=False), key=lambda one: (one["type"] != "missing", len(one["loc"])))
     kind, loc, context = details["type"], details["loc"], details.get("ctx", {})
     schema = _schema(model)
@@ -77,7 +77,7 @@ _PLAIN = {
 
 @cache
 def _schema(model: type[BaseModel]) -> _Schema:
-    """Making it takes fifty times as long as reading a plot."""
+    """Return the cached schema: its construction takes fifty times as long as reading a plot."""
     return model.model_json_schema()
 
 
@@ -97,7 +97,7 @@ def _message(details: ErrorDetails) -> str:
 
 
 def in_yaml(value: Any) -> str:
-    """The value as people write it, or only its kind if it is a collection."""
+    """Return the value in its written form, or only its kind if it is a collection."""
     if isinstance(value, bool | None):
         return {True: "true", False: "false", None: "nothing"}[value]
     if isinstance(value, Mapping):
@@ -108,7 +108,7 @@ def in_yaml(value: Any) -> str:
 
 
 def _said_by(error: ValueError) -> str:
-    """What the language said about a text in the file, with the place inside that text in words."""
+    """Return the language's message about a text in the file, with the place inside that text in words."""
     cause = error.__cause__
     if not isinstance(cause, InputError):
         return str(error)
@@ -118,9 +118,9 @@ def _said_by(error: ValueError) -> str:
 
 
 def _follow(loc: _Location, data: Any, schema: _Schema) -> tuple[FormPath, list[_Schema]]:
-    """Along a location as pydantic gives it: the keys of the data in it, and the schemas of what stands there.
+    """Follow a pydantic location: return the data's keys along it, and the schemas at its end.
 
-    Where the schema has a tagged union, the location's next element is the tag of a member and no key.
+    In a tagged union of the schema, the location's next element is the tag of a member instead of a key.
     """
     path: list[str | int] = []
     nodes = [schema]
@@ -142,7 +142,7 @@ def _follow(loc: _Location, data: Any, schema: _Schema) -> tuple[FormPath, list[
 
 
 def _tagged(members: list[_Schema], tag: str, schema: _Schema) -> list[_Schema]:
-    """The members with that tag: the key that tells them, or the beginning of their name; all if none has it."""
+    """Return the members with that tag, by distinctive key or beginning of name; all if none matches."""
     resolved = [_resolved(member, schema) for member in members]
     return [
         form for form in resolved if tag in form.get("properties", {}) or form["title"].lower().startswith(tag)
@@ -162,7 +162,7 @@ def _alternatives(node: _Schema, schema: _Schema) -> list[_Schema]:
 
 
 def _into(node: _Schema, element: str | int, schema: _Schema) -> list[_Schema]:
-    """The schemas one step further; none if the element is no key."""
+    """Return the schemas one step further; none if the element is not a key."""
     further = []
     for one in _alternatives(node, schema):
         if element in one.get("properties", {}):

@@ -1,4 +1,4 @@
-"""Contingency rules and event handlers: what a plot does besides going along its transitions (S1.4, S1.14)."""
+"""Contingency rules and event handlers: reactions of a plot besides its transitions (S1.4, S1.14)."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ RESPONSES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "after": (CONTINUE, RETRY, REPLAN, GIVE_UP),
     }
 )
-"""What a rule may do besides going to a named state, by where it answers; the first is what it does by default."""
+"""Responses besides a named state, by the place of the rule; the first is the default."""
 
 STEP = "step."
-"""What the names of a step's arguments begin with in rules: `?step.item`."""
+"""Prefix of a step's arguments in rules: `?step.item`."""
 
 Names = Annotated[tuple[str, ...], BeforeValidator(as_tuple)]
 Command = Annotated[
     Annotated[Configure, Tag("set")] | Annotated[Switch, Tag("switch")] | Annotated[Send, Tag("send")],
     by_key("set", "switch", "send"),
 ]
-"""What reaches a component and is not waited for."""
+"""A one-way command to a component."""
 Commands = Annotated[tuple[Command, ...], BeforeValidator(as_tuple)]
 
 
 class Reaction(Frozen):
-    """What is done about something.
+    """Actions in answer to an event.
 
     Attributes:
         tell: change the knowledge base first.
@@ -52,19 +52,19 @@ class Reaction(Frozen):
 
     @property
     def acts(self) -> bool:
-        """Whether it takes a state to do it."""
+        """Return whether it needs a state."""
         return bool(self.command or self.use)
 
 
 class Response(Reaction):
-    """What a rule does about an outcome event, before a step or after it.
+    """A rule's answer to an outcome event, or before or after a step.
 
     Attributes:
-        then: what follows, whatever the used plot ends with: `retry` the step (its candidates are chosen anew),
-            `continue` as if the step were done, `replan`, `give_up`, `enter` the step it stands before, or the name
-            of a state of the same plot. See `Rule.then` for what follows if nothing is said.
+        then: the continuation, regardless of the used plot's outcome; see `Rule.then` for the default. `retry` enters
+            the step again and chooses among its candidates. `continue` treats the step as done. `enter` enters the step
+            after a `before`. `replan` and `give_up` concern the plan. Any other word names a state of the plot.
         passed: arguments (`pass`) for the step or state that is entered then, over its own `with`.
-        limit: how often this rule may answer for one state while its plot is active.
+        limit: upper bound of this rule's answers for one state while its plot is active.
     """
 
     then: str | None = None
@@ -75,12 +75,12 @@ class Response(Reaction):
 class Rule(Frozen):
     """A contingency rule: the plot that holds a state answers for it (S1.4).
 
-    A step is a state that holds another plot; it is spoken of by its name, or by the planning action that all plots
-    which it may hold implement. Its arguments are read as `?step.item`, where steps are named.
+    A step is a state that holds another plot. A rule names it by its name, or by the planning action that all its
+    possible plots implement. Where steps are named, `?step.item` reads a step's argument.
 
     Attributes:
-        on: the outcome event of a step that is answered.
-        before, after: the steps before which or after which something is inserted; `before` may leave them out.
+        on: the outcome event of a step to answer.
+        before, after: the steps for an insertion before or after; a `before` rule may skip them.
         when: condition over the event's attributes, the step's arguments and the knowledge base.
         of: with `on`, only for these steps; empty means any.
         do: the response.
@@ -105,48 +105,49 @@ class Rule(Frozen):
 
     @property
     def place(self) -> str:
-        """Where it answers: `on`, `before` or `after`."""
+        """The place of its answer: `on`, `before` or `after`."""
         return next(key for key in RESPONSES if getattr(self, key))
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """The steps it names; nothing means any."""
+        """The steps it names; an empty tuple means any."""
         return self.of or self.before or self.after
 
     @property
     def then(self) -> str:
-        """What follows: what it says, or what goes without saying where it answers."""
+        """The continuation: the written one, or the default for its place."""
         return self.do.then or RESPONSES[self.place][0]
 
     @property
     def leads_away(self) -> bool:
-        """Whether a named state follows: there is none beside the steps of a plan, so the plan is left for it."""
+        """Return whether a named state follows: a plan has no such state, so the rule leaves the plan."""
         return self.then not in RESPONSES[self.place]
 
     @property
     def outcome(self) -> str:
-        """The outcome with which it leaves a plan; its attributes are what is passed to the state that follows."""
+        """The outcome with which it leaves a plan; its attributes are the arguments for the state that follows."""
         return f"{LED_AWAY}{self.then}" + (f"({','.join(sorted(self.do.passed))})" if self.do.passed else "")
 
     @property
     def label(self) -> str:
-        """What people call it: where it answers, and the response, e.g. `grasp_failed: reposition, retry`."""
+        """A short name: the place and the response, e.g. `grasp_failed: reposition, retry`."""
         about = self.on or f"{self.place} {', '.join(self.steps)}"
         then = None if self.then == RESPONSES[self.place][0] and self.on is None and self.do.acts else self.then
         return f"{about}: " + ", ".join(part for part in (self.do.use, then) if part)
 
 
 class Handler(Frozen):
-    """An event handler: what is done about an event that may come at any time while the plot is active (S1.14).
+    """An event handler: the answer to an event at any time while the plot is active (S1.14).
 
-    A rule answers how a step has ended and decides what becomes of it; a handler always comes back to what went on.
+    A rule answers the outcome of a step and decides the continuation. A handler always returns to the interrupted
+    activity.
 
     Attributes:
-        on: the event: one that the plot `receives`, that something in it fires, or that `listen` brings.
-        listen: activates a component's event as long as the plot is active.
+        on: the event: one that the plot `receives`, that a part of it fires, or that `listen` activates.
+        listen: activates a component's event while the plot is active.
         when: condition over the event's attributes, the plot's variables and the knowledge base.
-        interrupt: whether what goes on is left for it and entered anew afterwards; if not, both go on side by side.
-        do: what is done.
+        interrupt: whether the present activity is exited and afterwards entered again; if not, both run in parallel.
+        do: the answer.
     """
 
     on: str
@@ -157,5 +158,5 @@ class Handler(Frozen):
 
     @property
     def label(self) -> str:
-        """What people call it: the event and what is used, e.g. `handler low_bat: announce`."""
+        """A short name: the event and the used plot, e.g. `handler low_bat: announce`."""
         return f"handler {self.on}" + (f": {self.do.use}" if self.do.use else "")

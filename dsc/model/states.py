@@ -1,4 +1,4 @@
-"""The kinds of states and connectors; the kind follows from the key that is there, such as `use` or `states`."""
+"""The kinds of states and connectors; a distinctive key such as `use` or `states` determines the kind."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ class State(TransitionSource):
     """A simple state: a configuration of the skill layer, set in entry and reverted by exit (S0.15).
 
     Attributes:
-        entry, exit, on_break: external actions; in dialect `scxml` internal ones too. `on_break` runs in place of
-            `exit` when the state is interrupted: left by a transition that is not its own (S2.3). If it is empty,
+        entry, exit, on_break: external actions; in dialect `scxml` internal ones too. `on_break` replaces `exit` when
+            the state is interrupted, which is an exit by another state's transition (S2.3). Without `on_break`,
             `exit` runs then too.
-        at_least: seconds for which the state's own transitions wait (S3.1); an event that one of them would take
-            is kept and offered again when the time has passed. The upper bound is `after`.
+        at_least: seconds before the state's own transitions are enabled (S3.1). Until then an event for one of them is
+            kept, and then offered again. The upper bound is `after`.
         on: event -> transitions, tried in order; `done` is the completion of the state's content.
         after: timeouts.
-        every: reactions that come again and again while the state is active (S3.2).
+        every: periodic reactions while the state is active (S3.2).
         always: transitions without trigger, taken as soon as their guard holds.
     """
 
@@ -49,13 +49,13 @@ class State(TransitionSource):
     always: Transitions = ()
 
     def blocks(self) -> Iterator[tuple[str, Actions]]:
-        """Its actions, by the keys under which they stand."""
+        """Yield its actions with their keys."""
         yield "entry", self.entry
         yield "exit", self.exit
         yield "on_break", self.on_break
 
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
-        """Every outgoing transition, with its path such as `("on", "grasped", 0)` and the label of its trigger."""
+        """Yield every outgoing transition, with its path, e.g. `("on", "grasped", 0)`, and the label of its trigger."""
         for event, transitions in self.on.items():
             for number, transition in enumerate(transitions):
                 yield ("on", event, number), event, transition
@@ -68,7 +68,7 @@ class State(TransitionSource):
 
 
 class CompositeState(State):
-    """States grouped for common transitions; brings no scope of its own (S0.2)."""
+    """States grouped for common transitions, without a separate scope of names (S0.2)."""
 
     states: dict[str, AnyState] = Field(min_length=1)
     initial: str | None = None
@@ -82,7 +82,7 @@ class Region(Frozen):
 
 
 class OrthogonalState(State):
-    """Regions that are active together; done when each has reached its final state.
+    """Regions that are active together; the state is done when each has reached its final state.
 
     Attributes:
         regions: the regions by name.
@@ -111,13 +111,13 @@ class Budget(Frozen):
 
 
 class DynamicState(State):
-    """An empty hull that chooses its content on entry (S0.4), and may ask a planner for it (S0.12).
+    """An empty hull that chooses its content on entry (S0.4), and may request it from a planner (S0.12).
 
     Attributes:
         dynamic: names of candidate plots in order of preference; each carries its own `when`.
         arguments: values for the candidates' parameters (`with`).
-        goal: what shall hold in the end; planned for when no candidate fits. Adds the outcomes `no_plan`
-            and `gave_up`, which must be wired.
+        goal: the planning goal; planned for when no candidate fits. It adds the outcomes `no_plan` and `gave_up`, which
+            must be wired.
         budget: bounds for planning.
     """
 
@@ -128,7 +128,7 @@ class DynamicState(State):
 
 
 class FinalState(Frozen):
-    """The end of its region or plot; entering it completes the state around (S0.11, S2.2).
+    """The end of its region or plot; its entry completes the state around it (S0.11, S2.2).
 
     `entry` holds internal actions, and only in dialect `scxml`.
     """
@@ -141,12 +141,12 @@ class FinalState(Frozen):
 
 
 class HistoryState(Frozen):
-    """Stands for what was active when the state around was last left (SCXML 3.10; only in dialect `scxml`).
+    """Stands for the states that were active at the last exit of the state around (SCXML 3.10; dialect `scxml` only).
 
     Attributes:
-        history: `shallow` remembers the states directly inside, `deep` the innermost ones. What ran inside a
-            submachine or dynamic state is not remembered: such a state begins anew.
-        target: the state to enter (`to`) if the state around was never left.
+        history: `shallow` remembers the states directly inside, `deep` the innermost ones. The content of a submachine
+            or dynamic state is not remembered: such a state starts again.
+        target: the state to enter (`to`) if the state around was never exited.
         do: internal actions of that default.
     """
 

@@ -1,4 +1,4 @@
-"""Edges of the chart: what states and connectors hold, under the keys that say when each is taken."""
+"""Transitions of states and connectors, under the keys that name their triggers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from knowledge_base.language.expression import Constant, Term
 
 
 def as_tuple(value: Any) -> Any:
-    """A list as it is, anything else as the only element: the short form of lists of one."""
+    """Return a list unchanged, anything else as the only element: the short form of lists of one."""
     return tuple(value) if isinstance(value, list | tuple) else (value,)
 
 
@@ -26,25 +26,25 @@ def _a_duration(value: Term) -> Term:
 
 
 Duration = Annotated[TermField, AfterValidator(_a_duration)]
-"""Seconds; where it is a constant, a number that is not negative."""
+"""Seconds; a constant is a number of at least 0."""
 
 
 class Transition(Frozen):
-    """An edge of the chart; its trigger is the key it stands under.
+    """An edge of the chart; the key around it names its trigger.
 
     Attributes:
-        target: name of the state to enter (`to`); none means: stay, only the actions happen.
+        target: name of the state to enter (`to`); without one, only the actions run.
         guard: condition that must hold (`when`).
-        assign, tell, emit, arguments: internal actions in this order, written directly; `arguments` (`with`)
-            are the attributes of the emitted event.
+        assign, tell, emit, arguments: internal actions in this order, written directly; `arguments` (`with`) are the
+            attributes of the emitted event.
         do: more internal actions, before those.
-        passed: arguments (`pass`) for the plot of the target, a submachine or dynamic state, over its own `with`;
-            event attributes and this plot's parameters and variables are the sources (S2.1).
-        clear: states whose histories are forgotten on the way; with `*` behind the name those of all levels
-            below too (Harel's clear-history(state) and clear-history(state*); only in dialect `scxml`).
-        rule: label of the contingency rule that put the transition there.
+        passed: arguments (`pass`) for the plot of the target state, over its own `with` (S2.1). Event attributes and
+            this plot's parameters and variables are the sources.
+        clear: states whose histories are cleared; `*` after a name includes all levels below. These are Harel's
+            clear-history(state) and clear-history(state*); only in dialect `scxml`.
+        rule: label of the contingency rule that created the transition.
         also: more targets, in other regions (only in dialect `scxml`).
-        internal: a composite source is not left if the target is inside it (SCXML 3.5; only in dialect `scxml`).
+        internal: a composite source stays active if the target is inside it (SCXML 3.5; only in dialect `scxml`).
     """
 
     target: str | None = Field(default=None, alias="to")
@@ -83,19 +83,19 @@ class Transition(Frozen):
 
     @property
     def emitted(self) -> tuple[str, ...]:
-        """The events its actions fire."""
+        """The events that its actions fire."""
         effect = self.effect  # most transitions have none, and large plots have many transitions
         return tuple(action.emit for action in flat(effect) if isinstance(action, Emit)) if effect else ()
 
 
 class TimedTransition(Transition):
-    """A transition taken `seconds` after its state was entered, unless the state was left before."""
+    """A transition taken `seconds` after the entry of its state, unless the state was exited before."""
 
     seconds: Duration
 
 
 class CyclicTransition(TimedTransition):
-    """A transition taken every `seconds` while its state is active (S3.2); 0 seconds would never come to rest."""
+    """A transition taken every `seconds` while its state is active (S3.2); 0 seconds would never end a macrostep."""
 
     @field_validator("seconds")
     @classmethod
@@ -106,7 +106,7 @@ class CyclicTransition(TimedTransition):
 
 
 def as_transition(value: Any) -> Any:
-    """A transition, or the name of its target: the short form."""
+    """Return a transition, or the name of its target: the short form."""
     return {"to": value} if isinstance(value, str) else value
 
 
@@ -120,15 +120,15 @@ CyclicTransitions = Annotated[tuple[CyclicTransition, ...], BeforeValidator(as_t
 
 
 class TransitionSource(Frozen):
-    """What transitions lead away from: a state or a connector."""
+    """The source of transitions: a state or a connector."""
 
     about: str | None = None
 
     @abstractmethod
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
-        """Every outgoing transition in order, with its path inside the source and the label of its trigger."""
+        """Yield every outgoing transition in order, with its path inside the source and the label of its trigger."""
 
     def transitions(self) -> Iterator[tuple[str, Transition]]:
-        """Every outgoing transition with the label of its trigger."""
+        """Yield every outgoing transition with the label of its trigger."""
         for _, trigger, transition in self.placed_transitions():
             yield trigger, transition

@@ -69,9 +69,9 @@ BROKEN = [
     ("plot: p\nconfirm: .inf" + END, 2, "finite"),
     ("plot: p\nwhen: (or" + END, 2, "'(' is never closed"),
     ("plot: p\n1: 5" + END, 2, "a key is a name; '1' is none"),
-    ("plot: p\nparameters:\n  Item: item" + END, 3, "'Item' is no name for a variable"),
-    ("plot: p\nvariables:\n  two words: item" + END, 3, "'two words' is no name for a variable"),
-    ("plot: p\nemits:\n  failed:\n    itemName: item" + END, 4, "'itemName' is no name for a variable"),
+    ("plot: p\nparameters:\n  Item: item" + END, 3, "'Item' is not a name for a variable"),
+    ("plot: p\nvariables:\n  two words: item" + END, 3, "'two words' is not a name for a variable"),
+    ("plot: p\nemits:\n  failed:\n    itemName: item" + END, 4, "'itemName' is not a name for a variable"),
     (
         "plot: p\nparameters: {n: number}\nvariables:\n  n: number" + END,
         4,
@@ -79,7 +79,7 @@ BROKEN = [
     ),
     # states
     ("plot: p\nstates:\n  s: text", 3, "a mapping was expected"),
-    ("plot: p\nstates:\n  a/b: {}", 3, "'a/b' is no name for a state"),
+    ("plot: p\nstates:\n  a/b: {}", 3, "'a/b' is not a name for a state"),
     (HEAD + "    states:\n      t:\n        states:\n          s: {}", 7, "two states are named 's'"),
     (HEAD + "    onn: {e: s}", 4, "did you mean 'on'?"),
     (HEAD + "    usee: q", 4, "did you mean 'use'?"),
