@@ -1,1 +1,1 @@
-"""Which plot a dynamic state becomes, and why; what a plot's rules make of outcomes."""
+"""Dynamic states choose their content among plots; rules and handlers expand into states and transitions."""

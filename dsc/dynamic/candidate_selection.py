@@ -1,4 +1,4 @@
-"""Choosing the content of a dynamic state: top-down the candidates, bottom-up their conditions (S0.4)."""
+"""Selection of a dynamic state's content: top-down the candidates, bottom-up their conditions (S0.4)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from knowledge_base.language.expression import Constant, substitute
 from knowledge_base.language.printer import to_text
 
 ACHIEVE = "achieve"
-"""The plot of the library that stands in when no designed candidate fits: plan, execute, replan."""
+"""The library's plot for a goal without a fitting candidate: plan, execute, replan."""
 
 
 def choose(
     state: DynamicState, holder: str, bindings: Mapping[str, Any], world: World, plots: Plots, version: int
 ) -> Decision:
-    """The decision record for entering `state` in the plot named `holder`.
+    """Return the decision record for entering `state` in the plot named `holder`.
 
-    A goal that holds already needs no content. Otherwise the first candidate whose condition holds is
-    chosen; with a goal and no such candidate, `achieve`.
+    A goal that holds already needs no content. Otherwise the first candidate whose condition holds is chosen; with a
+    goal and no such candidate, `achieve`.
 
     Raises:
         UnknownNameError: a candidate is not in the library, or a variable has no value.
@@ -53,7 +53,7 @@ def choose(
 
 
 def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdict:
-    """Whether a candidate's condition holds for these arguments, and the leaf that decides."""
+    """Return whether a candidate's condition holds for these arguments, with the leaf that decides."""
     if plot.when is None:
         return Verdict(plot.name, fits=True, reason="no condition")
     bindings = {**_defaults(plot), **arguments}
@@ -70,10 +70,10 @@ def _defaults(plot: ActionPlot) -> dict[str, Any]:
 
 
 def plain(content: Content) -> Any:
-    """What a chart's variable may hold of it: plain JSON, so a geometry is a list of numbers."""
+    """Return the content as a value for a chart's variable: plain JSON, with a geometry as a list of numbers."""
     return list(content) if isinstance(content, tuple) else content
 
 
 def scalars(bindings: Mapping[str, Any]) -> dict[str, Any]:
-    """The bindings a condition can speak about; plots and other structures held in variables are not."""
+    """Return the bindings that a condition can use; drop plots and other structures held in variables."""
     return {name: value for name, value in bindings.items() if isinstance(value, str | int | float | bool)}

@@ -1,12 +1,12 @@
 r"""Event handlers as states and transitions (S1.14).
 
-A handler that interrupts adds to every state that can rest a way to a state for what it does, and from there back.
-The others stand in regions of their own beside the whole plot, one for each event:
+An interrupting handler adds to each state a transition to a state with its actions, and one back. The other handlers
+get separate regions parallel to the whole plot, one for each event:
 
     active { plot: ... ended_reached | low_bat: awaited <-> handled }  --> ended
 
-What a handler listens to is activated when that whole is entered, and never again: an activation that is made while its
-condition holds would bring the event at once. The whole says inside what it has heard, by an event of its own.
+The orthogonal state activates each handler's `listen` once, at its entry. A second activation would repeat the event
+if the condition still holds. The orthogonal state passes each received event inside under a separate name.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from knowledge_base.language.expression import Variable
 States = dict[str, AnyState]
 _EVENT = "event."
 BESIDE = "active"
-"""Name of the state that holds the plot and its handlers side by side, as long as none of its own is called so."""
+"""Name of the orthogonal state with the plot and its handlers; a number follows if the name is taken."""
 
 
 def with_handlers(
     plot: ActionPlot, written: ActionPlot, plots: Plots, added: FreshNames, entrances: Mapping[str, str]
 ) -> ActionPlot:
-    """The plot with the handlers that were `written`.
+    """Return the plot with the handlers that were `written`.
 
     Args:
-        plot: its rules are carried out.
+        plot: the plot with its rules already expanded.
         written: the plot as people wrote it.
-        plots: where the plots are found that handlers use.
-        added: gives names to what is added.
-        entrances: states that are entered by way of another one.
+        plots: provider of the plots that handlers use.
+        added: gives names to added elements.
+        entrances: states that are entered through another one.
 
     Raises:
-        UnknownNameError: a handler uses a plot that is not there.
+        UnknownNameError: a handler uses a missing plot.
     """
     interrupting = [one for one in written.handlers if one.interrupt]
     listening = {one.on: added.event(f"{one.on}_heard") for one in written.handlers if one.listen is not None}
@@ -66,7 +66,7 @@ class _Handling:
     def interrupted(
         self, states: Mapping[str, AnyState], handlers: list[Handler], entrances: Mapping[str, str]
     ) -> States:
-        """The states of a scope, each with a way to every handler and back; regions are interrupted as one."""
+        """Return the states of a scope, each with transitions to all handlers and back; interrupt regions as one."""
         result: States = {}
         for name, state in states.items():
             if isinstance(state, CompositeState):
@@ -88,7 +88,7 @@ class _Handling:
         return {name: state.model_copy(update={"on": on}), **more}
 
     def around(self, plot: ActionPlot, handlers: Iterable[Handler]) -> ActionPlot:
-        """The plot as one region, and one for each event that is handled beside it; the whole listens."""
+        """Return the plot as one region, with a region for each handled event; the orthogonal state listens."""
         handlers = list(handlers)
         beside = [handler for handler in handlers if not handler.interrupt]
         reached = {name: self._added.state(f"{name}_reached") for name in _ends(plot)}
@@ -134,7 +134,7 @@ def _ends(plot: ActionPlot) -> dict[str, FinalState]:
 
 
 def _inside(plot: ActionPlot, reached: Mapping[str, str]) -> States:
-    """The plot's states as those of a region: its ends are reached there first, and say so."""
+    """Return the plot's states as those of a region: its ends become final states of the region, with an event each."""
 
     def to_region(way: Way) -> Way:
         return way.model_copy(update={"target": reached.get(way.target or "", way.target)})
@@ -149,12 +149,12 @@ def _inside(plot: ActionPlot, reached: Mapping[str, str]) -> States:
 
 
 def _told_its_attributes(end: FinalState) -> FinalState:
-    """An end of the plot that hears from the region what it hands on."""
+    """Return an end of the plot that takes its attributes from the event of the region's end."""
     return end.model_copy(update={"arguments": {key: Variable(_EVENT + key) for key in end.arguments}})
 
 
 def _passed_on(heard: str, mentioned: Iterable[str]) -> Transition:
-    """Says inside that the event has come, with those of its attributes that handlers want to know."""
+    """Return a transition that fires the event inside, with the attributes that its handlers read."""
     known = sorted(name.removeprefix(_EVENT) for name in mentioned if name.startswith(_EVENT))
     return Transition(target=None, do=(Emit(emit=heard, arguments={key: Variable(_EVENT + key) for key in known}),))
 

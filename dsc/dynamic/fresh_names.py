@@ -1,4 +1,4 @@
-"""Names for what rules and handlers add to a plot, none of which the plot has already."""
+"""Unused names for states, events and variables that rules and handlers add to a plot."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dsc.model.plot import ActionPlot, PlotVariable
 
 
 class FreshNames:
-    """What is added to one plot.
+    """Gives unused names in one plot.
 
     Attributes:
         variables: the added ones.
@@ -24,19 +24,19 @@ class FreshNames:
         self.variables: dict[str, PlotVariable] = {}
 
     def state(self, wanted: str) -> str:
-        """A name for a state, as near as may be to the one that is wanted."""
+        """Return a name for a state: the wanted one, or with a number if it is taken."""
         name = _unused(wanted, self._names)
         self._names.add(name)
         return name
 
     def event(self, wanted: str) -> str:
-        """A name for an event inside, as near as may be to the one that is wanted."""
+        """Return a name for an internal event: the wanted one, or with a number if it is taken."""
         name = _unused(wanted, self._events)
         self._events.add(name)
         return name
 
     def variable(self, wanted: str, type_: str, initial: Any = None) -> str:
-        """A new variable, named as near as may be to what is wanted."""
+        """Add a variable under the wanted name, or with a number if it is taken; return its name."""
         taken = ChainMap[str, object](self.variables, *self._declared)  # type: ignore[arg-type]
         name = _unused(wanted.lower().replace("-", "_"), taken)
         declared = {"type": type_} if initial is None else {"type": type_, "initial": initial}
@@ -45,6 +45,6 @@ class FreshNames:
 
 
 def _unused(name: str, taken: Container[str]) -> str:
-    """The name, with a number behind it if it is taken."""
+    """Return the name, followed by a number if it is taken."""
     numbered = (f"{name}_{number}" for number in itertools.count(2))
     return name if name not in taken else next(other for other in numbered if other not in taken)

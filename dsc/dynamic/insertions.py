@@ -1,9 +1,9 @@
-r"""What rules insert before a step and after it, or have left out, as connectors and states (S1.4).
+r"""Insertions of rules before and after steps, and skipped steps, as connectors and states (S1.4).
 
-    -> <clean?> -> look            before: look
-          \-> wipe -/
+    -> <clean?> -> look   before: look
+         \-> wipe -/
 
-Each rule is asked once whenever the step is entered, however that comes about, or has been done.
+Each rule is evaluated once at every entry of the step, from any source, or after every completion.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from knowledge_base.language.expression import Term
 
 
 class Insertions:
-    """The ways that lead through the insertions of one plot.
+    """Builds the insertions of one plot.
 
     Attributes:
-        entrances: step -> the connector in front of it, for those that have one.
+        entrances: step -> the connector in front of it, if it has one.
     """
 
     def __init__(self, plot: ActionPlot, plots: Plots, added: FreshNames, responses: Responses) -> None:
@@ -38,15 +38,15 @@ class Insertions:
         self._added, self._responses = added, responses
         self._steps: dict[str, Step] = {}
         self._before: dict[str, list[tuple[int, Rule]]] = {}
-        self._leading: dict[str, str] = {}  # what was added in front of a step -> the step
+        self._leading: dict[str, str] = {}  # added state in front of a step -> the step
         self.entrances: dict[str, str] = {}
         self._placed = [(number, rule) for number, rule in enumerate(plot.rules) if rule.on is None]
 
     def through(self, states: Mapping[str, AnyState], written: Iterable[str]) -> States:
-        """The states of one scope with all insertions.
+        """Return the states of one scope with all insertions.
 
         Args:
-            states: those written, and those that the rules for outcomes have added.
+            states: the written ones, and those added for outcome rules.
             written: the names of the first.
         """
         if not self._placed:
@@ -75,7 +75,7 @@ class Insertions:
         return [(n, about_step(one, state, self._plot)) for n, one in found]
 
     def _after(self, name: str, state: Step) -> States:
-        """The state, whose ways out when it is done lead through what is inserted after it."""
+        """Return the state with its transitions on `done` redirected through the insertions after it."""
         rules = self._of(name, state, "after")
         if not rules or DONE not in state.on:
             return {name: state}
@@ -87,7 +87,7 @@ class Insertions:
         return {name: state.model_copy(update={"on": {**state.on, DONE: tuple(ways)}}), **more}
 
     def _in_front_of(self, name: str, passed: Mapping[str, Term], states: States) -> str:
-        """The first of the connectors in front of a step."""
+        """Return the first of the connectors in front of a step."""
         more: States = {}
         last = Transition(target=name, passed=dict(passed))
         first = self._chain(f"{name}_before", name, self._steps[name], self._before[name], ENTER, last, more)
@@ -112,7 +112,7 @@ class Insertions:
         self, way: Transition, mark: str, name: str, state: Step, rules: list[tuple[int, Rule]], by_default: str,
         states: States,
     ) -> Transition:  # fmt: skip
-        """A transition that leads through insertions to where it led before."""
+        """Return a transition that leads through insertions to its former target."""
         kept: dict[str, Term] = {}
         last = Transition(target=way.target, passed=self._responses.remembered(way.passed, mark, kept))
         first = self._chain(mark, name, state, rules, by_default, last, states)
@@ -122,13 +122,13 @@ class Insertions:
         self, mark: str, name: str, state: Step, rules: list[tuple[int, Rule]], by_default: str, last: Transition,
         states: States,
     ) -> Transition:  # fmt: skip
-        """One connector after the other, and behind them `last`."""
+        """Build the connectors in sequence, with `last` at the end."""
         following = last
         for number, rule in reversed(rules):
             key = f"{mark}_{number}"
             if rule.then != by_default:
                 onward = self._responses.onward(rule, number, name, state)
-            elif rule.do.passed:  # they go with the last stretch of the way
+            elif rule.do.passed:  # arguments belong to the last transition of the sequence
                 onward = [last.model_copy(update={"passed": {**last.passed, **rule.do.passed}})]
             else:
                 onward = [following]
@@ -152,7 +152,7 @@ class Insertions:
 
 
 def _handing_over(way: Way, target: str, kept: Mapping[str, Term]) -> Way:
-    """The transition to another target, which keeps in variables what it would have passed."""
+    """Return the transition to another target, with its passed arguments kept in variables."""
     if not kept:
         return way.model_copy(update={"target": target})
     own = (Assign(assign=way.assign),) if way.assign else ()
@@ -161,5 +161,5 @@ def _handing_over(way: Way, target: str, kept: Mapping[str, Term]) -> Way:
 
 
 def _in_order(result: States, states: Mapping[str, AnyState]) -> States:
-    """The states as they were, then what was added."""
+    """Order the written states first, then the added ones."""
     return {**{name: result[name] for name in states}, **result}

@@ -1,4 +1,4 @@
-"""The engine's window on a knowledge base: one version plus what the macrostep told."""
+"""Situation of the engine on a knowledge base: one version plus the changes of the macrostep."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from knowledge_base.world.overlay import Overlay
 
 
 class KnowledgeSituation:
-    """A `Situation` for one macrostep; the knowledge base itself is not touched."""
+    """A `Situation` for one macrostep; it leaves the knowledge base unchanged."""
 
     def __init__(self, knowledge: KnowledgeBase, library: Library) -> None:
         self._version = knowledge.version
@@ -27,7 +27,7 @@ class KnowledgeSituation:
 
     @property
     def _world(self) -> Overlay:
-        """What is known and what was told; most steps ask nothing and tell nothing."""
+        """The knowledge with the macrostep's changes, created on first use: most steps neither read nor change it."""
         if self._pending is None:
             self._pending = self._knowledge.overlay()
         return self._pending

@@ -1,4 +1,4 @@
-"""The library of plots: found by name, with rules carried out and tables made once (S0.9)."""
+"""Library of plots: finds them by name, expands their rules and compiles their tables once (S0.9)."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import shown
 
 MOST_BOUND = 64
-"""Plots given as data whose tables are kept: a retry binds the same plan again, a long run makes ever new ones."""
+"""Upper bound of compiled plots given as data: a retry binds the same plan again, and a long run has many plans."""
 
 MOST_EXPECTED = 4
-"""Plots made in this process that wait for being bound: of each plan the last one."""
+"""Upper bound of plots made in this process and not yet bound: the last one of each plan."""
 
 
 class Library:
-    """Plots by name; also gives the engine their compiled form."""
+    """Plots by name; provides the engine with their compiled form."""
 
     def __init__(self, plots: Iterable[ActionPlot] = ()) -> None:
         self._plots: dict[str, ActionPlot] = {}
@@ -36,18 +36,18 @@ class Library:
             self.add(plot)
 
     def __iter__(self) -> Iterator[ActionPlot]:
-        """All plots, in the order in which they were added."""
+        """Yield all plots, in the order in which they were added."""
         return iter(self._plots.values())
 
     def __contains__(self, name: object) -> bool:
-        """Whether a plot of that name is there."""
+        """Return whether the library has a plot of that name."""
         return name in self._plots
 
     def add(self, plot: ActionPlot) -> None:
         """Add a plot.
 
         Raises:
-            InputError: it is no plot.
+            InputError: the value is not a plot.
             SchemaError: another plot has its name.
         """
         if not isinstance(plot, ActionPlot):
@@ -59,30 +59,30 @@ class Library:
         self._plots[plot.name] = plot
 
     def plot(self, name: str) -> ActionPlot:
-        """The plot as it was written; raises `UnknownNameError`."""
+        """Return the plot as it was written; raise `UnknownNameError`."""
         found = self._plots.get(name)
         if found is None:
             raise UnknownNameError(f"there is no plot '{name}'", found=name, valid=self._plots)
         return found
 
     def substitute(self, name: str, plot: ActionPlot) -> Library:
-        """A new library in which `plot` stands in place of the plot of that name; this one stays as it is.
+        """Return a new library in which `plot` replaces the plot of that name; this library is unchanged.
 
-        Everything that used the old plot uses the new one: a whole branch is replaced, for a test or for good.
+        All users of the old plot use the new one: this replaces a whole branch, for a test or permanently.
 
         Raises:
-            UnknownNameError: there is no plot of that name.
-            SchemaError: who holds the old plot could not hold the new one; see `substitution.stand_in`.
+            UnknownNameError: the library has no plot of that name.
+            SchemaError: a holder of the old plot could not hold the new one; see `substitution.stand_in`.
         """
         other = stand_in(self.plot(name), plot)
         return Library(other if own.name == name else own for own in self)
 
     def with_default(self, plot: str, name: str, value: object, who: Who) -> Library:
-        """A new library in which a plot's parameter has another default; tables that are made stay.
+        """Return a new library in which a plot's parameter has another default; other plots keep their tables.
 
         Raises:
             UnknownNameError: there is no such plot or parameter.
-            InputError: the value does not fit the parameter, or it is not for `who` to say.
+            InputError: the value does not fit the parameter, or `who` may not set it.
         """
         changed = self.plot(plot).with_default(name, value, who)
         other = Library(changed if own.name == plot else own for own in self)
@@ -91,36 +91,36 @@ class Library:
         return other
 
     def expanded(self, plot: ActionPlot) -> ActionPlot:
-        """The plot with its rules and handlers as states and transitions; see `expand`."""
+        """Return the plot with its rules and handlers as states and transitions; see `expand`."""
         return expand(plot, self)
 
     def implementing(self, planning_action: str) -> tuple[ActionPlot, ...]:
-        """The plots that carry out a planning action, in the order of the library."""
+        """Return the plots that execute a planning action, in the order of the library."""
         return tuple(plot for plot in self if plot.implements == planning_action)
 
     def compiled(self, name: str) -> CompiledPlot:
-        """The plot's tables; raises `UnknownNameError`."""
+        """Return the plot's tables; raise `UnknownNameError`."""
         if name not in self._compiled:
             self._compiled[name] = compile_plot(self.expanded(self.plot(name)))
         return self._compiled[name]
 
     def expect(self, plot: ActionPlot) -> None:
-        """The plot may soon be bound as data; its form, unchanged, need not be read then."""
+        """Remember a plot for a later `bind` of its unchanged form, which then skips reading."""
         self._made[plot.text] = plot
         if len(self._made) > MOST_EXPECTED:
             del self._made[next(iter(self._made))]
 
     def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
-        """A plot given as data; equal data share their tables.
+        """Compile a plot given as data; equal data share their tables.
 
         Raises:
-            InputError: the data are no plot, or it names unknown plots.
+            InputError: the data are not a plot, or it names unknown plots.
         """
-        if not isinstance(form, Mapping):  # whatever a variable may hold
-            raise InputError(f"the value to be bound is no plot: {form!r}")
+        if not isinstance(form, Mapping):  # a variable may hold any value
+            raise InputError(f"the value to be bound is not a plot: {form!r}")
         key = json.dumps(form)  # the order of states counts
         compiled = self._bound.pop(key, None) or compile_plot(self.expanded(self._made.get(key) or _read(form)), form)
-        self._bound[key] = compiled  # the last one is kept longest
+        self._bound[key] = compiled  # the last used plot is dropped last
         if len(self._bound) > MOST_BOUND:
             del self._bound[next(iter(self._bound))]
         return compiled
@@ -130,4 +130,4 @@ def _read(form: Mapping[str, Any]) -> ActionPlot:
     try:
         return ActionPlot.model_validate(form)
     except InputError as error:
-        raise InputError(f"the value to be bound is no plot: {error}") from error
+        raise InputError(f"the value to be bound is not a plot: {error}") from error

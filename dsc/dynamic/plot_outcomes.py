@@ -1,4 +1,4 @@
-"""How a state can end, found from the plots it uses: its outcome events, and what its completion hands on."""
+"""Outcomes of states, derived from the plots they use: outcome events, and the outputs at completion."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ _FAILED: Outcomes = {
 
 
 class Plots(Protocol):
-    """Where plots are found by name."""
+    """Provider of plots by name."""
 
     def __iter__(self) -> Iterator[ActionPlot]:
-        """All of them."""
+        """Yield all plots."""
         ...
 
     def plot(self, name: str) -> ActionPlot:
-        """Raises `UnknownNameError`."""
+        """Return the plot of that name; raise `UnknownNameError`."""
         ...
 
 
 def outputs_of(state: AnyState, plots: Plots) -> Mapping[str, str] | None:
-    """What the completion of a state hands on: name -> type (S2.1); `None` if nobody can know it beforehand.
+    """Return the outputs of a state at completion: name -> type (S2.1); `None` if they depend on a variable.
 
-    A dynamic state has what all its candidates have, with the same type; a plan for a goal has nothing.
+    A dynamic state has the outputs that all its candidates share, with the same type. A plan for a goal has none.
 
     Raises:
-        UnknownNameError: the state names a plot that is not there.
+        UnknownNameError: the state names a missing plot.
     """
     if isinstance(state, SubmachineState):
         return None if state.use.startswith("?") else _outputs(plots.plot(state.use))
@@ -51,12 +51,12 @@ def _outputs(plot: ActionPlot) -> dict[str, str]:
 
 
 def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:
-    """The outcome events of a submachine or dynamic state; nothing for other kinds.
+    """Return the outcome events of a submachine or dynamic state; nothing for other kinds.
 
-    A state that uses a plot held in a variable has outcomes that nobody can know beforehand; none are given.
+    The outcomes of a plot held in a variable are unknown beforehand; the result is empty.
 
     Raises:
-        UnknownNameError: the state names a plot that is not there.
+        UnknownNameError: the state names a missing plot.
     """
     if isinstance(state, SubmachineState):
         return {} if state.use.startswith("?") else plots.plot(state.use).emits
@@ -71,10 +71,10 @@ def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:
 
 
 def answerable(state: AnyState, plots: Plots) -> Outcomes:
-    """What a rule can answer at a state: its outcomes, and failures of skills that the plot inside does not take.
+    """Return the events that a rule can answer at a state: outcomes, and skill failures that its plot does not take.
 
     Raises:
-        UnknownNameError: the state names a plot that is not there.
+        UnknownNameError: the state names a missing plot.
     """
     outcomes = outcomes_of(state, plots)
     return {**outcomes, **_FAILED} if isinstance(state, SubmachineState | DynamicState) else outcomes

@@ -1,4 +1,4 @@
-"""The same state with its transitions leading elsewhere."""
+"""Redirection of a state's transitions."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Way = TypeVar("Way", bound=Transition)
 
 
 class Redirect(Protocol):
-    """Gives a transition as it shall be; timed ones stay timed."""
+    """Maps a transition to its replacement; timed transitions stay timed."""
 
     def __call__(self, way: Way, /) -> Way:
-        """The transition in its place."""
+        """Return the replacement of a transition."""
         ...
 
 
 def redirected(state: AnyState, redirect: Redirect) -> AnyState:
-    """The state with other ways out."""
+    """Return the state with redirected transitions."""
     if isinstance(state, State):
         return state.model_copy(update={
             "on": {event: tuple(map(redirect, ways)) for event, ways in state.on.items()},

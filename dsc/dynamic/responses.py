@@ -1,4 +1,4 @@
-"""What a rule's response becomes: transitions, a state that runs its recovery, variables that count and remember."""
+"""Responses of rules as transitions, recovery states, and variables for counters and remembered values."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from knowledge_base.language import expression as lang
 from knowledge_base.language.effect import substitute_effect
 
 DEFAULT_RETRIES = 3
-"""Bound on `retry` and `replan` responses that name none, so that no rule can go on for ever."""
+"""Limit of `retry` and `replan` responses without a `limit`, so that no rule repeats without end."""
 
 States = dict[str, AnyState]
 Terms = Mapping[str, lang.Term]
 
 
 class Responses:
-    """Carries out the responses of one plot's rules.
+    """Expands the responses of one plot's rules.
 
     Args:
         plot: the plot.
-        plots: where the plots are found that rules use.
-        added: gives names to what is added.
+        plots: provider of the plots that rules use.
+        added: gives names to added elements.
     """
 
     def __init__(self, plot: ActionPlot, plots: Plots, added: FreshNames) -> None:
@@ -44,13 +44,13 @@ class Responses:
         self._endings: dict[tuple[str, str], Transition] = {}
 
     def carried_out(self, rule: Rule, key: str, onward: Iterable[Transition], states: States) -> list[Transition]:
-        """The transitions that do what a rule says and then go `onward`; `states` gets the state that this takes.
+        """Return transitions with the response of a rule, followed by `onward`; add its recovery state to `states`.
 
         Args:
-            rule: speaks of the step's arguments no more.
-            key: names what is added for it.
-            onward: what follows the response.
-            states: is added to.
+            rule: the rule, with the step's arguments already substituted.
+            key: part of the names of added elements.
+            onward: transitions after the response.
+            states: receives the added states.
         """
         guard, counting = self._limit(rule, key)
         onward = list(onward)
@@ -64,7 +64,7 @@ class Responses:
         return [_joined(rule, guard, {**counting, **kept}, Transition(target=name))]
 
     def onward(self, rule: Rule, number: int, name: str, state: State) -> list[Transition]:
-        """What follows the response of a rule, which stands at that place in the plot, to a step."""
+        """Return the transitions after a rule's response to a step; `number` is the rule's position in the plot."""
         then, about = rule.then, rule.label if rule.on is None else rule.on
         if self._plot.generated and (then in {REPLAN, GIVE_UP} or rule.leads_away):
             return [self._leaving(rule, name, about)]
@@ -78,21 +78,21 @@ class Responses:
         return [Transition(target=target, passed=rule.do.passed)]
 
     def _leaving(self, rule: Rule, name: str, about: str) -> Transition:
-        """Out of the generated plot."""
+        """Return a transition out of the generated plot."""
         if rule.leads_away:
             return Transition(target=self._end(self._beside[name], rule.outcome), passed=rule.do.passed)
-        reason = about if rule.do.acts or rule.on is None else reason_of(rule.on)  # else the event is another one
+        reason = about if rule.do.acts or rule.on is None else reason_of(rule.on)  # the event has another source
         return self.ending(name, REPLAN if rule.then == REPLAN else GAVE_UP, reason)
 
     def ending(self, name: str, outcome: str, reason: str) -> Transition:
-        """To the final state beside a step that ends the generated plot with the outcome."""
+        """Return a transition from a step to its scope's final state that ends the generated plot with the outcome."""
         end = self._end(self._beside[name], outcome)
-        if (end, reason) not in self._endings:  # the same for many steps
+        if (end, reason) not in self._endings:  # shared by many steps
             self._endings[end, reason] = Transition.model_validate({"to": end, "assign": {"reason": reason}})
         return self._endings[end, reason]
 
     def _handed_out(self, way: Transition) -> Transition:
-        """What is passed to an end of the plot becomes the variables that this end hands out."""
+        """Assign arguments for an end of the plot to the variables that this end returns."""
         end = self._states.get(way.target or "")
         if not way.passed or not isinstance(end, FinalState):
             return way
@@ -100,14 +100,14 @@ class Responses:
         return way.model_copy(update={"passed": {}, "do": (*way.do, Assign(assign=handed))})
 
     def _end(self, scope: Mapping[str, AnyState], outcome: str) -> str:
-        """The final state of a scope that emits the outcome; looked for once."""
+        """Return the name of the scope's final state that emits the outcome; the search is cached."""
         if (id(scope), outcome) not in self._ends:
             found = (each for each, one in scope.items() if isinstance(one, FinalState) and one.emit == outcome)
             self._ends[id(scope), outcome] = next(found, outcome)
         return self._ends[id(scope), outcome]
 
     def remembered(self, terms: Terms, key: str, kept: dict[str, lang.Term]) -> dict[str, lang.Term]:
-        """The terms as variables of the plot, which `kept` says how to assign."""
+        """Return the terms as variables of the plot; `kept` receives their assignments."""
         found: dict[str, lang.Term] = {}
         for name, term in terms.items():
             variable = self._added.variable(f"kept_{key}_{name}", "symbol")
@@ -116,7 +116,7 @@ class Responses:
         return found
 
     def _kept(self, terms: Terms, key: str, kept: dict[str, lang.Term]) -> dict[str, lang.Term]:
-        """The terms with those remembered that read the event: it is gone when the state is left or entered anew."""
+        """Store terms that read the event in variables: the event is gone after an exit or a new entry of the state."""
         lost = {name: term for name, term in terms.items() if reads_event(term)}
         return {**terms, **self.remembered(lost, key, kept)}
 
@@ -149,23 +149,23 @@ class Responses:
 
 
 def limit_of(rule: Rule, *, generated: bool = False) -> int | None:
-    """How often a rule answers for one state; `None` for as often as need be."""
+    """Return a rule's limit of answers for one state; `None` if unlimited."""
     bounded = rule.then == RETRY or (rule.then == REPLAN and not generated)
     return rule.do.limit or (DEFAULT_RETRIES if bounded else None)
 
 
 def skipped(step: str) -> str:
-    """In a generated plot, the state beside a step that goes on without waiting for the effects it would have had."""
+    """Return the name of the state that continues a generated plot after a step, without waiting for its effects."""
     return f"{step}_skipped"
 
 
 def reason_of(event: str) -> str:
-    """Why a step did not go on: a failure says so itself."""
+    """Return the reason why a step failed; a failure event carries its reason."""
     return "?event.reason" if event in FAILURES else event
 
 
 def reads_event(term: lang.Term) -> bool:
-    """Whether a term reads an attribute of the event."""
+    """Return whether a term reads an attribute of the event."""
     return any(name.startswith("event.") for name in lang.free_variables(term))
 
 
@@ -174,7 +174,7 @@ def _spoken(rule: Rule) -> str:
 
 
 def because(outcome: str, giving_up: Transition) -> Transition:
-    """A state's way out on `gave_up`, taken on another outcome: that outcome is the reason."""
+    """Return a transition on `gave_up` for use on another outcome, with that outcome as the reason."""
     reason = {"event.reason": lang.Constant(outcome)}
     return giving_up.model_copy(
         update={
@@ -196,12 +196,12 @@ def _action_because(action: Internal, reason: Terms) -> Internal:
             return Assign(assign=filled(action.assign, reason))
         case Emit():
             return action.model_copy(update={"arguments": filled(action.arguments, reason)})
-        case _:  # a log or a branch of dialect scxml stays as it is
+        case _:  # a log or a branch of dialect scxml is unchanged
             return action
 
 
 def _joined(rule: Rule, guard: lang.Expression | None, counting: Terms, after: Transition) -> Transition:
-    """One transition that does what the rule says and then what comes after it."""
+    """Return one transition with the response of the rule and the actions of `after`."""
     both = [part for part in (guard, after.guard) if part is not None]
     actions: list[Internal] = []
     if rule.do.tell is not None:

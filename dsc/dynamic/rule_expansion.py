@@ -1,4 +1,4 @@
-"""Rules and handlers become ordinary states and transitions, visible in every drawing (S1.4, S1.14)."""
+"""Expansion of rules and handlers into ordinary states and transitions, visible in every drawing (S1.4, S1.14)."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from knowledge_base.language.expression import Arithmetic, Comparison, Constant,
 
 
 def expand(plot: ActionPlot, plots: Plots) -> ActionPlot:
-    """The plot with its rules and handlers turned into states and transitions.
+    """Return the plot with its rules and handlers turned into states and transitions.
 
     Raises:
-        UnknownNameError: a rule or state names a plot that is not there.
-        SchemaError: a rule cannot be carried out at a state.
+        UnknownNameError: a rule or state names a missing plot.
+        SchemaError: a rule cannot be applied at a state.
     """
     if not plot.rules and not plot.handlers and not plot.generated:
         return plot
@@ -42,17 +42,17 @@ class _Expansion:
         self.added = FreshNames(plot)
         self._responses = Responses(plot, plots, self.added)
         self._in_plans = [rule for rule in plot.rules if rule.leads_away and answers_in_plans(rule, plots)]
-        self._given_up: dict[str, str] = {}  # by what states say so inside, and why
+        self._given_up: dict[str, str] = {}  # events by which inner states report `gave_up` -> reason
         self.detours = Insertions(plot, plots, self.added, self._responses)
 
     def scope(self, scope: Scope) -> dict[str, object]:
-        """What changes in a scope: its states, and the one to begin with if there is something before that."""
+        """Return the changed fields of a scope: its states, and a new initial state if an insertion precedes it."""
         states = self.detours.through(self._states(scope.states), scope.states)
         entrance = self.detours.entrances.get(initial_of(scope))
         return {"states": states} if entrance is None else {"states": states, "initial": entrance}
 
     def _states(self, states: Mapping[str, AnyState]) -> States:
-        """The states of one scope, each followed by the recoveries its rules need."""
+        """Return the states of one scope, each followed by the recovery states of its rules."""
         result: States = {}
         for name, state in states.items():
             if isinstance(state, CompositeState | OrthogonalState):
@@ -64,7 +64,7 @@ class _Expansion:
         return result
 
     def _around(self, state: CompositeState | OrthogonalState) -> AnyState:
-        """A state that contains others."""
+        """Return a composite or orthogonal state with its inner scopes expanded."""
         before, self._given_up = self._given_up, {}
         if isinstance(state, CompositeState):
             inside = self.scope(state)
@@ -109,16 +109,16 @@ def led_away(
     added: FreshNames,
     given_up: MutableMapping[str, str],
 ) -> Ways:
-    """The ways out of a state with a goal, with those of rules that leave its plans.
+    """Return the transitions of a state with a goal, with those of rules that leave its plans.
 
     Args:
         name: the state's name.
         state: has the budget.
-        on: its ways out so far.
+        on: its transitions so far.
         beside: the states of its scope.
         rules: those that may answer for steps of plans.
-        added: gives names to what is added.
-        given_up: is told the events by which the state makes known that it has given up, and why; for `answered`.
+        added: gives names to added elements.
+        given_up: receives the events by which the state reports `gave_up`, with reasons; for `answered`.
     """
     leading = {rule.outcome: rule for rule in rules if rule.leads_away and rule.then in beside}
     if not leading:
@@ -138,7 +138,7 @@ def led_away(
 
 
 def answered(on: Ways, given_up: MutableMapping[str, str]) -> Ways:
-    """The ways out of a state, with those for what states inside it make known; what it settles is taken away."""
+    """Return a state's transitions with those for inner `gave_up` reports; remove settled reports from `given_up`."""
     own = on.get(GAVE_UP, ())
     if not (own and given_up):
         return on

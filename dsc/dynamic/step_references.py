@@ -1,4 +1,4 @@
-"""What rules call a step, and its arguments in what a rule says: `?step.item` (S1.4)."""
+"""References of rules to steps, and to a step's arguments as `?step.item` (S1.4)."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Terms = Mapping[str, Term]
 
 
 def contents_of(step: Step, plots: Plots) -> list[ActionPlot]:
-    """The plots that may become the content of a step, as far as that is known.
+    """Return the plots that may become the content of a step; omit a plot held in a variable.
 
     Raises:
-        UnknownNameError: it names a plot that is not there.
+        UnknownNameError: it names a missing plot.
     """
     if isinstance(step, DynamicState):
         return [plots.plot(name) for name in step.dynamic]
@@ -31,7 +31,7 @@ def contents_of(step: Step, plots: Plots) -> list[ActionPlot]:
 
 
 def action_of(step: Step, plots: Plots) -> str | None:
-    """The planning action that all plots implement which the step may hold; `None` if there is no such action."""
+    """Return the one planning action that all possible plots of the step implement, or `None`."""
     if isinstance(step, DynamicState) and step.goal is not None:
         return None
     actions = {plot.implements for plot in contents_of(step, plots)}
@@ -39,12 +39,12 @@ def action_of(step: Step, plots: Plots) -> str | None:
 
 
 def concerns(rule: Rule, name: str, step: Step, plots: Plots) -> bool:
-    """Whether a rule is for that step, as far as steps are named in it."""
+    """Return whether a rule applies to that step; a rule that names no steps applies to all."""
     return not rule.steps or name in rule.steps or action_of(step, plots) in rule.steps
 
 
 def answers_in_plans(rule: Rule, plots: Plots) -> bool:
-    """Whether a rule may answer for steps of plans: those that carry out planning actions, if it names any, theirs."""
+    """Return whether a rule may answer for steps of plans: it names planning actions, or no steps."""
     return any(True for _ in _answered_in_plans(rule, plots))
 
 
@@ -54,7 +54,7 @@ def _answered_in_plans(rule: Rule, plots: Plots) -> Iterator[ActionPlot]:
 
 
 def entered_by(rule: Rule, plot: ActionPlot, plots: Plots) -> Iterator[ActionPlot]:
-    """The plots that are handed what a rule of a plot passes, as far as they are known, each once."""
+    """Yield the known plots that receive the arguments passed by a rule of a plot, each once."""
     steps = {name: state for name, state, _ in plot.walk() if isinstance(state, Step)}
     if rule.leads_away:
         entered = [steps[rule.then]] if rule.then in steps else []
@@ -68,7 +68,7 @@ def entered_by(rule: Rule, plot: ActionPlot, plots: Plots) -> Iterator[ActionPlo
 
 
 def mentioned_in(rule: Rule | Handler) -> frozenset[str]:
-    """The variables that the condition and response of a rule or handler read."""
+    """Return the variables that the condition and response of a rule or handler read."""
     do = rule.do
     passed = do.passed.values() if isinstance(do, Response) else ()
     terms = [*do.arguments.values(), *passed, *(term for c in do.command for term in terms_of(c).values())]
@@ -78,10 +78,10 @@ def mentioned_in(rule: Rule | Handler) -> frozenset[str]:
 
 
 def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
-    """The rule with the step's arguments in place of `?step.item`.
+    """Return the rule with `?step.item` replaced by the step's arguments.
 
     Raises:
-        SchemaError: an argument is a variable of the plot that the rule uses for something else.
+        SchemaError: an argument is a variable of the plot that the rule uses for another value.
     """
     read = mentioned_in(rule)
     arguments = {STEP + name: term for name, term in step.arguments.items() if STEP + name in read}
@@ -101,12 +101,12 @@ def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
 
 
 def filled(terms: Terms, values: Mapping[str, Term]) -> dict[str, Term]:
-    """The terms with others in place of variables."""
+    """Return the terms with variables replaced by other terms."""
     return {name: substitute_term(term, values) for name, term in terms.items()}
 
 
 def terms_of(command: Command) -> Terms:
-    """The values that a command hands to its component."""
+    """Return the values that a command passes to its component."""
     match command:
         case Configure(to=value):
             return {"to": value}

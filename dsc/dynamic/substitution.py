@@ -1,4 +1,4 @@
-"""A plot in another's place: what it must share with the original so that no holder notices (S0.1)."""
+"""Substitution of a plot by another one with an interface that fits all its holders (S0.1)."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dsc.model.plot import ActionPlot
 from knowledge_base.errors import InputError, SchemaError
 
 _ROLE = ("when", "implements", "effects", "confirm")
-"""What a library knows a plot for; a substitute that says nothing about it plays the original's part."""
+"""The properties by which a library knows a plot; a substitute without them takes those of the original."""
 
 
 def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
-    """The substitute under the original's name, with the original's part where it names none of its own.
+    """Return the substitute under the original's name, with the original's role if it declares none.
 
-    That part is the condition as a candidate and the planning action with what is said about its effects. It still
-    declares every outcome of the original, so that what holders have wired is not found to be dead.
+    The role is the condition as a candidate, and the planning action with the treatment of its effects. The result
+    declares every outcome of the original, so that the holders' transitions remain valid.
 
     Raises:
         SchemaError: a holder of the original could not hold the substitute.
@@ -27,12 +27,12 @@ def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
 
 
 def require_stand_in(original: ActionPlot, substitute: ActionPlot) -> None:
-    """Raise an error unless who holds the original could hold the substitute.
+    """Raise an error if a holder of the original could not hold the substitute.
 
-    Holders give all parameters of the original, or only the required ones, and wire its outcomes.
+    Holders pass all parameters of the original, or only the required ones, and wire its outcomes.
 
     Raises:
-        SchemaError: see above; the message says what does not fit.
+        SchemaError: the interfaces differ; the message names the difference.
     """
     for name, parameter in original.parameters.items():
         own = substitute.parameters.get(name)
@@ -48,7 +48,7 @@ def require_stand_in(original: ActionPlot, substitute: ActionPlot) -> None:
             raise _refusal(original, substitute, needs, name, original.parameters)
     for name, output in original.outputs.items():
         if name not in substitute.outputs or substitute.outputs[name].type != output.type:
-            lacking = f"does not hand back '{name}' as '{output.type}'"
+            lacking = f"does not return '{name}' as '{output.type}'"
             raise _refusal(original, substitute, lacking, name, substitute.outputs)
     for event, attributes in substitute.emits.items():
         if event not in original.emits:
