@@ -1,4 +1,4 @@
-"""Pictures of plots: a neutral layout in `layout`, drawn as SVG by `svg`; begin with `drawing.draw`."""
+"""Drawings of plots: `drawing.draw` lays out neutral boxes and edges (`layout`) and writes them as SVG (`svg`)."""
 
 from dsc.drawing.drawing import draw, lay_out
 

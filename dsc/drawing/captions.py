@@ -1,4 +1,4 @@
-"""What is written at edges and in states: triggers, guards and actions in short and in full."""
+"""Captions of edges and states: triggers, guards and actions in short and in full."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from knowledge_base.language.printer import to_text
 from knowledge_base.spelling import value_text
 
 WIDTH = 190.0
-"""Of one line at an edge."""
+"""Width of one caption line at an edge."""
 ALWAYS = "always"
 COUNTER_PREFIX = "tries_"
-"""Of the variables in which expanded rules count how often they answered."""
+"""Prefix of the variables by which expanded rules count their answers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Caption:
-    """One or more triggers with the same guard and actions: short lines, and all of it in one."""
+    """One or more triggers with the same guard and actions: short lines, and the full text on one line."""
 
     lines: tuple[str, ...]
     full: str
@@ -47,7 +47,7 @@ class Caption:
 
     @property
     def style(self) -> TextStyle:
-        """How it is written."""
+        """The style of its text."""
         return TextStyle.RULE if self.rule else TextStyle.LABEL
 
 
@@ -61,7 +61,7 @@ class Labelled:
 
 
 def labelled(source: TransitionSource) -> list[Labelled]:
-    """The transitions of a state or connector in the order in which they are tried."""
+    """Return the transitions of a state or connector in the order in which they are tried."""
     seen: set[str] = set()
     result = []
     for event, transition in source.transitions():
@@ -71,7 +71,7 @@ def labelled(source: TransitionSource) -> list[Labelled]:
 
 
 def labelled_by_value(source: TransitionSource) -> list[Labelled]:
-    """As `labelled`, with the cases of a selection by their values alone, for where it says what it selects."""
+    """As `labelled`, with only the values of a selection's cases, for a box that shows the selection."""
     if not isinstance(source, SelectState):
         return labelled(source)
     cases = [Labelled(value_text(case_value(key)), case, otherwise=False) for key, case in source.cases.items()]
@@ -85,7 +85,7 @@ def _trigger(event: str, transition: Transition) -> str:
 
 
 def seconds_text(seconds: Term) -> str:
-    """A duration: `0.5 s`, `(* 2 ?n) s`."""
+    """Return a duration as text: `0.5 s`, `(* 2 ?n) s`."""
     match seconds:
         case Constant(int() | float() as value):
             return f"{value:g} s"
@@ -94,9 +94,9 @@ def seconds_text(seconds: Term) -> str:
 
 
 def captions(transitions: Iterable[Labelled], *, terse: bool = False) -> list[Caption]:
-    """The captions of one edge; triggers that share all the rest share a caption.
+    """Return the captions of one edge; triggers with equal guards and actions share a caption.
 
-    If `terse`, assignments and `[else]` are only in the full text, as suits plots made by machines.
+    If `terse`, assignments and `[else]` are only in the full text, as suits generated plots.
     """
     groups: dict[tuple[object, ...], list[Labelled]] = {}
     for one in transitions:
@@ -105,7 +105,7 @@ def captions(transitions: Iterable[Labelled], *, terse: bool = False) -> list[Ca
 
 
 def _rest(one: Labelled, *, terse: bool) -> tuple[object, ...]:
-    """What a caption says besides the trigger."""
+    """Return the parts of a caption besides the trigger, as a key."""
     return _guard(one, terse=terse), one.transition.rule, one.transition.internal, _brief(one.transition, terse=terse)
 
 
@@ -122,7 +122,7 @@ def _brief(transition: Transition, *, terse: bool) -> tuple[str, ...]:
 
 
 def _handed(transition: Transition, *, brief: bool = False) -> list[str]:
-    """What a transition passes to the plot of its target, and which histories it clears."""
+    """Return the arguments that a transition passes to its target's plot, and the histories it clears."""
     passed = ", ".join(name if brief else f"{name} = {to_text(value)}" for name, value in transition.passed.items())
     cleared = ", ".join(transition.clear)
     return [f"{word} {what}" for word, what in (("pass", passed), ("clear", cleared)) if what]
@@ -143,7 +143,7 @@ def _caption(group: list[Labelled], *, terse: bool) -> Caption:
 
 
 def full_text(one: Labelled, *, trigger: bool = True) -> str:
-    """A transition with nothing left out; `trigger` can be."""
+    """Return a transition with all its parts; `trigger=False` omits the trigger."""
     effects = "; ".join([*map(action_text, one.transition.effect), *_handed(one.transition)])
     rule = one.transition.rule
     parts = [
@@ -157,7 +157,7 @@ def full_text(one: Labelled, *, trigger: bool = True) -> str:
 
 
 def _kind(transition: Transition) -> str:
-    """As UML writes it: the state it leads away from is not left."""
+    """Return `{internal}` as in UML if the transition does not exit its source."""
     return "{internal}" if transition.internal and transition.target is not None else ""
 
 
@@ -168,7 +168,7 @@ def _enumerated(words: Sequence[str], separator: str = ",", before: str = "") ->
 
 
 def _rule_guard(guard: Expression | None) -> str:
-    """A rule's guard with its count of tries in words."""
+    """Return a rule's guard with its counter in words."""
     parts = guard.parts if isinstance(guard, And) else () if guard is None else (guard,)
     words: list[str] = []
     for part in parts:
@@ -181,15 +181,15 @@ def _rule_guard(guard: Expression | None) -> str:
 
 
 def block_texts(state: State) -> list[str]:
-    """The actions of a state, one a line: `entry / arm.grasp(?item)`."""
+    """Return the actions of a state, one a line: `entry / arm.grasp(?item)`."""
     words = {"entry": "entry", "exit": "exit", "on_break": "break"}
     return [f"{words[key]} / {action_text(action)}" for key, actions in state.blocks() for action in actions]
 
 
 def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> str:  # noqa: PLR0911  # a table by kind
-    """An action in the notation of state charts: `^event`, `name := value`, `component.skill(…)`.
+    """Return an action in the notation of state charts: `^event`, `name := value`, `component.skill(…)`.
 
-    If `brief`, the attributes of fired events are left out.
+    If `brief`, omit the attributes of fired events.
     """
     match action:
         case Emit(emit=event, arguments=arguments):
@@ -223,5 +223,5 @@ def _values(arguments: Mapping[str, Term]) -> str:
 
 
 def content_text(use: str, arguments: Mapping[str, Term]) -> str:
-    """A used plot with its arguments."""
+    """Return a used plot with its arguments as text."""
     return use + (_values(arguments) if arguments else "")

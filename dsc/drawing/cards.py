@@ -1,4 +1,4 @@
-"""One state as a box: its name and, below, what it does; sizes follow from the texts."""
+"""Cards: one state as a box, with its name and actions; texts determine the size."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ SIDE = 12.0
 """Free space left and right of texts."""
 NAME_HEIGHT = 30.0
 MARK = 24.0
-"""Room beside the name for the mark of submachine and dynamic states."""
+"""Room next to the name for the mark of submachine and dynamic states."""
 LEAST_WIDTH = 76.0
 FINAL_SIZE = 20.0
 DIAMOND_HEIGHT = 44.0
-"""With one line in it."""
+"""Height of a diamond with one line."""
 DOT_SIZE = 14.0
 CIRCLE_SIZE = 24.0
 
 
 @dataclass(frozen=True, slots=True)
 class CardRow:
-    """A line of text in a box, and what it says in full."""
+    """A line of text in a box, and its full text."""
 
     text: str
     style: TextStyle = TextStyle.DETAIL
@@ -39,14 +39,14 @@ class CardRow:
 
 
 def dot() -> Box:
-    """The initial pseudo-state."""
+    """Return the box of the initial pseudostate."""
     return Box(BoxKind.INITIAL, "", 0, 0, DOT_SIZE, DOT_SIZE)
 
 
 def card(
     kind: BoxKind, name: str, rows: Sequence[CardRow], *, about: str = "", rule: bool = False, mark: bool = False
 ) -> Box:
-    """A box with a name and rows of text."""
+    """Return a box with a name and rows of text."""
     title_room = text_width(name, TextStyle.NAME) + 2 * SIDE + 2 * MARK * mark
     width = max(LEAST_WIDTH, title_room, *(text_width(row.text, row.style) + 2 * SIDE for row in rows))
     texts = [Text(width / 2, 20.0, name, TextStyle.NAME, centred=True)]
@@ -61,7 +61,7 @@ def card(
 
 
 def final_card(name: str, state: FinalState) -> Box:
-    """A final state: the bullseye, its name and the outcome it fires below."""
+    """Return the box of a final state: the bullseye, with its name and its outcome event below."""
     rows = [(name, TextStyle.NAME)]
     if state.emit is not None:
         rows.append((f"^{state.emit}", TextStyle.DETAIL))
@@ -78,7 +78,7 @@ def final_card(name: str, state: FinalState) -> Box:
 
 
 def history_card(name: str, state: HistoryState) -> Box:
-    """A history: a circle with H or H*, as UML writes it; beside it its name and what it does when it is empty."""
+    """Return the box of a history: a circle with H or H*, as in UML, next to its name and default actions."""
     done = "; ".join(map(action_text, state.do))
     rows = [CardRow(name, TextStyle.NAME, name), *([_row(f"/ {done}")] if done else [])]
     aside = CIRCLE_SIZE / 2 + 7
@@ -92,13 +92,13 @@ def history_card(name: str, state: HistoryState) -> Box:
     letter = Text(CIRCLE_SIZE / 2, CIRCLE_SIZE / 2 + 4, mark, TextStyle.DETAIL, centred=True)
     circle = Box(BoxKind.CIRCLE, "", 0, 0, CIRCLE_SIZE, CIRCLE_SIZE, (letter,))
     title = "\n".join(filter(None, [name, state.about, *(row.full for row in rows[1:])]))
-    # The circle is in the middle, since that is where edges meet it.
+    # Edges end at the middle of the box, so the circle is there.
     circle = circle.moved(half - CIRCLE_SIZE / 2, (height - CIRCLE_SIZE) / 2)
     return Box(BoxKind.HISTORY, name, 0, 0, 2 * half, height, texts, title=title, boxes=(circle,))
 
 
 def name_below(history: Box) -> Box:
-    """A history with its texts below the circle, for edges that come from the left."""
+    """Return a history with its texts below the circle, for edges that come from the left."""
     width = max(CIRCLE_SIZE, *(text_width(text.text, text.style) for text in history.texts))
     below = LINE_HEIGHT * len(history.texts)
     texts = tuple(
@@ -111,13 +111,13 @@ def name_below(history: Box) -> Box:
 
 
 def diamond(name: str, connector: Connector) -> Box:
-    """A choice or selection: a flat diamond around its name and what it selects by."""
+    """Return the box of a choice or selection: a flat diamond around its name and the selecting value."""
     rows = [CardRow(name, TextStyle.NAME, name)]
     if isinstance(connector, SelectState):
         rows.append(_row(to_text(connector.select)))
     block = LINE_HEIGHT * len(rows)
     height = DIAMOND_HEIGHT + 2 * LINE_HEIGHT * (len(rows) - 1)
-    # A text fits where its share of the width and the lines' share of the height are 1 together.
+    # A text fits if its share of the width and the lines' share of the height sum to at most 1.
     width = (max(text_width(row.text, row.style) for row in rows) + SIDE) / (1 - block / height)
     first = (height - block) / 2 + 11.5
     texts = tuple(
@@ -129,7 +129,7 @@ def diamond(name: str, connector: Connector) -> Box:
 
 
 def name_beside(final: Box) -> Box:
-    """A final state with its texts right of the bullseye, for edges that come from the left."""
+    """Return a final state with its texts right of the bullseye, for edges that come from the left."""
     height = max(FINAL_SIZE, LINE_HEIGHT * len(final.texts))
     top = (height - LINE_HEIGHT * len(final.texts)) / 2
     texts = tuple(
@@ -142,14 +142,14 @@ def name_beside(final: Box) -> Box:
 
 
 def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, told: bool) -> Box:
-    """A state without states of its own: simple, submachine or dynamic.
+    """Return the box of a state without inner states: simple, submachine or dynamic.
 
     Args:
         name: its name.
         state: the state.
-        library: to say more about the plots it uses.
-        rule: whether a rule put it there.
-        told: whether to write down what it is about; otherwise only the tooltip says it.
+        library: for details of the plots it uses.
+        rule: whether a rule added it.
+        told: whether to write its purpose in the box; otherwise only the tooltip has it.
     """
     rows = [_row(state.about, TextStyle.ABOUT)] if told and state.about and not rule else []
     kind, about = BoxKind.SIMPLE, [state.about or ""]
@@ -166,7 +166,7 @@ def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, t
 
 
 def action_rows(state: State) -> list[CardRow]:
-    """How long a state lasts at least, what it does on entry, on exit, and on events that do not leave it."""
+    """Return a state's least duration, and its actions on entry, on exit and on events without an exit."""
     rows = [] if state.at_least is None else [_row(f"≥ {seconds_text(state.at_least)}")]
     rows += [_row(text) for text in block_texts(state)]
     for caption in captions(one for one in labelled(state) if one.transition.target is None):
@@ -187,7 +187,7 @@ def _choices(state: DynamicState, library: Library | None) -> list[CardRow]:
 
 
 def _taken(state: DynamicState, plot: ActionPlot | None) -> dict[str, Term]:
-    """The arguments that a candidate takes; all if it is not known."""
+    """Return the arguments that a candidate takes; all for an unknown candidate."""
     return {k: v for k, v in state.arguments.items() if plot is None or k in plot.parameters}
 
 

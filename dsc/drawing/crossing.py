@@ -1,4 +1,4 @@
-"""Edges across borders: from where one meets the outermost box on its way, on to the state inside that it means."""
+"""Edges across borders: their continuation from the border of an outer box to a state inside it."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from dsc.drawing.maze import Maze
 from dsc.drawing.measure import text_width
 
 ROUND = frozenset({BoxKind.FINAL, BoxKind.HISTORY})
-"""Cards with a circle inside, at which edges end."""
+"""Cards with a circle inside; edges end at the circle."""
 TRACKS = (5.0, 11.0)
-"""How far from things lines run."""
+"""Distances of parallel lines from boxes and texts."""
 CLEAR = 3.0
-"""The least distance from things."""
+"""Least distance of a line from boxes and texts."""
 ARRIVAL = 11.0
-"""Straight end of a line at a state, so that an arrowhead has room."""
+"""Straight end of a line at a state, with room for an arrowhead."""
 LEAST = 2.5
-"""Between places where lines may run, so that there are not too many in large drawings."""
+"""Least distance between candidate tracks, to bound their number in large drawings."""
 PORT_GAP = 14.0
 CORNER = 11.0
 """Free space at a state's corners."""
@@ -29,7 +29,7 @@ CORNER = 11.0
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """A place at a border, the direction out of the box there, and how unwelcome it is."""
+    """A place at a border, the direction out of the box there, and its cost."""
 
     place: Point
     out: Point
@@ -37,13 +37,13 @@ class Port:
 
     @property
     def before(self) -> Point:
-        """Where the straight end of a line begins."""
+        """The beginning of the straight end of a line."""
         return _shifted(self.place, self.out, ARRIVAL)
 
 
 @dataclass(slots=True)
 class _Ground:
-    """What lies inside a box: what to go around, lines, and places where new lines may run."""
+    """The contents of a box: obstacles, lines, and tracks for new lines."""
 
     solid: list[Area] = field(default_factory=list)
     lines: list[tuple[Point, Point]] = field(default_factory=list)
@@ -57,7 +57,7 @@ class _Ground:
         self.ys += [place for track in TRACKS for place in (y - track, y + height + track)]
 
     def enclose(self, box: Box) -> None:
-        """A box that lines may cross, but not run along."""
+        """Add a box that lines may cross, but not follow along its border."""
         right, low = box.x + box.width, box.y + box.height
         corners = [(box.x, box.y), (right, box.y), (right, low), (box.x, low), (box.x, box.y)]
         self.lines += pairwise(corners)
@@ -69,14 +69,14 @@ class _Ground:
 def prolonged(
     edge: DrawnEdge, start: Box, end: Box, also: Iterable[str], drawn: Sequence[DrawnEdge]
 ) -> list[DrawnEdge]:
-    """An edge between two boxes from its source inside `start` to its target inside `end`, forked to more targets.
+    """Return an edge between two boxes, prolonged from its source inside `start` to its target inside `end`.
 
     Args:
         edge: ends at the borders of the boxes.
-        start: where its source is, or that itself.
-        end: where its target is, or that itself.
-        also: more targets in `end`; the edges to them share the way to its border.
-        drawn: edges that are there already, which are crossed seldom.
+        start: the box of the source, or the source itself.
+        end: the box of the target, or the target itself.
+        also: more targets in `end`; the edges to them share the line to its border.
+        drawn: existing edges; crossings with them cost extra.
     """
     first, second, *_ = edge.points
     before, last = edge.points[-2:]
@@ -91,7 +91,7 @@ def prolonged(
 
 
 def join(box: Box, source: str, target: str) -> DrawnEdge:
-    """The edge from a history among regions to a state in one of them."""
+    """Return the edge from a history among regions to a state in one of them."""
     circle = way_to(box, source)[-1].boxes[0]
     port = (circle.x + circle.width / 2, circle.y + circle.height)
     points = _inwards(way_to(box, target), ((port[0], circle.y), port), ())
@@ -99,7 +99,7 @@ def join(box: Box, source: str, target: str) -> DrawnEdge:
 
 
 def way_to(box: Box, name: str) -> tuple[Box, ...]:
-    """The boxes from `box` to the state `name` in it; empty if it is not there. Regions have names of their own."""
+    """Return the boxes from `box` to the state `name` in it; empty if missing. Region names have a separate scope."""
     if box.name == name and box.kind is not BoxKind.REGION:
         return (box,)
     for inner in box.boxes:
@@ -109,7 +109,7 @@ def way_to(box: Box, name: str) -> tuple[Box, ...]:
 
 
 def _led_on(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[DrawnEdge]) -> list[Point]:
-    """How a line goes on whose last piece comes to the border of `box`, to the border of the state `name`."""
+    """Return the continuation of a line from the border of `box` to the border of the state `name`."""
     if box.name != name:
         return _inwards(way_to(box, name), last, drawn)
     if box.kind is BoxKind.HISTORY:
@@ -118,7 +118,7 @@ def _led_on(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[Draw
 
 
 def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[DrawnEdge]) -> list[Point]:
-    """From the border of the first box on the way to the border of the last one."""
+    """Return the line from the border of the first box of the path to the border of the last one."""
     box, ports = way[0], _ports(way[-1])
     vertical = abs(last[0][0] - last[1][0]) < abs(last[0][1] - last[1][1])
     start = _shifted(last[1], _direction(*last), TRACKS[0])
@@ -138,7 +138,7 @@ def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[Draw
 
 
 def _places(needed: Iterable[float], useful: Iterable[float], bounds: tuple[float, float]) -> list[float]:
-    """Where lines may run: where they have to, and wherever it is useful and no other place is close."""
+    """Return the tracks for lines: all needed ones, and useful ones without another track close by."""
     fixed = [(place, 0) for place in needed]
     free = [(place, 1) for place in useful if bounds[0] < place < bounds[1]]
     places: list[float] = []
@@ -159,7 +159,7 @@ def _ground(way: Sequence[Box], drawn: Sequence[DrawnEdge]) -> _Ground:
 
 
 def _survey(box: Box, way: Sequence[Box], ground: _Ground) -> None:
-    """Regions and the boxes on the way are open, all others are not."""
+    """Treat regions and the boxes on the path as open, all others as obstacles."""
     ground.enclose(box)
     for area in _writing(box):
         ground.keep_clear(area)
@@ -179,7 +179,7 @@ def _area(box: Box) -> Area:
 
 
 def _writing(box: Box) -> Iterator[Area]:
-    """Where something is written in a box and at its edges."""
+    """Yield the areas of all texts in a box and at its edges."""
     for text in box.texts:
         yield _text_area(text)
     for edge in box.edges:
@@ -193,7 +193,7 @@ def _text_area(text: Text) -> Area:
 
 
 def _ports(box: Box) -> list[Port]:
-    """Where lines may meet a state."""
+    """Return the places where lines may meet a state."""
     shape = box.boxes[0] if box.kind in ROUND else box
     x, y = shape.x + shape.width / 2, shape.y + shape.height / 2
     beside, above = _spread(shape.height), _spread(shape.width)
@@ -213,7 +213,7 @@ def _spread(length: float) -> list[float]:
 
 
 def _taken(port: Port, words: Iterable[Area], lines: Iterable[tuple[Point, Point]]) -> float:
-    """What it costs that words or other lines are there."""
+    """Return the cost of words or other lines at the port."""
     near = sum(1 for ends in lines if any(_distance(end, port.place) < PORT_GAP / 2 for end in ends))
     return 60.0 * near + 500.0 * any(_holds(area, port.before) for area in words)
 

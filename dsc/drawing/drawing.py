@@ -1,4 +1,4 @@
-"""Drawing of a plot: every state a box, every scope a layered drawing inside the box of its state."""
+"""Drawing of a plot: each state is a box, each scope a layered drawing inside the box of its state."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ HULLS = frozenset({BoxKind.COMPOSITE, BoxKind.ORTHOGONAL})
 
 
 def build(plot: ActionPlot, library: Library | None, *, rules: bool, sideways: bool) -> Box:
-    """The drawing of a plot.
+    """Return the drawing of a plot.
 
     Args:
-        plot: what to draw.
-        library: where the plots it uses are found; without one, less is said about them.
-        rules: whether to carry the plot's rules out, which needs the library; otherwise they are listed.
+        plot: the plot.
+        library: provider of the plots it uses; without one, their details are omitted.
+        rules: whether to expand the plot's rules, which needs the library; otherwise they are listed.
         sideways: from left to right instead of from top to bottom.
 
     Raises:
-        UnknownNameError: a transition leads nowhere, or a rule or state names a plot that is not there.
+        UnknownNameError: a transition names a missing state, or a rule or state names a missing plot.
     """
     expanded = library.expanded(plot) if library is not None and rules else plot
     added = {name for name, _, _ in expanded.walk()} - {name for name, _, _ in plot.walk()}
@@ -53,7 +53,7 @@ def build(plot: ActionPlot, library: Library | None, *, rules: bool, sideways: b
 
 
 def _notes(plot: ActionPlot, *, shown: bool) -> Box | None:
-    """The rules that no edge shows: all that were not carried out, and those for what will be planned."""
+    """Return a list of the rules without an edge: unexpanded ones, and those for steps of future plans."""
     planned = any(isinstance(state, DynamicState) and state.goal is not None for _, state, _ in plot.walk())
     rows = [rule_text(rule) for rule in plot.rules] if planned or not shown else []
     rows += [handler_text(handler) for handler in plot.handlers] if not shown else []
@@ -87,7 +87,7 @@ class _Builder:
         self._bundles = self._by_scope()
 
     def _by_scope(self) -> dict[Path, list[EdgeBundle]]:
-        """The edges of the whole plot, each in the innermost scope that holds all of its ends."""
+        """Assign each edge of the plot to the innermost scope that holds all its ends."""
         states = {name: state for name, state, _ in self._plot.walk()}
         paths = {name: path for name, _, path in self._plot.walk()}
         among_regions = {name for name, path in paths.items() if path[-2] == "connectors"}
@@ -101,7 +101,7 @@ class _Builder:
         return scopes
 
     def scope(self, scope: Scope, path: Path) -> Inside:
-        """The states of a scope with their edges, laid out."""
+        """Return the layout of a scope's states with their edges."""
         initial = initial_of(scope)
         self._known(initial, self._nesting.inside(path), (*path, "initial"))
         boxes = {"": dot(), **{name: self._state(name, state, path) for name, state in scope.states.items()}}
@@ -109,12 +109,12 @@ class _Builder:
         spans = [span for one in edges for span in self._spans(path, one)]
         if not any(box.kind in HULLS for box in boxes.values()):
             return arranged(boxes, spans, sideways=self._sideways).finished()
-        # Around large boxes, the direction in which the whole is closer to a square reads better.
+        # Large boxes read better if the whole is closer to a square.
         both = [arranged(boxes, spans, sideways=sideways) for sideways in (self._sideways, not self._sideways)]
         return min(both, key=lambda draft: max(draft.width, draft.height)).finished()
 
     def _spans(self, scope: Path, bundle: EdgeBundle) -> Iterator[ScopeSpan]:
-        """One for all targets, unless the plot is wrong and they are not together in a state."""
+        """Yield one span for all targets; an invalid plot, with targets in several states, gets several."""
         holder = self._nesting.holder
         start, end = holder(scope, bundle.source), holder(scope, bundle.target)
         also = tuple(target for target in bundle.also if holder(scope, target) == end)
@@ -148,7 +148,7 @@ class _Builder:
         return leaf_card(name, state, self._library, rule=name in self._added, told=self._plot.generated)
 
     def _hull(self, kind: BoxKind, name: str, state: State, inside: Inside) -> Box:
-        """A state around an inside; regions reach up to its border, states do not."""
+        """Return a state's box around its content; regions reach up to its border, states do not."""
         pad = 0.0 if kind is BoxKind.ORTHOGONAL else PAD
         head = card(kind, name, action_rows(state), about=state.about or "")
         width = max(head.width, inside.width + 2 * pad)
@@ -169,7 +169,7 @@ class _Builder:
 
 
 def _side_by_side(regions: list[Box]) -> Inside:
-    """Regions in a row or in a column, whichever is closer to a square; all reach from border to border."""
+    """Return regions in a row or in a column, as is closer to a square; all reach from border to border."""
     widths, heights = [one.width for one in regions], [one.height for one in regions]
     in_row = max(sum(widths), *heights) <= max(*widths, sum(heights))
     width = sum(widths) if in_row else max(widths)
@@ -183,7 +183,7 @@ def _side_by_side(regions: list[Box]) -> Inside:
 
 
 def _below(histories: Sequence[Box], regions: Inside) -> Inside:
-    """Regions below the histories of the whole."""
+    """Return regions placed below the histories of the orthogonal state."""
     if not histories:
         return regions
     boxes, x = [], PAD
@@ -207,18 +207,18 @@ def draw(
     direction: Direction = "down",
     marks: Mapping[str, str] = NO_MARKS,
 ) -> str:
-    """The plot as SVG; the same plot gives the same text.
+    """Return the plot as SVG; the same plot gives the same text.
 
     Args:
-        plot: what to draw.
-        library: where the plots it uses are found. With it, rules are carried out and drawn as the states and
-            transitions they become, and dynamic states say when each candidate fits.
+        plot: the plot.
+        library: provider of the plots it uses. With it, rules are drawn as their expanded states and transitions, and
+            dynamic states show each candidate's condition.
         rules: `False` only lists the rules.
-        direction: where the flow goes.
-        marks: what is said of states beyond what they are, by name: `active`, `added`, `removed`, `changed`.
+        direction: the direction of the flow.
+        marks: marks of states by name: `active`, `added`, `removed`, `changed`.
 
     Raises:
-        UnknownNameError: a transition leads nowhere, or a rule or state names a plot that is not there.
+        UnknownNameError: a transition names a missing state, or a rule or state names a missing plot.
     """
     return to_svg(lay_out(plot, library, rules=rules, direction=direction), marks)
 
@@ -226,5 +226,5 @@ def draw(
 def lay_out(
     plot: ActionPlot, library: Library | None = None, *, rules: bool = True, direction: Direction = "down"
 ) -> Box:
-    """The drawing as values, for other renderers; arguments and errors as for `draw`."""
+    """Return the drawing as values, for other renderers; arguments and errors as for `draw`."""
     return build(plot, library, rules=rules, sideways=direction == "right")

@@ -1,4 +1,4 @@
-"""Transitions as edges: merged by their ends, labelled, and laid along routes; loops beside their state."""
+"""Edges of a drawing: transitions merged by their ends, with labels and routes; loops next to their state."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from dsc.model.states import AnyState, HistoryState
 from dsc.model.transitions import TransitionSource
 
 LOOP = 18.0
-"""How far a loop leaves its state."""
+"""Reach of a loop from its state."""
 LOOP_HALF = 8.0
 LOOP_GAP = 8.0
-"""Between loops of one state."""
+"""Space between loops of one state."""
 CAPTION_GAP = 4.0
 
 
@@ -43,7 +43,7 @@ class EdgeBundle:
         return "\n".join(caption.full for caption in self.captions)
 
     def texts(self, middle: Point) -> tuple[Text, ...]:
-        """The label, centred on a point."""
+        """Return the label, centred on a point."""
         x, y = middle[0], middle[1] - self.height / 2 + 11.5
         texts = []
         for caption in self.captions:
@@ -54,7 +54,7 @@ class EdgeBundle:
         return tuple(texts)
 
     def edge(self, points: tuple[Point, ...], middle: Point) -> DrawnEdge:
-        """The edge along `points` with its label around `middle`."""
+        """Return the edge along `points` with its label around `middle`."""
         edge = DrawnEdge(self.source, self.target, points, title=self.title, rule=self.rule)
         if not self.height:
             return edge
@@ -62,12 +62,12 @@ class EdgeBundle:
         return replace(edge, label=self.texts(middle), area=area)
 
     def along(self, route: Route) -> DrawnEdge:
-        """The edge along a route."""
+        """Return the edge along a route."""
         return self.edge(route.points, route.label)
 
 
 def bundles(states: Mapping[str, AnyState], recoveries: frozenset[str], *, terse: bool) -> list[EdgeBundle]:
-    """The transitions of states and the defaults of histories, merged by their ends, in the order of the states.
+    """Merge the transitions of states and the defaults of histories by their ends, in the order of the states.
 
     Args:
         states: by name.
@@ -76,7 +76,7 @@ def bundles(states: Mapping[str, AnyState], recoveries: frozenset[str], *, terse
     """
     groups: dict[tuple[str, tuple[str, ...]], list[Labelled]] = {}
     for name, state in states.items():
-        if isinstance(state, HistoryState):  # what it does then stands at its circle
+        if isinstance(state, HistoryState):  # the history's card shows the default's actions
             groups[name, (state.target,)] = []
         for one in labelled_by_value(state) if isinstance(state, TransitionSource) else ():
             if one.transition.target is not None:
@@ -98,23 +98,23 @@ def _bundle(
 
 
 def _gap(said: tuple[Caption, ...]) -> float:
-    """Between captions, so that one sees which lines belong together."""
+    """Return the space between captions that separates their lines."""
     return CAPTION_GAP if any(len(caption.lines) > 1 for caption in said) else 0.0
 
 
 def initial_bundle(target: str) -> EdgeBundle:
-    """From the initial pseudo-state, which has no name, to the first state."""
+    """Return the edge from the initial pseudostate, which has an empty name, to the first state."""
     return EdgeBundle("", target, (), rule=False)
 
 
 def room_for_loops(bundles: Sequence[EdgeBundle], *, sideways: bool) -> float:
-    """The space that loops with their labels need beside their state (below it if `sideways`)."""
+    """Return the space for loops with their labels right of their state (below it if `sideways`)."""
     return max((LOOP + 6 + (one.height if sideways else one.width) for one in bundles), default=0.0)
 
 
 def room_along_loops(bundles: Sequence[EdgeBundle], *, sideways: bool) -> float:
-    """How high (wide if `sideways`) a state has to be for the labels of its loops."""
-    if len(bundles) < 2:  # one alone may reach beyond its state
+    """Return the height (width if `sideways`) of a state for the labels of its loops."""
+    if len(bundles) < 2:  # a single one may reach beyond its state
         return sum(one.width if sideways else one.height for one in bundles)
     return sum(_extent(one, sideways=sideways) + LOOP_GAP for one in bundles)
 
@@ -124,7 +124,7 @@ def _extent(bundle: EdgeBundle, *, sideways: bool) -> float:
 
 
 def loops(bundles: Sequence[EdgeBundle], box: Box, *, sideways: bool) -> list[DrawnEdge]:
-    """Transitions that leave a state and come back to it or into it, side by side."""
+    """Return edges in parallel for transitions from a state to itself or into it."""
     extents = [_extent(one, sideways=sideways) + LOOP_GAP for one in bundles]
     first = -sum(extents) / 2
     offsets = [first + sum(extents[:number]) + extent / 2 for number, extent in enumerate(extents)]

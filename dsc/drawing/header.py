@@ -1,4 +1,4 @@
-"""What a drawing says about the plot as a whole: its interface on top, rules that show nowhere else below."""
+"""Header of a drawing with the plot's interface, and a note with rules that no edge shows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LEAST_WIDTH = 340.0
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """Texts at the top of a frame, the room they need, and everything they shorten."""
+    """Texts at the top of a frame, their size, and the full form of shortened ones."""
 
     texts: tuple[Text, ...]
     width: float
@@ -27,7 +27,7 @@ class Header:
 
 
 def header(plot: ActionPlot, width: float) -> Header:
-    """Name, parameters, purpose and interface of a plot, for a frame of about that width."""
+    """Return name, parameters, purpose and interface of a plot, for a frame of about that width."""
     room = max(width, LEAST_WIDTH)
     known = facts(plot)
     name = signature(plot)
@@ -44,12 +44,12 @@ def header(plot: ActionPlot, width: float) -> Header:
 
 
 def signature(plot: ActionPlot) -> str:
-    """Name and parameters."""
+    """Return the plot's name and parameters."""
     return f"{plot.name}({_declared(plot.parameters)})" if plot.parameters else plot.name
 
 
 def facts(plot: ActionPlot) -> list[str]:
-    """The rest of the interface, one fact a line."""
+    """Return the rest of the interface, one fact a line."""
     return [
         f"{what}: {text}"
         for what, text in (
@@ -75,7 +75,7 @@ def _events(declared: Mapping[str, Mapping[str, str] | None]) -> str:
 
 
 def rules_note(rows: Sequence[str], about: str) -> Box:
-    """A box that lists rules and handlers, for those that no edge shows."""
+    """Return a box that lists rules and handlers without an edge."""
     texts = [Text(12.0, 20.0, about, TextStyle.ABOUT)]
     texts += [
         Text(12.0, 22.0 + LINE_HEIGHT * number, shorten(row, TextStyle.RULE, 480.0), TextStyle.RULE)
@@ -87,7 +87,7 @@ def rules_note(rows: Sequence[str], about: str) -> Box:
 
 
 def rule_text(rule: Rule) -> str:
-    """A rule on one line."""
+    """Return a rule on one line."""
     response = rule.do
     steps = [content_text(response.use, response.arguments)] if response.use else []
     steps = [*(action_text(command) for command in response.command), *steps]
@@ -101,7 +101,7 @@ def rule_text(rule: Rule) -> str:
 
 
 def handler_text(handler: Handler) -> str:
-    """A handler on one line."""
+    """Return a handler on one line."""
     do = handler.do
     steps = [action_text(command) for command in do.command]
     steps += [content_text(do.use, do.arguments)] if do.use else []

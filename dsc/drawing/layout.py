@@ -1,4 +1,4 @@
-"""A drawing as values: boxes in boxes, edges as polylines, texts with places. Renderers need nothing else.
+"""Layout of a drawing as values: nested boxes, edges as polylines, placed texts. Renderers need no other input.
 
 Lengths are pixels, y grows downwards, all places are absolute.
 """
@@ -14,7 +14,7 @@ Area = tuple[float, float, float, float]
 
 
 class TextStyle(StrEnum):
-    """What a text is; fonts follow from it."""
+    """The role of a text, which determines its font."""
 
     TITLE = "title"
     ABOUT = "about"
@@ -25,7 +25,7 @@ class TextStyle(StrEnum):
 
 
 class BoxKind(StrEnum):
-    """What a box stands for; its looks follow from it."""
+    """The kind of a box, which determines its looks."""
 
     PLOT = "plot"
     GENERATED = "generated"
@@ -57,14 +57,14 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class DrawnEdge:
-    """A transition, or several between the same two states, which may be deeper inside the boxes around.
+    """One or more transitions between two states, which may be inside the boxes of the scope.
 
     Attributes:
-        source, target: names of the states; the initial pseudo-state has the name `""`.
+        source, target: names of the states; the initial pseudostate has the name `""`.
         points: from the source's border to the target's.
-        label: its texts, which stand on the line in the rectangle `area` (x, y, width, height).
-        title: everything the label had to shorten.
-        rule: whether contingency rules put it there.
+        label: its texts, on the line in the rectangle `area` (x, y, width, height).
+        title: the full form of shortened labels.
+        rule: whether contingency rules added it.
     """
 
     source: str
@@ -78,16 +78,16 @@ class DrawnEdge:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A rectangle with texts, and what is inside.
+    """A rectangle with texts and contents.
 
     Attributes:
-        kind, name: what it stands for.
-        x, y, width, height: where it is.
+        kind, name: kind and name of its state, region or plot.
+        x, y, width, height: its place and size.
         texts: its own texts.
-        lines: heights at which a line divides it.
-        title: everything the texts had to shorten.
-        rule: whether a contingency rule put it there.
-        boxes, edges: what is inside.
+        lines: heights of its dividing lines.
+        title: the full form of shortened texts.
+        rule: whether a contingency rule added it.
+        boxes, edges: its contents.
     """
 
     kind: BoxKind
@@ -104,7 +104,7 @@ class Box:
     edges: tuple[DrawnEdge, ...] = ()
 
     def moved(self, dx: float, dy: float) -> Box:
-        """The box, with all that is in it, somewhere else."""
+        """Return the box and its contents at another place."""
         return replace(
             self,
             x=self.x + dx,
@@ -117,7 +117,7 @@ class Box:
 
 
 def moved_texts(texts: tuple[Text, ...], dx: float, dy: float) -> tuple[Text, ...]:
-    """The texts somewhere else."""
+    """Return the texts at another place."""
     return tuple(replace(text, x=text.x + dx, y=text.y + dy) for text in texts)
 
 

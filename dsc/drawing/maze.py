@@ -1,4 +1,4 @@
-"""A line around things: the cheapest way along a grid of horizontal and vertical lines."""
+"""Maze search: the cheapest path along a grid of horizontal and vertical lines around obstacles."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from math import inf
 from dsc.drawing.layout import Area, Point
 
 BEND = 25.0
-"""How much longer a way may be to save a bend."""
+"""Additional length that saving one bend justifies."""
 CROSSED = 15.0
-"""The same for crossing a line."""
+"""Additional length that avoiding one crossing justifies."""
 COVERED = 5.0
-"""How much worse it is to run on a line than beside it, per pixel."""
+"""Price factor for running on top of a line, per pixel."""
 THROUGH = 60.0
-"""How much worse it is to run through something, per pixel; possible where nothing else is."""
+"""Price factor for running through an obstacle, per pixel: the last resort."""
 NEAR = 3.5
-"""Lines that are closer run on each other."""
+"""Lines closer than this run on top of each other."""
 
 Node = tuple[int, int, bool]
 """Column, row, and whether it was reached vertically."""
@@ -29,9 +29,9 @@ class Maze:
     """A grid with prices.
 
     Args:
-        xs, ys: where lines may run.
-        solid: what to go around.
-        lines: what to cross seldom and not to run along, horizontal or vertical.
+        xs, ys: tracks for lines.
+        solid: obstacles.
+        lines: horizontal or vertical lines; crossing or covering them costs extra.
     """
 
     def __init__(
@@ -53,17 +53,17 @@ class Maze:
                 _cut(self._across, self._xs, self._ys, x, (low[1], high[1]))
 
     def way(self, start: Point, goals: Mapping[tuple[Point, bool], float], *, vertical: bool) -> list[Point]:
-        """The cheapest way from a crossing of the grid to one of the goals, without the points between bends.
+        """Return the cheapest path from a grid point to one of the goals, reduced to its bends.
 
         Args:
-            start: where it begins.
-            goals: crossings with the direction in which to go on from them (vertical or not) -> the price of that.
-            vertical: the direction in which it comes to the start.
+            start: its first point.
+            goals: grid points with the direction after them (vertical or not) -> an additional price.
+            vertical: the direction before the start.
         """
         (left, right), (top, low) = (_span(place[axis] for place, _ in goals) for axis in (0, 1))
 
         def least(node: Node) -> float:
-            """What it costs at least from there on."""
+            """Return a lower bound of the remaining price."""
             x, y = self._xs[node[0]], self._ys[node[1]]
             return max(left - x, x - right, 0.0) + max(top - y, y - low, 0.0)
 
@@ -119,7 +119,7 @@ def _span(places: Iterable[float]) -> tuple[float, float]:
 
 
 def _lengths(places: Sequence[float], count: int) -> list[list[float]]:
-    """The prices of the steps along `count` free lines."""
+    """Return the prices of the steps along `count` free lines."""
     steps = [after - before for before, after in pairwise(places)]
     return [steps.copy() for _ in range(count)]
 
@@ -132,7 +132,7 @@ def _spoil(
     width: tuple[float, float],
     factor: float,
 ) -> None:
-    """Make the steps dearer that lie in a rectangle, which is given along and across them."""
+    """Raise the prices of the steps in a rectangle, which is given along and across them."""
     first, last = max(bisect_right(along, reach[0]) - 1, 0), min(bisect_left(along, reach[1]), len(along) - 1)
     for line in range(bisect_right(across, width[0]), bisect_left(across, width[1])):
         for step in range(first, last):
@@ -142,7 +142,7 @@ def _spoil(
 def _cut(
     prices: list[list[float]], along: Sequence[float], across: Sequence[float], at: float, reach: tuple[float, float]
 ) -> None:
-    """Make the steps dearer that cross a line at `at`."""
+    """Raise the prices of the steps that cross a line at `at`."""
     step = bisect_right(along, at) - 1
     if 0 <= step < len(along) - 1:
         for line in range(bisect_left(across, reach[0]), bisect_right(across, reach[1])):

@@ -1,6 +1,6 @@
-"""How wide texts are, and how to make them fit, without asking a font.
+"""Widths of texts, and shortening of texts to a width, without access to a font.
 
-Widths are those of DejaVu Sans, the widest of the usual sans-serif fonts, so that others fit as well.
+The widths are measured in DejaVu Sans, the widest of the usual sans-serif fonts, so that others fit as well.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ ELLIPSIS = "…"
 
 
 def text_width(text: str, style: TextStyle) -> float:
-    """How wide a text is at most."""
+    """Return an upper bound of a text's width."""
     ems = sum(_EM.get(character) or _unknown(character) for character in text)
     return ems * FONT_SIZES[style] * (_BOLDER if style in BOLD else 1.0)
 
@@ -53,7 +53,7 @@ def _unknown(character: str) -> float:
 
 
 def shorten(text: str, style: TextStyle, width: float) -> str:
-    """The text, or as much of its beginning as fits, with an ellipsis."""
+    """Return the text, shortened with an ellipsis if it does not fit."""
     if text_width(text, style) <= width:
         return text
     low, high = 0, len(text)
@@ -67,7 +67,7 @@ def shorten(text: str, style: TextStyle, width: float) -> str:
 
 
 def pack(words: list[str], style: TextStyle, width: float) -> list[str]:
-    """The words on as many lines as they need; a word that is too long for a line is shortened."""
+    """Return the words on the necessary number of lines; shorten a word that is too long for a line."""
     lines: list[str] = []
     for word in words:
         if lines and text_width(f"{lines[-1]} {word}", style) <= width:

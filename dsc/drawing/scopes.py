@@ -24,24 +24,24 @@ class ScopeNesting:
         return iter(self._holders)
 
     def inside(self, scope: Path) -> list[str]:
-        """All states in a scope, however deep."""
+        """Return all states in a scope, at any depth."""
         return [name for name, holders in self._holders.items() if scope in holders]
 
     def holder(self, scope: Path, name: str) -> str:
-        """The state of the scope that is the state `name` or holds it; the initial pseudo-state is everywhere."""
+        """Return the state of the scope that is or holds the state `name`; for the initial pseudostate, `""`."""
         return self._holders[name][scope] if name else ""
 
     def common_scope(self, names: Iterable[str]) -> Path:
-        """The innermost scope that holds all these states; regions are scopes, orthogonal states are not.
+        """Return the innermost scope that holds all these states; regions are scopes, orthogonal states are not.
 
-        This is what SCXML calls the least common compound ancestor (appendix D, `findLCCA`).
+        SCXML calls it the least common compound ancestor (appendix D, `findLCCA`).
         """
         first, *others = (self._holders[name] for name in names)
         return [scope for scope in first if all(scope in other for other in others)][-1]
 
 
 def _holders(path: Path) -> Iterator[tuple[Path, str]]:
-    """The scopes around the state at `path` from the outermost on, each with its state that is or holds that one."""
+    """Yield the scopes around the state at `path`, outermost first, each with its state that is or holds that one."""
     for place in range(0, len(path), 2):
         if path[place] == "states":
             yield path[:place], str(path[place + 1])
@@ -58,7 +58,7 @@ class ScopeSpan:
 
 @dataclass(frozen=True, slots=True)
 class Inside:
-    """What a scope holds, in a rectangle that begins at (0, 0)."""
+    """The contents of a scope, in a rectangle that begins at (0, 0)."""
 
     width: float
     height: float
@@ -76,7 +76,7 @@ class Draft:
     edges: tuple[tuple[ScopeSpan, DrawnEdge], ...]
 
     def finished(self) -> Inside:
-        """With all edges up to the states that they mean."""
+        """Return the scope with all edges prolonged to their states."""
         boxes = {box.name: box for box in self.boxes}
         edges: list[DrawnEdge] = []
         for span, edge in self.edges:
@@ -111,12 +111,12 @@ def arranged(boxes: Mapping[str, Box], spans: Sequence[ScopeSpan], *, sideways: 
 def _link(source: int, target: int, span: ScopeSpan) -> LayerLink:
     bundle = span.bundle
     meant = "" if bundle.target == span.end else bundle.target
-    # What was foreseen is the thread to follow; what rules do about failures goes around it.
+    # Edges of the regular flow are straight; edges of rules, for failures, bend around them.
     return LayerLink(source, target, bundle.width, bundle.height, weight=0.1 if bundle.rule else 1.0, meant=meant)
 
 
 def _written_aside(box: Box) -> Box:
-    """The box with its texts where no edge comes or goes sideways."""
+    """Return the box with its texts away from horizontal edges."""
     return name_beside(box) if box.kind is BoxKind.FINAL else name_below(box) if box.kind is BoxKind.HISTORY else box
 
 
@@ -128,13 +128,13 @@ def _node(box: Box, own: Sequence[ScopeSpan], *, sideways: bool) -> LayerNode:
 
 
 def _roomy(box: Box, own: Sequence[ScopeSpan], *, sideways: bool) -> Box:
-    """A box as large as the labels of its loops, so that these keep clear of other boxes."""
+    """Return a box at least as large as the labels of its loops, so that they do not touch other boxes."""
     room = room_along_loops([span.bundle for span in own], sideways=sideways)
     width, height = (room, 0.0) if sideways else (0.0, room)
     return widened(box, max(box.width, width), max(box.height, height))
 
 
 def widened(box: Box, width: float, height: float) -> Box:
-    """A box of another size with its texts in the middle."""
+    """Return a box of another size with its texts in the middle."""
     texts = tuple(replace(text, x=text.x + (width - box.width) / 2) if text.centred else text for text in box.texts)
     return replace(box, width=width, height=height, texts=texts)

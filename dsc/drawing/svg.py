@@ -1,4 +1,4 @@
-"""A drawing as SVG text. The colours are told apart without seeing red and green apart (Okabe and Ito 2008)."""
+"""SVG of a drawing. The colours suit readers with red-green colour blindness (Okabe and Ito 2008)."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _RECOVERY = ("#fbe8f1", _RULE)
 
 
 MARKS = {"active": "#d55e00", "added": "#0072b2", "removed": "#a3195b", "changed": "#b8860b"}
-"""What can be said of a state beyond what it is, each with its colour."""
+"""Marks of states, each with its colour."""
 
 
 def to_svg(root: Box, marks: Mapping[str, str] = NO_MARKS) -> str:
-    """The drawing as one SVG document with a background of its own; `marks` are by names of states."""
+    """Return the drawing as one SVG document with a background; `marks` are by names of states."""
     width, height = _n(root.width + 2 * MARGIN), _n(root.height + 2 * MARGIN)
     body = "\n".join((*_box(root.moved(MARGIN, MARGIN), "#ffffff"), *_marked(root.moved(MARGIN, MARGIN), marks)))
     return (
@@ -55,7 +55,7 @@ def to_svg(root: Box, marks: Mapping[str, str] = NO_MARKS) -> str:
 
 
 def above(upper: str, lower: str) -> str:
-    """Two drawings in one, one above the other."""
+    """Return two drawings as one, one above the other."""
     sizes = [tuple(map(float, _SIZE.search(svg).groups())) for svg in (upper, lower)]  # type: ignore[union-attr]
     width, height = max(w for w, _ in sizes), sizes[0][1] + MARGIN + sizes[1][1]
     moved = lower.replace("<svg ", f'<svg y="{_n(sizes[0][1] + MARGIN)}" ', 1)
@@ -77,7 +77,7 @@ def _css() -> str:
 
 
 def _box(box: Box, around: str) -> Iterator[str]:
-    """A box and all that is in it, from the back to the front."""
+    """Yield a box and its contents, from the back to the front."""
     fill, stroke = _RECOVERY if box.rule else _LOOKS.get(box.kind, (around, _SOFT))
     yield f'<g class="{box.kind}">'
     if box.title:
@@ -89,14 +89,14 @@ def _box(box: Box, around: str) -> Iterator[str]:
     names = {inner.name for inner in box.boxes}
     flat = [edge for edge in box.edges if names.issuperset((edge.source, edge.target))]
     over = [edge for edge in box.edges if not names.issuperset((edge.source, edge.target))]
-    # All lines are under all labels; where lines of rules and others run together, the others are seen.
+    # All lines are below all labels; where lines of rules cover others, the others stay visible.
     for edge in sorted(flat, key=lambda one: not one.rule):
         yield from _edge(edge)
     for edge in flat:
         yield from _label(edge, fill)
     for inner in box.boxes:
         yield from _box(inner, fill)
-    # What leads into inner boxes is drawn over them.
+    # Edges into inner boxes are above these.
     for edge in over:
         yield from _edge(edge)
     for edge in over:
@@ -104,7 +104,7 @@ def _box(box: Box, around: str) -> Iterator[str]:
 
 
 def _marked(box: Box, marks: Mapping[str, str]) -> Iterator[str]:
-    """A thick border around each marked state, over everything else."""
+    """Yield a thick border around each marked state, above all other elements."""
     for inner in box.boxes:
         mark = marks.get(inner.name)
         if mark is not None:
@@ -154,7 +154,7 @@ def _across(box: Box, y: float, stroke: str) -> str:
 
 
 def _mark(box: Box, stroke: str) -> Iterator[str]:
-    """Two linked states for a plot inside; a choice of ways for a dynamic state."""
+    """Yield two linked states for a submachine state; a branching path for a dynamic state."""
     x, y = box.x + box.width - 30, box.y + 15
     style = f'fill="none" stroke="{stroke}" stroke-width="1.4"'
     if box.kind is BoxKind.SUBMACHINE:
@@ -167,7 +167,7 @@ def _mark(box: Box, stroke: str) -> Iterator[str]:
 
 
 def _separators(boxes: Iterable[Box], stroke: str) -> Iterator[str]:
-    """Dashed lines between regions."""
+    """Yield dashed lines between regions."""
     regions = [box for box in boxes if box.kind is BoxKind.REGION]
     for one, other in pairwise(regions):
         end = (other.x, other.y + other.height) if other.x > one.x else (other.x + other.width, other.y)
@@ -204,7 +204,7 @@ def _label(edge: DrawnEdge, fill: str) -> Iterator[str]:
 
 
 def _path(points: list[Point]) -> str:
-    """A polyline with round corners."""
+    """Return a polyline with round corners."""
     path = [f"M{_p(points[0])}"]
     for (x0, y0), (x1, y1), (x2, y2) in zip(points, points[1:], points[2:], strict=False):
         before, after = hypot(x1 - x0, y1 - y0), hypot(x2 - x1, y2 - y1)
@@ -224,5 +224,5 @@ def _n(value: float) -> str:
 
 
 def _x(text: str) -> str:
-    """Text for XML, without the characters that XML 1.0 forbids."""
+    """Return text for XML, without the characters that XML 1.0 forbids."""
     return escape(_FORBIDDEN.sub("", text))

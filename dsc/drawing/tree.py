@@ -1,4 +1,4 @@
-"""A plot as a tree for the terminal: states with their kinds, below each what it does and where it leads."""
+"""A plot as a tree for the terminal: states with their kinds, actions and transitions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _SOFT, _RULE = "dim", "magenta"
 
 
 def plot_tree(plot: ActionPlot) -> Tree:
-    """The plot as a tree; lines that are too long for the terminal end in an ellipsis."""
+    """Return the plot as a tree; lines that are too long for the terminal end in an ellipsis."""
     tree = Tree(_line((signature(plot), "bold"), (plot.about or "", "italic dim")))
     for fact in facts(plot):
         tree.add(_line((fact, _SOFT)))
@@ -106,7 +106,7 @@ def _kind(state: AnyState) -> str:  # noqa: PLR0911  # a table by kind
 
 
 def _line(*parts: tuple[str, str]) -> Text:
-    """Parts with their styles, two spaces apart; cut off where the terminal ends."""
+    """Return parts with their styles, two spaces apart, cut off at the terminal's edge."""
     line = Text(no_wrap=True, overflow="ellipsis")
     for text, style in parts:
         if text:

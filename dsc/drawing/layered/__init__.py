@@ -1,1 +1,1 @@
-"""Layered drawing of directed graphs (Sugiyama, Tagawa, Toda 1981): boxes and links in, places and routes out."""
+"""Layered drawing of directed graphs (Sugiyama, Tagawa, Toda 1981): from boxes and links to places and routes."""

@@ -1,4 +1,4 @@
-"""From nodes and links to places and routes: layers, order, columns, tracks."""
+"""Arrangement of nodes and links: layers, order, columns, tracks."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from dsc.drawing.layered.tracks import Net, assign_tracks
 
 TRACK_GAP = 10.0
 AT_NODES = 13.0
-"""Straight end of a line at a node, so that an arrowhead has room."""
+"""Straight end of a line at a node, with room for an arrowhead."""
 AT_LABELS = 4.0
 
 
 def arrange(nodes: Sequence[LayerNode], links: Sequence[LayerLink], *, sideways: bool = False) -> Arrangement:
     """Draw a graph in layers from top to bottom, or from left to right if `sideways`.
 
-    Nodes that come first stand further up; links from later to earlier ones lead upwards. No node or label
-    overlaps another. The same input gives the same output.
+    Earlier nodes are further up; links from later to earlier ones lead upwards. No node or label overlaps another. The
+    same input gives the same output.
     """
     if sideways:
         turned = [replace(node, width=node.height, height=node.width) for node in nodes]
@@ -64,7 +64,7 @@ class _Levels:
         self.height = y
 
     def _gap(self, upper: int, top: float) -> float:
-        """Lay the tracks below a layer; returns the height they need."""
+        """Lay the tracks below a layer; return their height."""
         above, below = (AT_NODES, AT_LABELS) if upper % 2 == 0 else (AT_LABELS, AT_NODES)
         members = self._nets(self._grid.layers[upper])
         nets = [
@@ -80,7 +80,7 @@ class _Levels:
         return above + max(tracks, default=0) * TRACK_GAP + below
 
     def _nets(self, layer: list[int]) -> list[list[tuple[int, int]]]:
-        """The connections below a layer, those that meet in a trunk together."""
+        """Return the connections below a layer, grouped if they share a trunk."""
         cells = self._grid.cells
         nets: dict[tuple[int, int], list[tuple[int, int]]] = {}
         for upper in layer:
@@ -95,7 +95,7 @@ class _Levels:
         return list(nets.values())
 
     def arrangement(self, links: Sequence[LayerLink]) -> Arrangement:
-        """The finished drawing."""
+        """Return the finished drawing."""
         cells, axes = self._grid.cells, self._axes
         nodes = [(axes[n], cell) for n, cell in enumerate(cells) if cell.is_node]
         corners = [(axis - cell.left, self._middles[cell.layer] - cell.height / 2) for axis, cell in nodes]
@@ -123,7 +123,7 @@ class _Levels:
 
 
 def without_detours(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Without points that lie on the straight line between their neighbours."""
+    """Return the points without those on a straight line between their neighbours."""
     kept: list[Point] = []
     for point in points:
         if kept and point == kept[-1]:

@@ -1,4 +1,4 @@
-"""Columns of a layered drawing: straight lines first, then short ones, as close to their wishes as distances allow."""
+"""Columns of a layered drawing: straight lines first, then short ones, within the least distances."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from statistics import median
 from dsc.drawing.layered.graph import Cell, Grid, effort
 
 Wish = tuple[float, float]
-"""Where something should be, and how much that matters."""
+"""A wanted position and its weight."""
 
 
 def fit(wishes: Sequence[Sequence[Wish]], distances: Sequence[float]) -> list[float]:
-    """Positions that minimise the weighted absolute deviations, by pooling adjacent violators.
+    """Return positions that minimise the weighted absolute deviations, by pooling adjacent violators.
 
     Args:
         wishes: at least one for each position.
@@ -35,7 +35,7 @@ def fit(wishes: Sequence[Sequence[Wish]], distances: Sequence[float]) -> list[fl
 
 
 def _median(pool: Sequence[Wish], total: float) -> float:
-    """The weighted median; the middle of the possible ones if there are several."""
+    """Return the weighted median; the middle of the possible ones if there are several."""
     half = total / 2
     reached = 0.0
     for index, (value, weight) in enumerate(pool):
@@ -50,11 +50,11 @@ def _median(pool: Sequence[Wish], total: float) -> float:
 NODE_GAP = 36.0
 LINE_GAP = 14.0
 STAY = 0.01
-"""How much it matters that something stays where it is: only to choose between places that are as good."""
+"""Weight of the present position: it only decides between positions that are otherwise equal."""
 
 
 def place_cells(grid: Grid) -> list[float]:
-    """The axis of every cell, by its number."""
+    """Return the axis of every cell, by its number."""
     axes = [0.0] * len(grid.cells)
     for layer in grid.layers:
         _place(grid, layer, axes, [[(0.0, 1.0)]] * len(layer))
@@ -80,12 +80,12 @@ def _sweep(grid: Grid, axes: list[float], *, above: bool, below: bool) -> None:
 
 
 def straighten(grid: Grid, axes: list[float], ends: Mapping[tuple[int, int], float]) -> None:
-    """Move cells so that connections that meet nodes off their axis are straight, as far as there is room.
+    """Move cells so that connections off a node's axis are straight, if there is room.
 
     Args:
         grid: the cells.
         axes: is changed.
-        ends: (cell, neighbour) -> where the connection meets the cell.
+        ends: (cell, neighbour) -> position at which the connection meets the cell.
     """
     off = {pair: end - axes[pair[0]] for pair, end in ends.items()}
 
@@ -107,5 +107,5 @@ def _place(grid: Grid, layer: list[int], axes: list[float], wishes: list[list[Wi
 
 
 def distance(left: Cell, right: Cell) -> float:
-    """The least distance between the axes of two cells that stand side by side."""
+    """Return the least distance between the axes of two neighbouring cells."""
     return left.right + right.left + (NODE_GAP if left.is_node and right.is_node else LINE_GAP)

@@ -16,8 +16,8 @@ class LayerNode:
     Attributes:
         width, height: its size.
         beside: room to keep free on its right, e.g. for a loop.
-        pointed: all links meet it in the middle of its side, not spread along it.
-        diamond: it is pointed and only its corners reach its sides; links against the order meet it beside them.
+        pointed: all links meet it in the middle of its side, instead of spread along it.
+        diamond: it is pointed and only its corners reach its sides; links against the order end next to the corners.
         last: no link may lead upwards to it.
     """
 
@@ -35,9 +35,9 @@ class LayerLink:
 
     Attributes:
         source, target: positions of the nodes in the input.
-        width, height: size of its label; 0 if it has none.
-        weight: how much it matters that it is straight.
-        meant: what inside the target it leads to; links to the same share a line.
+        width, height: size of its label; 0 without a label.
+        weight: importance of a straight line.
+        meant: the element inside the target that it leads to; links to the same element share a line.
     """
 
     source: int
@@ -50,7 +50,7 @@ class LayerLink:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """How a link runs from its source to its target, and the middle of its label."""
+    """The line of a link from its source to its target, and the middle of its label."""
 
     points: tuple[Point, ...]
     label: Point
@@ -70,20 +70,19 @@ LABEL_GAP = 4.0
 """Free space around a label's text."""
 
 _Trunk = tuple[int, str, int, int]
-"""What links to one target share in a layer: the target, what is meant inside it, the direction, the layer."""
+"""Key of links that share a line in a layer: target, element inside it, direction, layer."""
 
 
 @dataclass(slots=True)
 class Cell:
-    """Something with a place in a layer: a node, a label, or a line that passes.
+    """An element with a place in a layer: a node, a label, or a line that passes.
 
     Attributes:
         layer: its layer, counted from the top.
-        left, right: how far it reaches from its axis.
-        height: how high it is.
+        left, right: its extents from its axis.
+        height: its height.
         is_node, bend: a node; or only a line.
-        up, down: the cells it is connected with in the layers above and below, and how much it matters
-            that the connection is straight.
+        up, down: the connected cells in the layers above and below, with the weight of a straight connection.
     """
 
     layer: int
@@ -106,7 +105,7 @@ class Grid:
 
 
 def effort(grid: Grid) -> int:
-    """How many rounds of improvement a drawing of that size gets, so that none takes more than seconds."""
+    """Return the number of improvement rounds for a drawing of that size, to bound the time to seconds."""
     size = len(grid.cells)
     return 8 if size < 3_000 else 4 if size < 20_000 else 1
 
@@ -125,7 +124,7 @@ def build_grid(nodes: Sequence[LayerNode], links: Sequence[LayerLink]) -> Grid:
 
 
 def _layers(rank: dict[int, int], links: Sequence[LayerLink]) -> list[int]:
-    """Every node as high as its links allow, then down where its links get shorter; lone ones last."""
+    """Place every node as high as its links allow, then down if this shortens its links; unconnected ones last."""
     above: dict[int, set[int]] = {node: set() for node in rank}
     below: dict[int, set[int]] = {node: set() for node in rank}
     for link in links:
@@ -179,7 +178,7 @@ def _connect(cells: list[Cell], one: int, other: int, step: int, weight: float) 
 
 
 def _in_order_of_visit(cells: list[Cell]) -> list[list[int]]:
-    """The layers in the order in which a walk along the connections, from the first node on, meets the cells."""
+    """Return the layers in the order in which a walk along the connections, from the first node on, meets the cells."""
     layers: list[list[int]] = [[] for _ in range(1 + max((cell.layer for cell in cells), default=-1))]
     seen: set[int] = set()
     for root in range(len(cells)):

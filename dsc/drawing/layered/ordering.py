@@ -1,4 +1,4 @@
-"""Which cell stands left of which: barycentre sweeps and exchanges of neighbours, for few crossings."""
+"""Order of cells in layers: barycentre sweeps and exchanges of neighbours, for few crossings."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from dsc.drawing.layered.graph import Cell, Grid, effort
 
 SMALL = 400
-"""Up to so many cells, drawings get the more thorough treatment."""
+"""Number of cells up to which drawings get the more thorough treatment."""
 
 
 def order_cells(grid: Grid) -> None:
-    """Reorder every layer of the grid; the best order met is kept, the first of equal ones."""
+    """Reorder every layer of the grid; keep the best order found, the first of equal ones."""
     rounds = effort(grid) + 4 * (len(grid.cells) <= SMALL)
     best, fewest = [list(layer) for layer in grid.layers], _crossings(grid)
     for number in range(2 * rounds):
@@ -59,7 +59,7 @@ def _exchange(grid: Grid) -> None:
 
 
 def _between(grid: Grid, left: int, right: int, position: dict[int, int]) -> int:
-    """Crossings of the two cells' connections if `left` stands left of `right`."""
+    """Return the number of crossings of two cells' connections if `left` is left of `right`."""
     count = 0
     for downwards in (True, False):
         others = [position[n] for n in _neighbours(grid.cells[right], downwards=downwards)]
@@ -74,7 +74,7 @@ def _crossings(grid: Grid) -> int:
 
 
 def _inversions(grid: Grid, layer: list[int], position: dict[int, int]) -> int:
-    """Crossings below a layer, counted with a Fenwick tree (Barth, Jünger, Mutzel 2002)."""
+    """Return the crossings below a layer, counted with a Fenwick tree (Barth, Jünger, Mutzel 2002)."""
     ends = [end for cell in layer for end in sorted(position[n] for n in grid.cells[cell].down)]
     tree = [0] * (max(ends, default=0) + 2)
     count = 0

@@ -1,4 +1,4 @@
-"""Where connections meet a node: spread along its upper or lower side, straight where possible."""
+"""Ports of connections at nodes: spread along the upper or lower side, with straight lines where possible."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from dsc.drawing.layered.graph import Grid, LayerNode
 
 PORT_GAP = 14.0
 TIGHT = 8.0
-"""The distance of ports where they would not fit otherwise."""
+"""The distance of ports if they would not fit otherwise."""
 CORNER = 11.0
 """Free space at a node's corners."""
 BESIDE = 12.0
-"""From a diamond's corner to links beside it."""
+"""Distance from a diamond's corner to links next to it."""
 STRAIGHT = 16.0
-"""How much more a connection that can be straight matters than one that cannot."""
+"""Weight of a connection that can be straight, relative to one that cannot."""
 
 Ports = dict[tuple[int, int], float]
-"""(cell, neighbour) -> where across the drawing the connection meets the cell."""
+"""(cell, neighbour) -> position, across the drawing, at which the connection meets the cell."""
 
 
 def assign_ports(nodes: Sequence[LayerNode], grid: Grid, axes: Sequence[float]) -> Ports:
-    """The ends of all connections between cells; lines and labels are met on their axis."""
+    """Return the ends of all connections between cells; lines and labels are met on their axis."""
     ports: Ports = {}
     against = _against_the_order(grid)
     for number, cell in enumerate(grid.cells):
@@ -43,13 +43,13 @@ def assign_ports(nodes: Sequence[LayerNode], grid: Grid, axes: Sequence[float]) 
 
 
 def _against_the_order(grid: Grid) -> set[tuple[int, int]]:
-    """The connections by which links leave a node upwards or reach it from below."""
+    """Return the connections of links that leave a node upwards or reach it from below."""
     ends = {(chain[0], chain[1]) for chain in grid.chains if chain[1] in grid.cells[chain[0]].up}
     return ends | {(chain[-1], chain[-2]) for chain in grid.chains if chain[-2] in grid.cells[chain[-1]].down}
 
 
 def _at_corner(axis: float, width: float, turning: Sequence[float | None]) -> list[float]:
-    """At the corner; beside it those that turn against the order (on the side they come from) where both meet."""
+    """Place links at the corner; those against the order are next to it, on their side, if both kinds meet."""
     if None not in turning:
         return [axis] * len(turning)
     aside = min(BESIDE, width / 4)
@@ -71,7 +71,7 @@ def _spread(axis: float, width: float, wanted: Sequence[float]) -> list[float]:
 
 
 def _capped(places: Sequence[float], limit: float, tight: float) -> list[float]:
-    """The places, as few as possible of them moved down so that none is above the limit."""
+    """Return the places, with the fewest possible moved down so that none is above the limit."""
     result: list[float] = []
     for place in reversed(places):
         result.append(min(place, limit))

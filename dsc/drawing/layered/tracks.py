@@ -1,4 +1,4 @@
-"""How lines run sideways between two layers: each on a track of its own, with few crossings."""
+"""Tracks of lines between two layers: a separate track for each horizontal part, with few crossings."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 CLOSE = 8.0
-"""Lines nearer than this to each other would be taken for one."""
+"""Lines nearer than this to each other look like one."""
 MANY = 40
-"""From so many lines on, tracks are shared first and crossings are not counted."""
+"""Number of lines from which tracks are shared first, without counting crossings."""
 SAME_LINE = 100
-"""How many crossings are as bad as two lines that run on top of each other."""
+"""Number of crossings that weigh as much as two lines on top of each other."""
 
 
 @dataclass(frozen=True, slots=True)
 class Net:
-    """Lines that share a sideways part: where they come from above and where they leave below."""
+    """Lines with a common horizontal part, their positions above it and below it."""
 
     tops: tuple[float, ...]
     bottoms: tuple[float, ...]
@@ -37,7 +37,7 @@ class Net:
 
 
 def assign_tracks(nets: Sequence[Net]) -> list[int]:
-    """The track of every net, counted from the top; nets that overlap never share one."""
+    """Return the track of every net, counted from the top; nets that overlap never share one."""
     bent = [number for number, net in enumerate(nets) if not net.straight]
     order = sorted(bent, key=lambda number: (nets[number].low, nets[number].high))
     tracks = [0] * len(nets)
@@ -61,7 +61,7 @@ def _first_fit(nets: Sequence[Net], order: Iterable[int], tracks: list[int]) -> 
 
 
 def _least_crossing(nets: Sequence[Net], order: list[int]) -> list[int]:
-    """Greedy: next comes the net that gains most by being above all that are left."""
+    """Greedy: the next net is the one with the largest gain above all remaining ones."""
     gain = {(a, b): _cost(nets[b], nets[a]) - _cost(nets[a], nets[b]) for a in order for b in order}
     score = {a: sum(gain[a, b] for b in order) for a in order}
     result = []
@@ -75,7 +75,7 @@ def _least_crossing(nets: Sequence[Net], order: list[int]) -> list[int]:
 
 
 def _cost(above: Net, below: Net) -> int:
-    """What it costs to have one net above another."""
+    """Return the cost of one net above another."""
     cost = sum(below.low < x < below.high for x in above.bottoms)
     cost += sum(above.low < x < above.high for x in below.tops)
     shared = any(abs(x - other) < CLOSE / 2 for x in above.bottoms for other in below.tops)
