@@ -1,4 +1,4 @@
-"""XML read into elements that know their line; no DTD, no entities, no instructions, bounded in size and depth."""
+"""XML reader with the line of each element; without DTD, entities or instructions, and bounded in size and depth."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from knowledge_base.errors import ParseError, Place
 
 NAMESPACE = "http://www.w3.org/2005/07/scxml"
 MAX_DEPTH = 30
-"""Of elements; a `parallel` in a `parallel` makes a plot four levels deeper, which must be readable as YAML."""
+"""Depth of elements. Each nested `parallel` makes a plot four levels deeper, and its YAML must stay readable."""
 
 
 @dataclass(slots=True)
 class Element:
-    """An element of the SCXML namespace (or of none), or of another, which is then `foreign`."""
+    """An element of the SCXML namespace (or of none), or of another one, which is `foreign`."""
 
     name: str
     attributes: Mapping[str, str]
@@ -27,32 +27,32 @@ class Element:
 
     @property
     def foreign(self) -> bool:
-        """Whether it is no element of SCXML."""
+        """Whether it is not an element of SCXML."""
         return self.namespace not in {"", NAMESPACE}
 
     @property
     def text(self) -> str:
-        """What stands in it besides elements, without the blanks around it."""
+        """Its text besides elements, stripped."""
         return "".join(self.texts).strip()
 
     def walk(self) -> Iterator[Element]:
-        """The element and all inside it."""
+        """Yield the element and all elements inside it."""
         yield self
         for child in self.children:
             yield from child.walk()
 
 
 def read_xml(text: str, source: str | None = None) -> Element:
-    """The root element.
+    """Return the root element.
 
     Raises:
-        ParseError: it is not well-formed XML, has a document type or an entity of its own, or is too large or deep.
+        ParseError: it is not well-formed XML, has a document type or an entity declaration, or is too large or deep.
     """
-    data = text.encode(errors="surrogatepass")  # half a character is refused with its place
+    data = text.encode(errors="surrogatepass")  # half a surrogate pair is refused with its place
     check_size(len(data), Place(source))
     reader = _Reader(source)
     try:
-        reader.parser.Parse(data, True)  # noqa: FBT003  # expat takes no names here
+        reader.parser.Parse(data, True)  # noqa: FBT003  # expat takes no keywords here
     except expat.ExpatError as error:
         place = Place(source, error.lineno, error.offset + 1)
         raise ParseError(f"not readable as XML: {expat.ErrorString(error.code)}", place=place) from None
@@ -60,7 +60,7 @@ def read_xml(text: str, source: str | None = None) -> Element:
 
 
 def written(element: Element) -> str:
-    """How messages call an element; one of another namespace with that namespace."""
+    """Return an element's name for messages; one of another namespace with that namespace."""
     return f"<{element.name}>" + (f" of the namespace '{element.namespace}'" if element.foreign else "")
 
 

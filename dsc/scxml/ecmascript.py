@@ -1,8 +1,8 @@
-"""The ECMAScript expressions that the one language can say, translated into it; everything else is refused by name.
+"""Translation of ECMAScript expressions into conditions and terms; anything without a counterpart is refused by name.
 
-Numbers, strings, truth values, variables, `_event.data.x`, `+ - * /`, `Math.pow` with a small whole exponent,
-comparisons, `&& || !` and `In()`. Where ECMAScript would convert a value, it is refused; the scope knows the kinds of
-values that there are.
+The subset has numbers, strings, truth values, variables, `_event.data.x`, `+ - * /`, comparisons, `&& || !`, `In()`,
+and `Math.pow` with a small whole exponent. An expression that relies on a conversion of values is refused; the scope
+knows the kinds of values.
 """
 
 from __future__ import annotations
@@ -30,41 +30,41 @@ from knowledge_base.language.expression import (
 )
 
 Names = Mapping[str, str] | Scope
-"""The chart's data by their own spelling -> the name of the variable; alone, nothing is known about their kinds."""
+"""The chart's data by their own spelling -> the name of the variable; such a mapping has no kinds of values."""
 
 _COMPARE = {"===": "=", "==": "=", "!==": "!=", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 _FALSE = {BOOLEAN: Constant(False), NUMBER: Constant(0), TEXT: Constant("", quoted=True), UNDEFINED: NO_VALUE}  # noqa: FBT003
-"""The values that count as false; NaN is none of ours."""
+"""The values that count as false; NaN cannot occur."""
 MAX_WHOLE = 2**53
-"""Whole numbers up to it are the same in ECMAScript, which rounds larger ones."""
+"""Largest whole number that ECMAScript represents exactly."""
 MAX_EXPONENT = 8
 MAX_NESTING = 50
 MAX_OPERATIONS = 100
-"""Of a term, counted after `Math.pow` is written out: `a + b - c` nests, and what follows recurses."""
+"""Upper bound of a term, counted after the expansion of `Math.pow`: `a + b - c` nests, and later stages recurse."""
 
 
 def condition(text: str, names: Names, place: Place | None = None) -> Expression:
-    """A `cond` as a condition.
+    """Return a `cond` as a condition.
 
     Args:
         text: the expression.
-        names: what it can name.
+        names: the names it may use.
         place: for errors.
 
     Raises:
-        NotExpressibleError: it uses something that conditions cannot say, or relies on a conversion.
+        NotExpressibleError: it has a part without counterpart in conditions, or relies on a conversion.
         UnknownNameError: it uses data that the chart does not declare.
     """
     return _Parser(text, names, place).whole_condition()
 
 
 def term(text: str, names: Names, place: Place | None = None) -> Term:
-    """An `expr` as a term; see `condition`."""
+    """Return an `expr` as a term; see `condition`."""
     return _Parser(text, names, place).whole_term()
 
 
 def joined(text: str, names: Names, place: Place | None = None) -> list[Term]:
-    """What a `log` shows: the terms that `+` joins, from the first string on; before it, numbers are added."""
+    """Return the parts of a `log`: the terms that `+` joins, from the first string on; before it, numbers are added."""
     return _Parser(text, names, place).whole_join()
 
 
@@ -237,7 +237,7 @@ class _Parser:
         return self._bounded(Arithmetic(sign, sides))
 
     def _number(self, part: Expression | Term) -> Term:
-        """A side of what is computed or ordered."""
+        """Return an operand of arithmetic or of an order comparison as a term."""
         found = self._as_term(part)
         if isinstance(found, Constant) and not _is_number(found):
             raise self._refused("text cannot be computed with")
@@ -253,7 +253,7 @@ class _Parser:
         return f"'{found.name}' ({kinds})" if isinstance(found, Variable) else f"a value ({kinds})"
 
     def _check_comparison(self, sign: str, left: Term, right: Term) -> None:
-        """Refuse what ECMAScript would convert: `==` between kinds, and the order of what is no number."""
+        """Refuse conversions of ECMAScript: `==` between kinds, and order between values other than numbers."""
         if sign not in {"===", "!==", "==", "!="}:
             self._number(left), self._number(right)
             return
@@ -277,7 +277,7 @@ class _Parser:
         return self._truth(part) if isinstance(part, Term) else part
 
     def _truth(self, value: Term) -> Expression:
-        """Whether a value counts as true: it is none of those that count as false."""
+        """Return whether a value is true: it differs from all false values."""
         kinds = self._scope.kinds_of(value)
         if kinds <= {BOOLEAN, UNDEFINED} or self._scope.want(value, BOOLEAN):
             return Comparison("=", value, Constant(True))  # noqa: FBT003  # a value to compare with
@@ -288,7 +288,7 @@ class _Parser:
 
     def _as_term(self, part: Expression | Term) -> Term:
         if not isinstance(part, Term):
-            raise self._refused("a condition is no value")
+            raise self._refused("a condition is not a value")
         return part
 
 

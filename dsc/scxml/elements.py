@@ -1,4 +1,4 @@
-"""The elements and attributes of SCXML that are read, and the refusal of all others."""
+"""Supported elements and attributes of SCXML, and the refusal of all others."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ATTRIBUTES: Mapping[str, frozenset[str]] = {
         "else": "",
     }.items()
 }
-"""Elements that are read -> their attributes."""
+"""Supported elements -> their attributes."""
 STATES = frozenset({"state", "parallel", "final"})
 
 _CHART = frozenset({"transition", "onentry", "onexit", "datamodel", "history"})
@@ -53,7 +53,7 @@ CHILDREN: Mapping[str, frozenset[str]] = {
     "send": frozenset({"param", "content"}),
     "if": _ACTIONS | {"elseif", "else"},
 }
-"""Elements -> what may stand directly inside them."""
+"""Elements -> the elements allowed directly inside them."""
 _MEANINGLESS_IF_EMPTY = frozenset({"id", "target", "initial", "event", "location", "idlocation", "sendid"})
 _HOLDS_TEXT = frozenset({"data", "assign", "content"})
 _KNOWN_TO_SCXML = frozenset({"script", "foreach", "invoke", "finalize", "donedata", "onexit"})
@@ -61,12 +61,12 @@ _KNOWN_ATTRIBUTES = frozenset({"src", "targetexpr", "typeexpr", "srcexpr", "auto
 
 
 def check(element: Element) -> None:
-    """Refuse what is unknown, misplaced, or known to SCXML but without counterpart, here and inside.
+    """Refuse elements and attributes, here and inside, that are unknown, misplaced or without counterpart.
 
     Raises:
-        NotExpressibleError: an element or attribute of SCXML that action plots have nothing for.
-        UnknownNameError: no element or attribute of SCXML, or not in this place.
-        InputError: an attribute says nothing, or text stands where none belongs.
+        NotExpressibleError: an element or attribute of SCXML has no counterpart in action plots.
+        UnknownNameError: it is not an element or attribute of SCXML, or not in this place.
+        InputError: an attribute is empty, or text is misplaced.
     """
     known = ATTRIBUTES[element.name]
     for name in element.attributes:
@@ -87,6 +87,6 @@ def check(element: Element) -> None:
             raise NotExpressibleError(child.name, "has no counterpart", place=child.place)
         if child.name not in valid:
             raise UnknownNameError(
-                f"<{child.name}> cannot stand in <{element.name}>", place=child.place, found=child.name, valid=valid
+                f"<{child.name}> is not allowed in <{element.name}>", place=child.place, found=child.name, valid=valid
             )
         check(child)

@@ -1,4 +1,4 @@
-"""Executable content (SCXML 4) as internal actions, in the form in which plots are written."""
+"""Executable content (SCXML 4) as internal actions, in the written form of plots."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DELAY = re.compile(r"(\d+\.?\d*|\.\d+)(ms|s)")
 
 
 def actions(elements: Iterable[Element], scope: Scope) -> list[Form]:
-    """The actions that the elements stand for, in order.
+    """Return the actions of the elements, in order.
 
     Raises:
         NotExpressibleError: one of them has no counterpart.
@@ -33,14 +33,14 @@ def actions(elements: Iterable[Element], scope: Scope) -> list[Form]:
 
 
 def needed(element: Element, attribute: str) -> str:
-    """An attribute that must be there; raises `InputError`."""
+    """Return a required attribute; raise `InputError` if it is missing."""
     if not element.attributes.get(attribute):
         raise InputError(f"<{element.name}> needs the attribute '{attribute}'", place=element.place)
     return element.attributes[attribute]
 
 
 def only_one(element: Element, *attributes: str) -> None:
-    """Raise `InputError` if two of the attributes are there, which exclude each other."""
+    """Raise `InputError` if the element has two of the attributes, which exclude each other."""
     both = [name for name in attributes if name in element.attributes]
     if len(both) > 1:
         message = f"<{element.name}> has both '{both[0]}' and '{both[1]}'"
@@ -48,26 +48,26 @@ def only_one(element: Element, *attributes: str) -> None:
 
 
 def variable(name: str, scope: Scope, element: Element) -> str:
-    """The variable for a datum; raises `UnknownNameError`."""
+    """Return the variable of a datum; raise `UnknownNameError`."""
     if name not in scope.names:
         raise UnknownNameError(f"there is no data '{name}'", place=element.place, found=name, valid=scope.names)
     return scope.names[name]
 
 
 def assigned(element: Element, scope: Scope) -> Term | None:
-    """The value that a `data` or `assign` gives: its expression, or what stands in it (SCXML B.2.1)."""
+    """Return the value of a `data` or `assign`: its expression, or its content (SCXML B.2.1)."""
     if "expr" in element.attributes:
         if element.text:
             raise InputError(f"<{element.name}> has both 'expr' and content", place=element.place)
         return term(element.attributes["expr"], scope, element.place)
     found = _literal(element) if element.text else None
     if isinstance(found, Mapping):
-        raise NotExpressibleError(element.name, "an object is no value of a variable", place=element.place)
+        raise NotExpressibleError(element.name, "an object is not a value of a variable", place=element.place)
     return found
 
 
 def set_at_first(root: Element, scope: Scope) -> frozenset[str]:
-    """Data that get a value before anything can read them: in the first state, or on every way out of it."""
+    """Return data that have a value before any use: set in the first state, or on every path out of it."""
     tops = [child for child in root.children if child.name in STATES]
     named = root.attributes.get("initial")
     first = next((top for top in tops if named is None or any(_id(one) == named for one in top.walk())), None)
@@ -84,7 +84,7 @@ def set_at_first(root: Element, scope: Scope) -> frozenset[str]:
 
 
 def _set_by(block: Element, scope: Scope) -> Iterator[str]:
-    """What a block sets to constants before it does anything else."""
+    """Yield the variables that a block sets to constants before any other action."""
     for action in block.children:
         if action.name != "assign" or not isinstance(assigned(action, scope), Constant):
             return
@@ -92,7 +92,7 @@ def _set_by(block: Element, scope: Scope) -> Iterator[str]:
 
 
 def _mentions(element: Element, name: str) -> int:
-    """How often the name stands in expressions and locations, here and inside; in anything else does no harm."""
+    """Count the name in expressions and locations, here and inside; other occurrences have no effect."""
     word = re.compile(rf"(?<![\w$.]){re.escape(name)}(?![\w$])")
     texts = (text for one in element.walk() for key, text in one.attributes.items() if key != "id")
     return sum(len(word.findall(text)) for text in texts)
@@ -103,7 +103,7 @@ def _id(element: Element) -> str | None:
 
 
 def fired(element: Element, scope: Scope) -> Sent:
-    """The event that a `raise` or `send` fires."""
+    """Return the event that a `raise` or `send` fires."""
     if element.name == "raise":
         return Sent(needed(element, "event"), None, scope)
     return Sent(_constant(element, "event", scope), _carried(element, scope), scope)
@@ -174,7 +174,7 @@ def _cancel(element: Element, scope: Scope) -> Form:
 
 
 def _constant(element: Element, attribute: str, scope: Scope) -> str:
-    """An attribute, or a string in the expression attribute of that name."""
+    """Return an attribute, or the string in the expression attribute of that name."""
     if f"{attribute}expr" not in element.attributes:
         return needed(element, attribute)
     only_one(element, attribute, f"{attribute}expr")
@@ -190,12 +190,12 @@ def _delay(element: Element, scope: Scope) -> float:
     text = _constant(element, "delay", scope)
     match = _DELAY.fullmatch(text)
     if match is None:
-        raise InputError(f"'{text}' is no delay such as 10ms or 1.5s", place=element.place, found=text)
+        raise InputError(f"'{text}' is not a delay such as 10ms or 1.5s", place=element.place, found=text)
     return float(match[1]) / (1000 if match[2] == "ms" else 1)
 
 
 def _arguments(element: Element, scope: Scope) -> dict[str, Term]:
-    """What is sent, under names in lower case; `_event.data` itself is called `data`."""
+    """Return the data of a `send`, with names in lower case; `_event.data` itself is named `data`."""
     found: dict[str, Term] = {}
     for name, value in (_carried(element, scope) or {}).items():
         folded = name.lower() or "data"
@@ -203,13 +203,13 @@ def _arguments(element: Element, scope: Scope) -> dict[str, Term]:
             why = f"two are named '{folded}', in lower case"
             raise NotExpressibleError("param/@name", why, place=element.place)
         if not is_plain_name(folded):
-            raise NotExpressibleError("param/@name", f"'{name}' is no name for an attribute", place=element.place)
+            raise NotExpressibleError("param/@name", f"'{name}' is not a name for an attribute", place=element.place)
         found[folded] = value
     return found
 
 
 def _carried(element: Element, scope: Scope) -> dict[str, Term] | None:
-    """What an event carries by its own spelling, with `WHOLE` for content that is no object; `None` if nothing."""
+    """Return an event's data with their own spelling, with `WHOLE` for content other than an object; or `None`."""
     contents = [child for child in element.children if child.name == "content"]
     named: dict[str, Term] = {
         name: Variable(variable(name, scope, element)) for name in element.attributes.get("namelist", "").split()
@@ -220,7 +220,7 @@ def _carried(element: Element, scope: Scope) -> dict[str, Term] | None:
     if not contents:
         return named or None
     if named or len(contents) > 1:
-        raise InputError("<content> stands alone in <send>, without 'namelist' and <param>", place=contents[0].place)
+        raise InputError("<content> in <send> excludes 'namelist' and <param>", place=contents[0].place)
     return _content(contents[0], scope)
 
 
@@ -234,7 +234,7 @@ def _content(element: Element, scope: Scope) -> dict[str, Term]:
 
 
 def _literal(element: Element) -> Constant | Mapping[str, Constant]:
-    """Content as JSON, or else as a string in which blanks count once (SCXML B.2.1)."""
+    """Return content as JSON, or else as a string with its blanks collapsed (SCXML B.2.1)."""
     try:
         value = json.loads(element.text)
     except ValueError:
@@ -244,7 +244,7 @@ def _literal(element: Element) -> Constant | Mapping[str, Constant]:
     if isinstance(value, dict) and value and all(name and _is_scalar(one) for name, one in value.items()):
         return {name: _scalar(one) for name, one in value.items()}
     if not _is_scalar(value):
-        why = "null, 'undefined', an array or an object in an object is no value"
+        why = "null, 'undefined', an array or an object in an object is not a value"
         raise NotExpressibleError(element.name, why, place=element.place)
     return _scalar(value)
 

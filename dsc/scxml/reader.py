@@ -1,4 +1,4 @@
-"""SCXML read into an action plot of dialect `scxml`.
+"""Reader of SCXML as an action plot of dialect `scxml`.
 
 | SCXML | plot |
 |---|---|
@@ -38,8 +38,8 @@ def parse_scxml(text: str, source: str | None = None) -> ActionPlot:
 
     Raises:
         ParseError: it is not XML, has a document type, or is too large or deep.
-        NotExpressibleError: something in it has no counterpart in action plots.
-        InputError: it is no SCXML; the message has file, line and the nearest valid name.
+        NotExpressibleError: an element has no counterpart in action plots.
+        InputError: it is not SCXML; the message has file, line and the nearest valid name.
     """
     root = read_xml(text, source)
     if root.name != "scxml" or root.foreign:
@@ -73,7 +73,7 @@ class _Reader:
         return read_model(ActionPlot, Document(form, self._places)).written_at(self._places)
 
     def _note(self, path: Path, place: Place) -> None:
-        """Remember where a part stands; the parts around it that are no elements stand where those do."""
+        """Record the place of a part, and of the parts around it that are not elements."""
         for length in range(1, len(path)):
             self._places.setdefault(path[:length], self._places[path[: length - 1]])
         self._places[path] = place
@@ -91,7 +91,7 @@ class _Reader:
         for element in data:
             name = needed(element, "id")
             if not is_plain_name(name.lower()):
-                raise InputError(f"'{name}' is no name for data", place=element.place, found=name)
+                raise InputError(f"'{name}' is not a name for data", place=element.place, found=name)
             if name.lower() in names.values():
                 raise InputError(f"two data are named '{name}', in lower case", place=element.place, found=name)
             names[name] = name.lower()
@@ -104,7 +104,7 @@ class _Reader:
         return form
 
     def _work_out_kinds(self) -> None:
-        """From here on the scope knows the kinds of the data, and what is converted is refused."""
+        """Give the scope the kinds of the data; from then on, conversions are refused."""
         known = self._known.data
         early = {self._known.names.get(name) for name in set_at_first(self._root, self._known)}
         given = [one for one in self._given(self._root, self._known) if one[1] is not None or one[0] not in early]
@@ -112,7 +112,7 @@ class _Reader:
         work_out(known, given)
 
     def _given(self, element: Element, scope: Scope) -> Iterator[tuple[str, Term | None, Scope]]:
-        """What the elements inside give to variables; events that they fire are noted on the way."""
+        """Yield the values that inner elements assign to variables; record the events that they fire."""
         for child in element.children:
             if child.name == "data":
                 yield scope.names[child.attributes["id"]], assigned(child, scope), scope
@@ -137,7 +137,7 @@ class _Reader:
         return form if initial is None else {**form, "initial": initial}
 
     def _received(self) -> list[str]:
-        """The events that the chart listens to and does not itself fire."""
+        """Return the events that the chart takes and does not itself fire."""
         own = {sent.event for sent in self._known.data.sent}
         heard = [e for one in self._root.walk() if one.name == "transition" for e in _descriptors(one)]
         plain = dict.fromkeys(event.removesuffix(".*").removesuffix(".") for event in heard)
@@ -147,7 +147,7 @@ class _Reader:
     # -- states --------------------------------------------------------------------------------------------
 
     def _scope(self, element: Element, path: Path) -> Form:
-        """`states` and `initial` of the chart or of a composite state."""
+        """Return `states` and `initial` of the chart or of a composite state."""
         states: Form = {}
         for child in element.children:
             if child.name in STATES or child.name == "history":
@@ -191,11 +191,11 @@ class _Reader:
     def _inside(self, element: Element, path: Path) -> Form:
         if not any(child.name in STATES for child in element.children):
             for child in (child for child in element.children if child.name == "history"):
-                raise InputError("a history needs states beside it", place=child.place)
+                raise InputError("a history needs sibling states", place=child.place)
             if self._initial(element) is not None:
                 raise InputError("there is no state inside to begin with", place=element.place)
             if element.name == "parallel":
-                raise NotExpressibleError("parallel", "without states it is complete at once", place=element.place)
+                raise NotExpressibleError("parallel", "without states it is complete immediately", place=element.place)
             return {}
         if element.name == "state":
             return self._scope(element, path)
@@ -228,7 +228,7 @@ class _Reader:
     # -- transitions ---------------------------------------------------------------------------------------
 
     def _transitions(self, element: Element, form: Form, path: Path) -> None:
-        """Document order is kept also where transitions with the same descriptors have others between them."""
+        """Keep document order, also between transitions with equal descriptors that have others between them."""
         on: dict[str, list[Form]] = {}
         always: list[Form] = []
         repeats: Counter[str] = Counter()
@@ -266,8 +266,8 @@ def _descriptors(transition: Element) -> list[str]:
 
 
 def _key(event: str, on: dict[str, list[Form]], repeats: Counter[str]) -> str:
-    """A key for a transition after those in `on`: new unless the last of them has the same descriptors."""
-    # A list of descriptors means the same with one of them repeated, and is another key.
+    """Return a key for a transition after those in `on`: a new one unless the last has the same descriptors."""
+    # A list with a repeated descriptor has the same meaning, and is a different key.
     again = f" {event.split(maxsplit=1)[0]}"
     key = event + again * repeats[event]
     while key in on and key != next(reversed(on)):
@@ -282,7 +282,7 @@ def _new(name: str, known: Form, element: Element) -> None:
 
 
 def _default(transition: Element) -> None:
-    """The transition of an `initial` or a history just leads somewhere (SCXML 3.6, 3.10)."""
+    """Refuse a trigger or guard in the transition of an `initial` or a history (SCXML 3.6, 3.10)."""
     for name in ("event", "cond"):
         if name in transition.attributes:
             raise InputError(f"this transition is taken always, so it has no '{name}'", place=transition.place)
@@ -295,5 +295,5 @@ def _only(element: Element) -> Element:
 
 
 def _declared(attributes: Mapping[str, str]) -> dict[str, str]:
-    """Attributes with their types; one that is only compared for equality may be anything."""
+    """Return attributes with their types; one that is only compared for equality may have any type."""
     return {name: kind or "symbol" for name, kind in attributes.items()}

@@ -1,4 +1,4 @@
-"""The words of the ECMAScript expressions that SCXML charts use."""
+"""Tokens of the ECMAScript expressions in SCXML charts."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ _ESCAPE = re.compile(r"\\(u[0-9a-fA-F]{4}|x[0-9a-fA-F]{2}|[^0-9ux])")
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A word: its kind (`number`, `text`, `name`, `sign`, `end`) and what it says."""
+    """A token: its kind (`number`, `text`, `name`, `sign`, `end`) and its text or value."""
 
     kind: str
     text: str
 
 
 def tokens(text: str, place: Place | None) -> list[Token]:
-    """The words of an expression.
+    """Return the tokens of an expression.
 
     Raises:
-        NotExpressibleError: something in it is no part of the subset, e.g. an object in braces.
+        NotExpressibleError: a part is outside the subset, e.g. an object in braces.
     """
     found, at, end = [], 0, len(text.rstrip())
     while at < end:
         match = _WORDS.match(text, at)
         if match is None:
-            raise NotExpressibleError("expression", f"'{text}' cannot be said in conditions and terms", place=place)
+            raise NotExpressibleError("expression", f"'{text}' has no counterpart in conditions and terms", place=place)
         kind = match.lastgroup or ""
         word = match[kind]
         found.append(Token(kind, _unquoted(word, place) if kind == "text" else word))
@@ -48,10 +48,10 @@ def tokens(text: str, place: Place | None) -> list[Token]:
 
 
 def _unquoted(word: str, place: Place | None) -> str:
-    """The text that a literal stands for; two halves of a character that are written as two escapes are put together.
+    """Return the text of a string literal; two escapes that form a surrogate pair become one character.
 
     Raises:
-        NotExpressibleError: an escape is octal, in braces or cut short, or there is half a character.
+        NotExpressibleError: an escape is octal, in braces or cut short, or there is half a surrogate pair.
     """
     inside = word[1:-1]
     if "\\" in _ESCAPE.sub("", inside):

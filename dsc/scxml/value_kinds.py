@@ -1,7 +1,7 @@
-"""The kinds of values that a chart's data and events have: what ECMAScript converts is translated rightly or refused.
+"""Kinds of values of a chart's data and events; they show where ECMAScript would convert a value.
 
-The kinds follow from the document alone: from what `data`, `assign` and `send` give. An event that the chart does not
-fire itself comes from outside; its attributes are declared under `receives`, with the type that the chart needs.
+The kinds follow from the document alone: from the values of `data`, `assign` and `send`. An event that the chart does
+not itself fire comes from outside. Its attributes are declared under `receives`, with the type that the chart needs.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ NUMBER, TEXT, BOOLEAN = "number", "text", "boolean"
 UNDEFINED = "undefined"
 ANY = "any"
 NO_VALUE = Constant("undefined", quoted=True)
-"""ECMAScript's `undefined`, which is none of our values: no other text of an imported chart is spelt so."""
+"""ECMAScript's `undefined`, which is not a value of a plot: no other text of an imported chart has this spelling."""
 Kinds = frozenset[str]
 WHOLE = ""
-"""The key of `_event.data` itself, beside those of its properties."""
+"""The key of `_event.data` itself, next to those of its properties."""
 _EVENT = "event."
 
 
@@ -31,8 +31,8 @@ class Sent:
 
     Attributes:
         event: its name.
-        carries: what it carries, by the spelling in the document; `None` if it has no data.
-        scope: where its terms stand.
+        carries: its data, by the spelling in the document; `None` without data.
+        scope: the scope of its terms.
     """
 
     event: str
@@ -42,10 +42,10 @@ class Sent:
 
 @dataclass(slots=True)
 class Data:
-    """What the whole chart knows about its data.
+    """Knowledge of the whole chart about its data.
 
     Attributes:
-        kinds: variable -> kinds of its values; `None` while they are worked out: nothing is checked then.
+        kinds: variable -> kinds of its values; `None` before their computation, which disables the checks.
         sent: the events that the chart fires.
         received: events from outside -> attributes that the chart reads, in lower case -> their types.
         spelt: those attributes -> their spelling.
@@ -59,12 +59,12 @@ class Data:
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """What an expression can name.
+    """The names that an expression may use.
 
     Attributes:
         names: the chart's data by their own spelling -> the name of the plot's variable.
-        data: what is known about them.
-        events: descriptors of the events of which one is `_event`; `None` if it can be any.
+        data: the knowledge about them.
+        events: descriptors of the events that `_event` may be; `None` if it can be any.
     """
 
     names: Mapping[str, str]
@@ -72,11 +72,11 @@ class Scope:
     events: tuple[str, ...] | None = None
 
     def on(self, events: Iterable[str]) -> Scope:
-        """The scope of a transition with these descriptors; of one without, any event may have been the last."""
+        """Return the scope of a transition with these descriptors; without descriptors, `_event` can be any event."""
         return replace(self, events=tuple(events) or None)
 
     def kinds_of(self, term: Term) -> Kinds:
-        """The kinds of values that a term has."""
+        """Return the kinds of values that a term has."""
         if isinstance(term, Constant):
             return frozenset({_kind(term.value)})
         if isinstance(term, Arithmetic):
@@ -88,10 +88,10 @@ class Scope:
         return self._kinds_of_attribute(term.name.removeprefix(_EVENT))
 
     def check_read(self, attribute: str, place: Place | None) -> None:
-        """Refuse `_event.data.ATTRIBUTE` (or `_event.data`, for `WHOLE`) where ECMAScript would find something else.
+        """Refuse `_event.data.ATTRIBUTE` (or `_event.data`, for `WHOLE`) if ECMAScript would find another value.
 
         Raises:
-            NotExpressibleError: an event that may be the last one has other data, or spells it otherwise.
+            NotExpressibleError: an event that may be the last one has other data, or another spelling.
         """
         if self.data.kinds is None:
             return
@@ -111,7 +111,7 @@ class Scope:
             self.data.received[event].setdefault(attribute.lower(), "")
 
     def want(self, term: Term, kind: str) -> bool:
-        """Whether a term has this kind; an attribute from outside is declared to have it."""
+        """Return whether a term has this kind; declare the kind of an attribute from outside."""
         kinds = self.kinds_of(term)
         if self.data.kinds is None:
             return True
@@ -125,7 +125,7 @@ class Scope:
 
     def _declare(self, attribute: str, kind: str) -> bool:
         events = self._outside()
-        if self.events is None or "*" in self.events:  # which event it is, nobody knows
+        if self.events is None or "*" in self.events:  # the event can be any one
             return False
         for event in events:
             declared = self.data.received[event]
@@ -142,13 +142,13 @@ class Scope:
         return [one for one in self.data.sent if self.events is None or any(matches(d, one.event) for d in self.events)]
 
     def _outside(self) -> list[str]:
-        """The events from outside that may be the last one."""
+        """Return the events from outside that may be the last one."""
         if self.events is None:
             return [*self.data.received]
         return [event for event in self.data.received if any(matches(d, event) for d in self.events)]
 
     def _has_platforms(self) -> bool:
-        """Whether an event of the interpreter itself, which has no data, may be the last one."""
+        """Return whether the last event may be one of the interpreter itself, which has no data."""
         return self.events is None or any(d.startswith(("done.", "error.", "*")) for d in self.events)
 
 
@@ -171,11 +171,11 @@ def _refused(why: str, place: Place | None) -> NotExpressibleError:
 
 
 def work_out(data: Data, given: Iterable[tuple[str, Term | None, Scope]]) -> None:
-    """Work out the kinds of all variables.
+    """Compute the kinds of all variables.
 
     Args:
-        data: where they are put down.
-        given: what gives a variable a value, with the scope of the term; `None` leaves it undefined.
+        data: receives the kinds.
+        given: assigned values of variables, with the scope of each term; `None` leaves a variable undefined.
     """
     listed = list(given)
     data.kinds = {name: frozenset() for name, _, _ in listed}

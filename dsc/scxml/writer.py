@@ -1,4 +1,4 @@
-"""Action plots as SCXML; skills, knowledge, dynamic states and timeouts are refused by name."""
+"""Writer of action plots as SCXML; skills, knowledge, dynamic states and timeouts are refused by name."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ _SIGNS = {"=": "===", "!=": "!=="}
 
 
 def expression_text(e: Expression) -> str:
-    """A condition as a `cond`.
+    """Return a condition as a `cond`.
 
     Raises:
-        NotExpressibleError: it asks the knowledge base, or quantifies.
+        NotExpressibleError: it reads the knowledge base, or quantifies.
     """
     match e:
         case And(parts):
@@ -70,7 +70,7 @@ def expression_text(e: Expression) -> str:
 
 
 def term_text(term: Term) -> str:
-    """A term as an `expr`; raises `NotExpressibleError` for a fluent or a name that is no identifier."""
+    """Return a term as an `expr`; raise `NotExpressibleError` for a fluent or a name that is not an identifier."""
     match term:
         case Constant(NO_VALUE.value):
             return "undefined"
@@ -87,9 +87,9 @@ def term_text(term: Term) -> str:
 
 
 def identifier(name: str) -> str:
-    """A variable's name, if it is one in ECMAScript too."""
+    """Return a variable's name if it is an identifier in ECMAScript too."""
     if not name.isidentifier():
-        raise NotExpressibleError("variable", f"'{name}' is no identifier in SCXML")
+        raise NotExpressibleError("variable", f"'{name}' is not an identifier in SCXML")
     return name
 
 
@@ -99,11 +99,11 @@ def _bracketed(e: Expression) -> str:
 
 
 def to_scxml(plot: ActionPlot) -> str:
-    """The plot as an SCXML document; `parse_scxml` reads it back as an equivalent chart.
+    """Return the plot as an SCXML document; `parse_scxml` reads it back as an equivalent chart.
 
     Raises:
-        NotExpressibleError: the plot uses something that SCXML has nothing for.
-        UnknownNameError: it leads to a state that it has not.
+        NotExpressibleError: a part of the plot has no counterpart in SCXML.
+        UnknownNameError: a transition names a missing state.
     """
     require_targets(plot)
     for what, there in (("parameters", plot.parameters), ("outputs", plot.outputs), ("rules", plot.rules),
@@ -162,7 +162,7 @@ class _Writer:
         if isinstance(state, SubmachineState | DynamicState):
             raise NotExpressibleError("submachine or dynamic state", f"'{name}' is filled by other plots")
         if type(state) is State and "done" in state.on and self._plot.dialect == "dsc":
-            raise NotExpressibleError("completion", f"'{name}' has no content and is done at once")
+            raise NotExpressibleError("completion", f"'{name}' has no content and is done immediately")
         for what, there in (("timeout", state.after), ("every", state.every), ("at_least", state.at_least)):
             if there:
                 raise NotExpressibleError(what, f"'{name}' has one; SCXML sends delayed events instead")
@@ -212,11 +212,11 @@ class _Writer:
         _actions(element, transition.effect)
 
     def _block(self, around: ET.Element, tag: str, actions: Iterable[ExternalAction | Internal]) -> None:
-        """One element for each block; loose actions are one block."""
+        """Write one element for each block; actions outside blocks form one block."""
         listed = tuple(actions)
         blocks: list[tuple[ExternalAction | Internal, ...]] = [one.block for one in listed if isinstance(one, Block)]
         if blocks and len(blocks) < len(listed):
-            raise NotExpressibleError("block", f"an error in the actions beside it would not end <{tag}>")
+            raise NotExpressibleError("block", f"an error in the other actions would not end <{tag}>")
         for block in blocks or [listed] * bool(listed):
             _actions(ET.SubElement(around, tag), block)
 
@@ -247,7 +247,7 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
 
 
 def _joined(parts: Sequence[Term]) -> str:
-    """The parts one after the other; `+` does so only where one of them is text."""
+    """Return the parts in sequence; `+` concatenates only if one of them is text."""
     texts = list(map(term_text, parts))
     joins = len(parts) == 1 or any(isinstance(part, Constant) and isinstance(part.value, str) for part in parts)
     return " + ".join(texts if joins else ['""', *texts])
@@ -266,7 +266,7 @@ def _send(around: ET.Element, action: Emit) -> None:
         element.set("idlocation", identifier(action.into))
     if action.id is not None:
         if not isinstance(action.id, Constant):
-            raise NotExpressibleError("send/@id", "an id that is worked out has no counterpart")
+            raise NotExpressibleError("send/@id", "a computed id has no counterpart")
         element.set("id", str(action.id.value))
     for name, term in action.arguments.items():
         ET.SubElement(element, "param", {"name": name, "expr": term_text(term)})

@@ -295,10 +295,10 @@ def test_elements_without_counterpart_are_named(body, message):
         ("<state id='a'><onentry><assign location='xx' expr='1'/></onentry></state>", "there is no data 'xx'"),
         ("<state id='a'><onentry><raise/></onentry></state>", "needs the attribute 'event'"),
         ("<state id='a'/><state id='a'/>", "two states are named 'a'"),
-        ("<state id='a/b'/>", "no name for a state"),
-        ("<state id='a'><history id='h'/></state>", "needs states beside"),
+        ("<state id='a/b'/>", "not a name for a state"),
+        ("<state id='a'><history id='h'/></state>", "needs sibling states"),
         ("<state id='a'><history id='h'/><state id='b'/></state>", "exactly one <transition>"),
-        ("<state id='a'><onentry><send event='e' delay='soon'/></onentry></state>", "is no delay"),
+        ("<state id='a'><onentry><send event='e' delay='soon'/></onentry></state>", "is not a delay"),
         ("", "at least one"),
     ],
 )
