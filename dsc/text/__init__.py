@@ -1,1 +1,1 @@
-"""Text and pictures of plots: YAML in and out, drawings."""
+"""Text forms of plots: YAML in and out, text diagrams, JSON Schema."""

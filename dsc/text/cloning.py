@@ -1,4 +1,4 @@
-"""Cloning copies plots and their files for another robot, with all that they depend on (S2.10)."""
+"""Cloning copies plots and their files for another robot, with all plots that they depend on (S2.10)."""
 
 from __future__ import annotations
 
@@ -25,27 +25,29 @@ from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameErr
 from knowledge_base.output_files import Output, write_all
 
 _ROLE = ("implements", "effects", "confirm")
-"""What a plot is for plans."""
+"""The properties of a plot as an implementation of a planning action."""
 
 
 def cloned(plot: ActionPlot, library: Library, prefix: str, *, made: Library | None = None) -> tuple[ActionPlot, ...]:
-    """The plot and all plots that it depends on, with the prefix before their names, and using each other.
+    """Return copies of a plot and of all plots that it depends on; the prefix precedes their names.
+
+    The copies use each other.
 
     Args:
-        plot: what is cloned.
-        library: has what it depends on.
-        prefix: stands before the names of clones.
-        made: where the clones will live, if that is another library. Plots of it that are called like a clone are such
-            already. There, clones carry out planning actions in place of their originals, and those that do belong to
-            what a goal depends on. Left out, clones stand beside their originals, which go on doing so alone: nothing
-            that was there behaves otherwise than before.
+        plot: the original.
+        library: has its dependencies.
+        prefix: the beginning of the clones' names.
+        made: the clones' library, if that is another one. Plots in it with a clone's name are earlier clones. There,
+            clones implement planning actions in place of their originals. A goal then depends on all plots that
+            implement planning actions. Without `made`, clones share the originals' library and implement no planning
+            actions, so that existing plans stay unchanged.
 
     Returns:
         The new clones, that of the plot first, unless it was made before.
 
     Raises:
-        UnknownNameError: a plot uses one that is not there.
-        SchemaError: a clone that was made before cannot stand in for its original any more; the message says why.
+        UnknownNameError: a plot uses a missing one.
+        SchemaError: an earlier clone no longer fits as a substitute of its original; the message has the reason.
     """
     apart = made is not None
     known = library if made is None else made
@@ -60,7 +62,7 @@ def cloned(plot: ActionPlot, library: Library, prefix: str, *, made: Library | N
 
 
 def cloned_profile(profile: Profile, prefix: str, names: Container[str]) -> Profile:
-    """The profile under a new name, what it says of the plots with these names said of their clones."""
+    """Return the profile under a new name, with its values for the named plots moved to their clones."""
     plots = {prefix + name if name in names else name: values for name, values in profile.plots.items()}
     return profile.model_copy(update={"name": prefix + profile.name, "plots": plots})
 
@@ -96,11 +98,11 @@ _KEY = r"""["']?[\w\-]+["']?\s*:\s*"""
 
 @dataclass(frozen=True, slots=True)
 class Clones:
-    """What cloning comes to; nothing has been written yet.
+    """The result of cloning, before any file is written.
 
     Attributes:
-        texts: what is to be written where.
-        kept: files with clones that were made before, which stay as they are.
+        texts: file -> its new text.
+        kept: files with earlier clones, which stay unchanged.
     """
 
     texts: Mapping[Path, str]
@@ -108,17 +110,17 @@ class Clones:
 
 
 def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Sequence[Path] = ()) -> Clones:
-    """A plot file cloned with all that it depends on.
+    """Clone a plot file with all plots that it depends on.
 
     Args:
-        file: a plot; what it depends on is in its folder.
-        prefix: stands before the names of clones and of their files.
-        into: the folder for them, if it is another one; see `dsc.text.cloning.cloned` for what that means.
-        profiles: files that say what parameters of the plots are worth; their clones say it of the clones.
+        file: a plot file; the plot's dependencies are in its folder.
+        prefix: the beginning of the names of clones and their files.
+        into: the folder for them, if it is another one; see `made` in `dsc.text.cloning.cloned`.
+        profiles: files with values of the plots' parameters; their clones have values of the clones' parameters.
 
     Raises:
-        InputError: a file cannot be read or is there already, a plot uses one that is not there, the prefix makes no
-            name, two clones would be one file, or a clone that was made before does not fit any more.
+        InputError: a file cannot be read or exists already, or a plot uses a missing one. The prefix does not begin a
+            name, two clones have one file, or an earlier clone no longer fits.
     """
     if not re.fullmatch(r"[a-zA-Z_][\w\-]*", prefix):
         raise SchemaError(f"no name begins with '{prefix}': letters, digits, _ and -, a letter first", found=prefix)
@@ -132,7 +134,7 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
         library = Library({one.name: one for one in (*library, *made)}.values())
     try:
         clones = cloned(plot, library, prefix, made=made if apart else None)
-    except UnknownNameError as error:  # the plot that is not there may be in a file that cannot be read
+    except UnknownNameError as error:  # the missing plot may be in a file that cannot be read
         raise (broken or [error])[0] from None
     new = {clone.name: clone for clone in clones}
     names = {one.name: prefix + one.name for one in library if prefix + one.name in (*new, *(p.name for p in made))}
@@ -155,11 +157,11 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
 
 
 def write_clones(clones: Clones) -> None:
-    """Write the files, all or none, and make their folder if it is missing.
+    """Write all files or none, and make their folder if it is missing.
 
     Raises:
-        InputError: the folder cannot be made, or a file not be written.
-        OSError: there is no room.
+        InputError: the folder or a file cannot be written.
+        OSError: the disk is full.
     """
     for folder in {target.parent for target in clones.texts}:
         try:
@@ -176,7 +178,7 @@ def _add(texts: dict[Path, str], target: Path, text: str) -> None:
 
 
 def _plots_in(folder: Path) -> Iterator[tuple[Path, ActionPlot]]:
-    """Those that can be read."""
+    """Yield the plots that can be read."""
     for file in sorted(folder.glob("*.yaml")):
         with suppress(InputError):
             yield file, load_plot(file)
@@ -188,7 +190,7 @@ def _stem(plot: ActionPlot) -> str:
 
 
 def _text(original: ActionPlot, clone: ActionPlot, names: Mapping[str, str]) -> str:
-    """The original's text with other names, if that is how the clone is read; else the clone's own."""
+    """Return the original's text with other names, if it reads as the clone; else the clone's own text."""
     place = original.place(("plot",))
     if place is not None and place.source:
         text = _substituted(read_file(place.source), original, names)
@@ -201,7 +203,7 @@ def _text(original: ActionPlot, clone: ActionPlot, names: Mapping[str, str]) -> 
 
 
 def _substituted(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
-    """The text with other names of plots, as far as they are found where they were read; from behind, as they move."""
+    """Replace the names of plots that are found at their places in the text, from the end, because places move."""
     lines = text.splitlines(keepends=True)
     for line, column, path, old in sorted(_written(plot), key=lambda one: one[:2], reverse=True):
         key = _KEY if isinstance(path[-1], str) else ""
@@ -213,7 +215,7 @@ def _substituted(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
 
 
 def _written(plot: ActionPlot) -> Iterator[tuple[int, int, FormPath, str]]:
-    """Line and column of each name of a plot, the path there, and the name."""
+    """Yield line and column of each name of a plot, its path, and the name."""
     for path, name in ((("plot",), plot.name), *plot.references()):
         place = plot.place(path)
         if place is not None and place.line is not None and place.column is not None:

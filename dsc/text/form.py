@@ -1,4 +1,4 @@
-"""From a document that people wrote to a model value, with errors that point at the line and the nearest key."""
+"""Reading of written documents as model values; errors name the line and the nearest key."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 def read_model(model: type[_Model], document: Document) -> _Model:
-    """The document as a value of `model`.
+    """Return the document as a value of `model`.
 
     Raises:
-        InputError: something in it does not fit; the message has file, line, and the nearest valid key.
+        InputError: the document does not match; the message has file, line, and the nearest valid key.
     """
     if not isinstance(document.data, Mapping):
         found = in_yaml(document.data)

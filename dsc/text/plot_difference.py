@@ -1,4 +1,4 @@
-"""What is different between two plots: states, transitions and the interface, as lines and as a drawing."""
+"""Difference of two plots: states, transitions and the interface, as lines and as a drawing."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _INSIDE = ("states", "regions")
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One thing that is different.
+    """One difference.
 
     Attributes:
         kind: `added`, `removed` or `changed`.
-        what: what it is, e.g. `state clear` or `parameter table`.
+        what: the element, e.g. `state clear` or `parameter table`.
         state: the state's name, if it is about one.
-        detail: for a change, which of its parts.
+        detail: for a change, the changed parts.
     """
 
     kind: str
@@ -33,18 +33,18 @@ class Difference:
     detail: str = ""
 
     def __str__(self) -> str:
-        """One line with a sign in front: `+ state clear`."""
+        """Return one line with a sign in front: `+ state clear`."""
         sign = {"added": "+", "removed": "-", "changed": "~"}[self.kind]
         return f"{sign} {self.what}" + (f": {self.detail}" if self.detail else "")
 
 
 def differences(old: ActionPlot, new: ActionPlot) -> list[Difference]:
-    """What was added, removed and changed from `old` to `new`: the interface first, then states in order."""
+    """Return the additions, removals and changes from `old` to `new`: the interface first, then states in order."""
     return [*_interface(old.to_form(), new.to_form()), *_states(old, new)]
 
 
 def draw_difference(old: ActionPlot, new: ActionPlot) -> tuple[str, str]:
-    """Both plots as SVG, with what was removed marked in the first, what was added in the second, changes in both."""
+    """Draw both plots as SVG: removals marked in the first, additions in the second, changes in both."""
     found = differences(old, new)
 
     def marks(*kinds: str) -> dict[str, str]:
@@ -91,7 +91,7 @@ def _states(old: ActionPlot, new: ActionPlot) -> Iterator[Difference]:
 
 
 def _own_forms(plot: ActionPlot) -> dict[str, dict[str, Any]]:
-    """Each state's form without the states in it, which are compared by themselves; where it is counts."""
+    """Return each state's form with its path but without its inner states, which are compared separately."""
     form, found = plot.to_form(), {}
     for name, _, path in plot.walk():
         own: Any = form

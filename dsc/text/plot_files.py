@@ -1,4 +1,4 @@
-"""Plot files: the author's YAML form read into `ActionPlot`s and written back."""
+"""Plot files: read YAML into `ActionPlot`s and write it."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def load_plot(path: Path | str) -> ActionPlot:
 
 
 def load_library(folder: Path | str) -> Library:
-    """All plots (`*.yaml`) of a folder, by file name.
+    """Return all plots (`*.yaml`) of a folder, by file name.
 
     Raises:
-        InputError: the folder is missing, a file is no plot, or two plots have one name.
+        InputError: the folder is missing, a file is not a plot, or two plots have one name.
     """
     files = sorted(path_of(folder).glob("*.yaml"))
     if not files:
@@ -42,7 +42,7 @@ def load_library(folder: Path | str) -> Library:
 
 
 def plot_to_yaml(plot: ActionPlot) -> str:
-    """The plot as YAML in the short form in which people write it; reading it gives the same plot."""
+    """Return the plot as YAML in its short form; reading it gives the same plot."""
     return dump(_short(plot.to_form()))
 
 
@@ -114,11 +114,11 @@ _NAMES = {
     "emits": "attributes", "receives": "attributes", "with": "value", "pass": "value", "as": "value",
     "assign": "value",
 }  # fmt: skip
-"""Mappings whose keys are people's names, which keep their order, and what stands under such a name."""
+"""Mappings with names as keys, which keep their order -> the kind of their values."""
 
 
 def _short(node: Any, role: str = "plot") -> Any:
-    """Lists of one and mappings that only say `to` or `type` in their short spelling, keys in reading order."""
+    """Return lists of one and mappings with only `to` or `type` in their short form, with keys in reading order."""
     if isinstance(node, list):
         short = [_short(one, "transition" if role in {"event", "always", "choice"} else "element") for one in node]
         return short[0] if len(short) == 1 and role in _SINGLE else short
@@ -135,7 +135,7 @@ def _short(node: Any, role: str = "plot") -> Any:
 
 
 def _key(name: str, role: str) -> str | int | float:
-    """The key of a case as YAML writes that constant; other names as they are."""
+    """Return the key of a case as YAML writes its constant; other names unchanged."""
     value = case_value(name) if role == "cases" else name
     return name if isinstance(value, str) else value
 

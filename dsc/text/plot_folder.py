@@ -1,4 +1,4 @@
-"""The plots beside a plot: of its folder, those are read that it needs, so that what else lies there costs nothing."""
+"""Related plots in a plot's folder: only files of needed plots are parsed, so that other files cost nothing."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ _DECLARES = re.compile(r"""\bplot["']?\s*:\s*["']?([\w\-#.]+)""")
 
 
 class Neighbours:
-    """Folders of plots; each file is read once, however many plots beside it are looked at."""
+    """Folders of plots; each file is read once for all plots of its folder."""
 
     def __init__(self) -> None:
         self._folders: dict[Path, dict[Path, str | InputError]] = {}
         self._plots: dict[Path, ActionPlot | InputError] = {}
 
     def of(self, file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
-        """The plot with those that it may meet, and why some files of its folder are not among them.
+        """Return the plot with its related plots, and the errors of files that could not be read.
 
-        These are the plots that it uses, that those use, and, where rules or plans are, what implements planning
-        actions. If one of them is not found, all plots of the folder are read: its name may be a misspelt one.
+        Related plots are the used ones, directly or not, and with rules or plans also the implementations of planning
+        actions. If one of them is missing, all plots of the folder are read: its name may be a misspelt one.
         """
         library, broken = Library([plot]), list[InputError]()
         planned = any(isinstance(state, DynamicState) for _, state, _ in plot.walk())
@@ -66,7 +66,7 @@ class Neighbours:
 
 
 def _holding(texts: dict[Path, str | InputError], names: set[str], *, actions: bool) -> Iterator[Path]:
-    """The files that seem to hold one of these plots, or one that implements a planning action."""
+    """Yield the files that seem to contain one of these plots, or an implementation of a planning action."""
     for file, text in texts.items():
         if isinstance(text, str) and (
             not names.isdisjoint(_DECLARES.findall(text)) or (actions and "implements" in text)

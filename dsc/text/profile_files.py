@@ -16,7 +16,7 @@ def parse_profile(text: str, source: str | None = None) -> Profile:
     """Read a profile from YAML text.
 
     Raises:
-        InputError: it is none; the message has the place and the nearest valid key.
+        InputError: it is not a profile; the message has the place and the nearest valid key.
     """
     document = load_document(text, source)
     return read_model(Profile, document).written_at(document.places)
@@ -28,15 +28,15 @@ def load_profile(path: Path | str) -> Profile:
 
 
 def profile_to_yaml(profile: Profile) -> str:
-    """The profile as YAML; reading it gives the same profile."""
+    """Return the profile as YAML; reading it gives the same profile."""
     return dump(profile.model_dump(mode="json", by_alias=True, exclude_defaults=True))
 
 
 def find_profile(name: str, folder: Path) -> Profile:
-    """The profile of that name in a folder, or else in the file of that path.
+    """Return the profile of that name in a folder, or else in the file of that path.
 
     Raises:
-        InputError: there is neither, or it is no profile; the message has the nearest name.
+        InputError: both are missing, or the file is not a profile; the message has the nearest name.
     """
     known = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
     if name in known:

@@ -1,4 +1,4 @@
-"""States that a plot names and has not: what no other form of it could say."""
+"""Check of the states that a plot names, for forms that cannot express a missing state."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from knowledge_base.errors import UnknownNameError
 
 
 def require_targets(plot: ActionPlot) -> None:
-    """Raise `UnknownNameError` unless each state that the plot begins with or leads to is one of its own."""
+    """Raise `UnknownNameError` if an initial state or target is not a state of the plot."""
     names = [name for name, _, _ in plot.walk()]
     for target, path in _named(plot):
         if target not in names:
@@ -20,7 +20,7 @@ def require_targets(plot: ActionPlot) -> None:
 
 
 def _named(plot: ActionPlot) -> Iterator[tuple[str, Path]]:
-    """The names of states that occur in the plot, each with the path where it stands."""
+    """Yield the names of states that occur in the plot, each with its path."""
     yield initial_of(plot), ("initial",)
     for _, state, path in plot.walk():
         if isinstance(state, CompositeState):

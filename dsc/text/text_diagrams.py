@@ -1,4 +1,4 @@
-"""Plots in the text forms of Mermaid (stateDiagram-v2) and PlantUML, which agree in nearly everything."""
+"""Plots in the text forms of Mermaid (stateDiagram-v2) and PlantUML, which differ only slightly."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from dsc.text.targets import require_targets
 
 
 def to_mermaid(plot: ActionPlot) -> str:
-    """The plot as a Mermaid state diagram; raises `UnknownNameError` if it leads to a state that it has not."""
+    """Return the plot as a Mermaid state diagram; raise `UnknownNameError` if a target is missing."""
     return "\n".join(["stateDiagram-v2", *_Writer(plot, hulls_have_rows=False).lines()]) + "\n"
 
 
 def to_plantuml(plot: ActionPlot) -> str:
-    """The plot as a PlantUML state diagram; errors as for `to_mermaid`."""
+    """Return the plot as a PlantUML state diagram; errors as for `to_mermaid`."""
     lines = _Writer(plot, hulls_have_rows=True).lines()
     return "\n".join(["@startuml", f"title {plot.name}", *lines, "@enduml"]) + "\n"
 
 
 class _Writer:
-    """States get short names of their own, since theirs may hold anything.
+    """Writes states under generated short names, because their own names may contain any character.
 
-    Mermaid refuses rows of text in states with states inside (`hulls_have_rows`); their titles say it then.
+    Mermaid refuses rows of text in states with inner states (`hulls_have_rows`); their titles contain the text then.
     """
 
     def __init__(self, plot: ActionPlot, *, hulls_have_rows: bool) -> None:
@@ -94,7 +94,7 @@ class _Writer:
 
 
 def _rows(state: AnyState) -> Iterator[str]:
-    """What a state says besides its name: how long it lasts, its actions, the events that do not leave it."""
+    """Yield a state's texts besides its name: least duration, actions, and events without an exit."""
     if not isinstance(state, State):
         return
     if state.at_least is not None:
@@ -118,5 +118,5 @@ def _title(name: str, state: AnyState) -> str:
 
 
 def _safe(text: str) -> str:
-    """What means something in these forms, spelled so that it does not: quotes, colons, line ends."""
+    """Replace special characters of these forms in a text: quotes, colons, line ends."""
     return " ".join(text.split()).replace('"', "'").replace(":=", "=").replace(":", ".").replace(";", ",")

@@ -1,4 +1,4 @@
-"""Plots, profiles, scenarios and charts as people wrote them: read no further than anything readable is long."""
+"""Files of plots, profiles, scenarios and charts, read up to a bounded size."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from knowledge_base.language.inputs import shown
 from knowledge_base.pddl.files import read_text, require_size
 
 MAX_BYTES = 250_000
-"""A hundred times the longest plot we ship; what is larger would keep its author waiting for an error."""
+"""A hundred times the longest plot of this project; a larger file would delay its author's error message."""
 
 
 def read_file(path: Path | str) -> str:
-    """The text of a file.
+    """Return the text of a file.
 
     Raises:
         InputError: it cannot be read, is not UTF-8, or has more than `MAX_BYTES`; as `knowledge_base.pddl.files`.
@@ -22,7 +22,7 @@ def read_file(path: Path | str) -> str:
 
 
 def path_of(path: object) -> Path:
-    """The path of that name; raises `InputError` for anything else than a text or path."""
+    """Return the path of that name; raise `InputError` for any value except a text or path."""
     if not isinstance(path, str | Path):
         raise InputError(f"a file or folder is named by a text or a Path, not {shown(path)}")
     return Path(path)

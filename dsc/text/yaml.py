@@ -1,9 +1,8 @@
-"""Plots and scenarios as YAML 1.2: read with places, refused where YAML is cleverer than people expect.
+"""Plots and scenarios as YAML 1.2, read with places; features of YAML that surprise authors are refused.
 
-Duplicate keys, tags, anchors, aliases and merge keys are refused; so are texts too large or nested too deeply to be
-anybody's plot. Scalars are those of YAML 1.2's core schema (10.3): `yes`, `off`, `1_000` and `2024-01-01` are text.
-Every error names file, line and column. What is read is built from the parser's events in one pass, so that the
-time it takes is bounded by the number of its parts.
+These are duplicate keys, tags, anchors, aliases and merge keys, and texts that are too large or nested too deeply for a
+plot. Scalars follow YAML 1.2's core schema (10.3): `yes`, `off`, `1_000` and `2024-01-01` are text. Every error names
+file, line and column. One pass builds the data from the parser's events, so that the number of parts bounds the time.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ _SPACES = "\0 \t\r\n\x85\u2028\u2029"
 
 
 class _Scanner(Scanner):
-    """Reads `{table: ?table}` as YAML 1.2 has it (7.3.3): `?` before a non-space begins a plain scalar.
+    """Reads `{table: ?table}` as YAML 1.2 (7.3.3): `?` before a non-space begins a plain scalar.
 
     The library keeps YAML 1.1's reading inside braces, where `?` always begins a complex key.
     """
@@ -59,7 +58,7 @@ class _Scanner(Scanner):
         return super().check_plain()
 
     def fetch_flow_collection_start(self, *args: Any, **named: Any) -> None:
-        if self.flow_level > MAX_DEPTH:  # looking for a key, the scanner runs ahead of the parser, at a price
+        if self.flow_level > MAX_DEPTH:  # the scanner looks ahead for a key, at a cost that grows with the depth
             raise ScannerError(None, None, _TOO_DEEP, self.reader.get_mark())
         super().fetch_flow_collection_start(*args, **named)
 
@@ -86,14 +85,14 @@ class Document:
 
     Attributes:
         data: dicts, lists and scalars.
-        places: where each part stands, by its path of keys and positions; a key's place is the key's own.
+        places: place of each part, by its path of keys and positions; a key's place is the key's own.
     """
 
     data: Any
     places: Mapping[FormPath, Place] = field(default_factory=dict)
 
     def place(self, path: FormPath) -> Place | None:
-        """Where the part at `path`, or the closest known part around it, stands."""
+        """Return the place of the part at `path`, or of the closest known part around it."""
         for length in range(len(path), -1, -1):
             if path[:length] in self.places:
                 return self.places[path[:length]]
@@ -104,7 +103,7 @@ def load_document(text: str, source: str | None = None) -> Document:
     """Read one YAML document.
 
     Raises:
-        ParseError: it is not YAML, or uses a feature that is refused.
+        ParseError: it is not YAML, or uses a refused feature.
         InputError: it is too large.
     """
     require_text(text, "what is read as YAML")
@@ -118,12 +117,12 @@ def load_document(text: str, source: str | None = None) -> Document:
     except ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         column = error.position - text.rfind("\n", 0, error.position)
-        problem = f"not readable as YAML: the character U+{ord(text[error.position]):04X} cannot stand in a text"
+        problem = f"not readable as YAML: the character U+{ord(text[error.position]):04X} is not allowed in a text"
         raise ParseError(problem, place=Place(source, line, column)) from None
 
 
 def dump(data: Mapping[str, Any]) -> str:
-    """Plain data as YAML in the house's style; `load_document` reads it back."""
+    """Return plain data as YAML in the project's style; `load_document` reads it back."""
     stream = StringIO()
     yaml = YAML()
     yaml.default_flow_style = None
@@ -179,7 +178,7 @@ class _Reader:
         return found
 
     def _key(self, event: Event, path: FormPath) -> str | int:
-        """A name; the cases of a `select` are constants, so there a number or truth value is one too."""
+        """Return a name; the cases of a `select` may also be numbers or truth values."""
         self._refuse_surprises(event, path)
         key = self._scalar(event) if isinstance(event, ScalarEvent) else None
         if isinstance(key, str):
@@ -246,7 +245,7 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def _plain(text: str) -> Any:
-    """What a scalar without quotes stands for in the core schema of YAML 1.2 (10.3.2)."""
+    """Return the value of a scalar without quotes in the core schema of YAML 1.2 (10.3.2)."""
     if text in _PLAIN:
         return _PLAIN[text]
     match = _NUMBER.fullmatch(text)
@@ -260,7 +259,7 @@ def _plain(text: str) -> Any:
 
 
 def _quoted(data: Any) -> Any:
-    """The data with quotes about texts that would be read as something else without."""
+    """Return the data with quotes around texts that would otherwise be read as another type."""
     if isinstance(data, Mapping):
         return {_quoted(key): _quoted(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
@@ -285,7 +284,7 @@ _PLAINER = {
     r"found unexpected end of stream": "a quote is never closed",
     r"'<stream end>'": "the end of the text",
 }
-"""The library's words -> ours."""
+"""The library's words -> this project's."""
 
 
 def _parse_error(error: MarkedYAMLError, source: str | None) -> ParseError:
