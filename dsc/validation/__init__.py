@@ -1,4 +1,4 @@
-"""What must be true of plots before they run; every finding has file, line, rule and remedy."""
+"""Validation of plots before a run; every finding has file, line, rule and remedy."""
 
 from dsc.validation.library import raise_findings, validate_library, validate_plot
 from dsc.validation.review import review_plot

@@ -1,4 +1,4 @@
-"""Arguments, parameters and outputs of plots: names exist, values keep their ranges, nothing needed is missing."""
+"""Arguments, parameters and outputs of plots: names exist, values are in range, and no required value is missing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from knowledge_base.language.expression import Constant, Term
 
 
 def check_parameters(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about the roles of a plot's own parameters, and about what it hands to others."""
+    """Yield findings about the roles of a plot's own parameters, and about its arguments for other plots."""
     for name, parameter in plot.parameters.items():
         yield from _own(plot, name, parameter)
     for _, state, path in nesting.states:
@@ -65,7 +65,7 @@ def _handed(
 ) -> Iterator[Finding]:
     for name, term in arguments.items():
         parameter = used.parameters.get(name)
-        if parameter is None:  # it is for another candidate, or a finding of its own
+        if parameter is None:  # another candidate's parameter, or a separate finding
             continue
         full, here = f"{used.name}.{name}", (*path, name)
         try:
@@ -87,7 +87,7 @@ def _fits(plot: ActionPlot, name: str, parameter: PlotParameter, term: Constant,
 
 
 def check_outputs(plot: ActionPlot) -> Iterator[Finding]:
-    """Findings about outputs that nothing gives a value."""
+    """Yield findings about outputs without an assignment."""
     open_ones = [name for name, output in plot.outputs.items() if output.initial is None]
     if not open_ones:
         return
@@ -114,7 +114,7 @@ def _actions(state: AnyState) -> Iterator[ExternalAction | Internal]:
 
 
 def check_arguments(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about the arguments of used plots."""
+    """Yield findings about the arguments of used plots."""
     entrances = _Entrances(plot, library, nesting)
     for name, state, path in nesting.states:
         if isinstance(state, Step):
@@ -142,7 +142,7 @@ def _used(plot: ActionPlot, do: Reaction, path: Path, library: Library) -> Itera
 
 
 def _passed_by_rule(plot: ActionPlot, rule: Rule, path: Path, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    """Some step that the rule is for takes what it passes; others are not handed it."""
+    """Require that some step of the rule takes each passed argument; other steps do not receive it."""
     if not rule.do.passed:
         return
     steps = [(name, state) for name, state, _ in nesting.states if isinstance(state, Step)]
@@ -200,7 +200,7 @@ def _passed(
     yield Finding(error, "arguments are taken", "pass them to a state with `use` or `dynamic`")
 
 
-# -- what must be given --------------------------------------------------------------------------------------
+# -- required arguments --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +213,7 @@ class _Need:
 
 @dataclass(frozen=True, slots=True)
 class _WayIn:
-    """A transition of the plot with its rules carried out; `path` is `None` where a rule made it."""
+    """A transition of the expanded plot; `path` is `None` if a rule created it."""
 
     transition: Transition
     path: Path | None
@@ -224,7 +224,7 @@ def _needed(parameters: Mapping[str, PlotParameter]) -> Iterable[str]:
 
 
 def _needs(state: Step, library: Library) -> Iterator[_Need]:
-    """What `with` leaves open."""
+    """Yield the required parameters that `with` does not set."""
     for used in contents_of(state, library):
         for name in _needed(used.parameters):
             if name not in state.arguments:
@@ -232,7 +232,7 @@ def _needs(state: Step, library: Library) -> Iterator[_Need]:
 
 
 class _Entrances:
-    """How states are entered, gathered when it is first asked for: in most plots `with` leaves nothing open."""
+    """Transitions into states, collected on first use: in most plots `with` sets every parameter."""
 
     def __init__(self, plot: ActionPlot, library: Library, nesting: Nesting) -> None:
         self._plot = plot
@@ -244,7 +244,7 @@ class _Entrances:
         """State -> the transitions that lead to it."""
         try:
             expanded = self._library.expanded(self._plot)
-        except InputError:  # which is a finding about the wiring
+        except InputError:  # the wiring check reports it
             expanded = self._plot
         found: defaultdict[str, list[_WayIn]] = defaultdict(list)
         for name, state, path in expanded.walk():
@@ -256,7 +256,7 @@ class _Entrances:
         return found
 
     def by_default(self, name: str, path: Path) -> bool:
-        """Whether the state begins its scope, or a history may bring it back."""
+        """Return whether the state is initial in its scope, or a history may restore it."""
         return name in self._defaults or any(path[:length] in self._remembered for length in range(len(path)))
 
     @cached_property
@@ -270,7 +270,7 @@ class _Entrances:
 
 
 def _given(plot: ActionPlot, name: str, path: Path, need: _Need, entrances: _Entrances) -> Iterator[Finding]:
-    """A parameter that `with` leaves open is passed on every way into the state."""
+    """Require that every transition into the state passes a parameter that `with` does not set."""
     leading = entrances.ways.get(name, [])
     silent = [way for way in leading if way.transition.target != name or need.parameter not in way.transition.passed]
     if len(silent) == len(leading):

@@ -1,4 +1,4 @@
-"""Data: variables that exist, conditions that can be evaluated, arguments that fit."""
+"""Data of plots: variables exist, conditions can be evaluated, arguments match."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ FREE_TYPES = frozenset({"number", "text", "symbol", "boolean", "condition", "plo
 def check_data(
     plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
 ) -> Iterator[Finding]:
-    """Findings about variables, types, conditions, effects and arguments."""
+    """Yield findings about variables, types, conditions, effects and arguments."""
     yield from _Data(plot, library, schema, skills, nesting).findings()
 
 
@@ -123,7 +123,7 @@ class _Data:
             yield from self._only(terms_of(command), scope, (*path, "command", position))
 
     def _continued(self, rule: Rule, event: Types, path: Path) -> Iterator[Finding]:
-        """What goes on as if a state were done has the rule's event, not the outputs that `done` would bring."""
+        """Check a `continue` response: the rule's event lacks the outputs that `done` would provide."""
         for name, state, outcomes in self._handing_back:
             if rule.on in outcomes and concerns(rule, name, state, self._library):
                 for transition in state.on.get(DONE, ()):
@@ -131,7 +131,7 @@ class _Data:
 
     @cached_property
     def _handing_back(self) -> list[tuple[str, Step, Outcomes]]:
-        """The states that bring outputs when they are done, with their outcomes."""
+        """Return the states with outputs at `done`, with their outcomes."""
         states = ((name, state) for name, state, _ in self._nesting.states if isinstance(state, Step))
         return [(n, s, answerable(s, self._library)) for n, s in states if outputs_of(s, self._library)]
 
@@ -174,7 +174,7 @@ class _Data:
             yield from self._condition(state.goal, self._types, (*path, "goal"))
 
     def _connector(self, connector: Connector, path: Path) -> Iterator[Finding]:
-        # Which event brought the run here is not known beforehand.
+        # The event before a connector is unknown at validation.
         if isinstance(connector, SelectState):
             yield from self._terms([("select", connector.select)], None, path)
         for inside, _, transition in self._nesting.leaving(path):
@@ -298,14 +298,14 @@ class _Data:
             yield Finding(_at(error, self._plot, path), "term")
 
     def _scope(self, attributes: Types | None, used: Expression | Term | Effect | None) -> dict[str, str | None]:
-        """Visible variables; where the event cannot be known, any of its attributes may be used."""
+        """Return the visible variables; for an unknown event, all of its attributes that the expression uses."""
         if attributes is not None:
             return {**self._types, **attributes}
         names = mentioned(used) if used is not None else frozenset()
         return {**self._types, **{name: None for name in names if name.startswith("event.")}}
 
     def _event_types(self, state: State, event: str) -> Types | None:
-        """Attribute types of an event as `event.name`; `None` if they are not known."""
+        """Return an event's attribute types as `event.name`; `None` if they are unknown."""
         found = attributes_of(event, state, self._plot, self._library, self._skills)
         if found is None:
             return None
@@ -318,6 +318,6 @@ class _Data:
 
 
 def _at(error: InputError, plot: ActionPlot, path: Path) -> InputError:
-    """The error at the place of the text it is about; its own place counts inside that text."""
+    """Return the error at the place of its text; its own place is relative to that text."""
     error.place = plot.place(path) or error.place
     return error

@@ -1,4 +1,4 @@
-"""Components that plots configure and switch are deployed."""
+"""Deployment check: plots configure and switch only deployed components."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.expression import Constant
 
 Components = Collection[str] | Mapping[str, Mapping[str, Parameter]]
-"""The names of components, or also what they declare about their parameters; nothing means that any may be set."""
+"""The names of components, or their declared parameters as well; names alone allow any parameter."""
 
 
 def check_components(plot: ActionPlot, components: Components) -> Iterator[Finding]:
-    """Findings about `set`, `send` and `switch` actions towards components that are not there or do not take them."""
+    """Yield findings about `set`, `send` and `switch` actions to missing components, or with undeclared parameters."""
     for action, path, who in _actions(plot):
         name = None if isinstance(action, Trigger) else component_of(action)  # triggers are checked with the skills
         if name is not None and name not in components:
@@ -30,7 +30,7 @@ def check_components(plot: ActionPlot, components: Components) -> Iterator[Findi
 
 
 def addressed_by(plot: ActionPlot) -> frozenset[str]:
-    """Names of the components that a plot itself uses; a plot that uses none is abstract, else primitive (S0.9)."""
+    """Return the components that a plot itself uses; a plot that uses none is abstract, else primitive (S0.9)."""
     named = (component_of(one) for one in flat(action for action, _, _ in _actions(plot)))
     return frozenset(name for name in named if name is not None)
 

@@ -1,4 +1,4 @@
-"""Flow of events: every declared outcome is wired, every wired event can happen, `done` is handled (S2.2, S0.11)."""
+"""Flow of events: declared outcomes are wired, wired events can happen, `done` is handled (S2.2, S0.11)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 def check_completion(
     plot: ActionPlot, wired: Mapping[str, AnyState], library: Library, nesting: Nesting
 ) -> Iterator[Finding]:
-    """Findings about `done`; `wired` has the states with the plot's rules carried out."""
+    """Yield findings about `done`; `wired` has the states of the expanded plot."""
     silent = cache(lambda used: _ends_silently(library.plot(used)))  # many states may use one plot
     for name, state, path in nesting.states:
         if type(state) is State and DONE in state.on and any(isinstance(a, Trigger) for a in state.entry):
@@ -62,12 +62,12 @@ def _completes(state: AnyState, silent: Callable[[str], bool]) -> bool:
 
 
 def _ends_silently(plot: ActionPlot) -> bool:
-    """Whether the plot can reach a top-level final state without firing a declared outcome."""
+    """Return whether the plot can reach a top-level final state without firing a declared outcome."""
     waiting = {initial_of(plot)} | {
         target for state in plot.states.values() if isinstance(state, State) for target in _silent_ways(plot, state)
     }
     seen: set[str] = set()
-    while waiting:  # connectors are passed through; what the way to them has fired, they need not fire again
+    while waiting:  # an outcome may be fired on the path through connectors
         name = waiting.pop()
         seen.add(name)
         reached = plot.states.get(name)
@@ -79,13 +79,13 @@ def _ends_silently(plot: ActionPlot) -> bool:
 
 
 def _silent_ways(plot: ActionPlot, source: TransitionSource) -> set[str]:
-    """Where transitions lead that fire no declared outcome."""
+    """Return the targets of transitions that fire no declared outcome."""
     silent = (one for _, one in source.transitions() if not set(one.emitted) & set(plot.emits))
     return {transition.target for transition in silent if transition.target is not None}
 
 
 def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about events."""
+    """Yield findings about events."""
     try:
         expanded = library.expanded(plot)
     except InputError as error:
@@ -104,11 +104,11 @@ def check_wiring(plot: ActionPlot, library: Library, skills: Skills, nesting: Ne
         if not isinstance(state, State):
             continue
         outcomes = outcomes_of(state, library)
-        if outcomes or state.entry:  # otherwise it cannot end with anything
+        if outcomes or state.entry:  # otherwise the state has no outcome to wire
             handled = _handled([wired[name], *nesting.around(path)])
             yield from _outcomes(plot, name, outcomes, handled, path)
             yield from _skills(plot, name, state, path, handled, skills)
-        if plot.dialect == "dsc":  # in SCXML an event that nobody takes, or nobody fires, is no mistake
+        if plot.dialect == "dsc":  # SCXML allows events without a transition or without a source
             yield from _known_events(plot, state, path, skills, traffic)
     if plot.dialect == "dsc":
         yield from check_completion(plot, wired, library, nesting)
@@ -129,7 +129,7 @@ def _reserved(plot: ActionPlot, event: str, path: Path) -> Finding:
 
 
 def _rule_targets(plot: ActionPlot, library: Library) -> Iterator[Finding]:
-    """A rule goes to a state beside the one it answers for."""
+    """Require that a rule's target is in the scope of the state that it answers for."""
     leading = [(n, rule) for n, rule in enumerate(plot.rules) if rule.leads_away and not plot.generated]
     for scope in plot.scopes() if leading else ():
         steps = [(name, state) for name, state in scope.states.items() if isinstance(state, Step)]
@@ -150,7 +150,7 @@ def _is_planned(state: Step) -> bool:
 
 
 def _left_out_in_a_circle(plot: ActionPlot, expanded: ActionPlot) -> Iterator[Finding]:
-    """Rules that leave out steps leave one in, in every circle of steps."""
+    """Require that in every cycle of steps at least one is never skipped by rules."""
     if not any(rule.before for rule in plot.rules):
         return
     connectors = ((name, state) for name, state, _ in expanded.walk() if isinstance(state, Connector))
@@ -161,7 +161,7 @@ def _left_out_in_a_circle(plot: ActionPlot, expanded: ActionPlot) -> Iterator[Fi
 
 
 def _handled(states: Iterable[AnyState]) -> dict[str, bool]:
-    """Event -> whether some transition takes it whatever the guards say."""
+    """Map each event to whether some transition takes it under all guards."""
     found: dict[str, bool] = {}
     for state in states:
         if isinstance(state, State):
@@ -187,7 +187,7 @@ def _outcomes(
 
 
 def _not_always(plot: ActionPlot, event: str) -> tuple[str, str]:
-    """Why an outcome that is handled is not always handled, and what helps."""
+    """Return the reason why a handled outcome is not always handled, with a remedy."""
     answers = [rule for rule in plot.rules if rule.on == event and rule.when is None and limit_of(rule) is not None]
     if not answers:
         return "every transition has a guard", "add a last transition or rule without `when`"
@@ -228,12 +228,12 @@ def _skills(
 
 @dataclass(frozen=True, slots=True)
 class _Traffic:
-    """Which events there are, gathered once for a plot.
+    """The events of a plot, collected once.
 
     Attributes:
-        anywhere: events that may come to every state.
-        inside: path of a state -> what its content and skills, and those of states inside, end with.
-        heard: events that some state listens to.
+        anywhere: events that every state may receive.
+        inside: path of a state -> final events of its content and skills, and of states inside.
+        heard: events with a transition.
     """
 
     anywhere: AbstractSet[str]

@@ -1,6 +1,6 @@
-"""Values of the wrong kind: text where a number is wanted, a place where an item is.
+"""Kinds of values: finds text in place of a number, or a place in place of an item.
 
-Only what can never fit is found: a name may be any thing, and a variable of a type may hold one of a type below.
+A finding needs certainty: a name may denote any object, and a variable may hold a value of a subtype.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _WORDS = frozenset({"text", "symbol"})
 def check_kinds(
     plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
 ) -> Iterator[Finding]:
-    """Findings about values that do not fit the types they are given to; SCXML's data have no types."""
+    """Yield findings about values that do not match their target's type; SCXML's data have no types."""
     if plot.dialect == "dsc":
         yield from _Kinds(plot, library, schema, skills, nesting).findings()
 
@@ -65,7 +65,7 @@ class _Kinds:
         yield from self._reactions()
 
     def _reactions(self) -> Iterator[Finding]:
-        """What rules and handlers hand over of their events, and of the steps' arguments."""
+        """Check the arguments of rules and handlers that read their events, or the steps' arguments."""
         if not (self._plot.rules or self._plot.handlers):
             return
         scopes = RuleScope(self._plot, self._library, self._skills, self._nesting, lambda kind: kind)
@@ -93,7 +93,7 @@ class _Kinds:
             yield from self._fits(state.at_least, "number", self._own, (*path, "at_least"))
 
     def _cases(self, state: SelectState, path: Path) -> Iterator[Finding]:
-        """A case of another type than the selected value is never taken."""
+        """Find cases that can never be taken, because their type differs from the selected value's."""
         selected = self._kind(state.select, self._own)
         for key in state.cases:
             value = case_value(key)
@@ -147,7 +147,7 @@ class _Kinds:
         yield Finding(error, "value fits")
 
     def _kind(self, term: Term, scope: Attributes) -> str | None:
-        """The type of a term's value as far as it is known."""
+        """Return the type of a term's value, or `None` if it is unknown."""
         match term:
             case Variable(name):
                 return scope.get(name)
@@ -162,15 +162,15 @@ class _Kinds:
         if _VALUES & {given, wanted}:
             return given == wanted or not self._known({given, wanted})
         if self._schema is None or not {given, wanted} <= self._schema.types.keys():
-            return True  # a word may name a thing, a plot or a condition
+            return True  # a word may name an object, a plot or a condition
         return self._schema.is_a(given, wanted) or self._schema.is_a(wanted, given)
 
     def _known(self, types: Iterable[str]) -> bool:
-        """Whether a number or truth value can be none of these for certain: misspelt types say nothing."""
+        """Return whether these types exclude numbers and truth values; misspelt types exclude no value."""
         things = frozenset() if self._schema is None else frozenset(self._schema.types)
         return self._schema is None or set(types) <= _VALUES | _WORDS | {"condition", "plot"} | things
 
     def _scope(self, state: State, event: str) -> Attributes:
-        """The types of what a transition can read: the plot's own, and what its event carries."""
+        """Return the types of all names that a transition can read: the plot's own, and its event's attributes."""
         attributes = attributes_of(event, state, self._plot, self._library, self._skills) or {}
         return {**self._own, **{f"event.{name}": kind for name, kind in attributes.items()}}

@@ -1,4 +1,4 @@
-"""The validator: all checks over a plot, or over all plots of a library."""
+"""Validator: all checks over a plot, or over all plots of a library."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from knowledge_base.language.inputs import require, require_several
 from knowledge_base.world.schema import Schema
 
 MAX_FINDINGS = 50
-"""For one plot; more are not read, and each takes a search for the name that was meant."""
+"""Upper bound for one plot; authors read no more, and each finding takes a search for the nearest name."""
 
 
 def validate_library(
@@ -30,7 +30,7 @@ def validate_library(
     skills: Iterable[SkillSignature] | None,
     components: Components | None = None,
 ) -> list[Finding]:
-    """All findings about all plots; see `validate_plot`."""
+    """Return all findings about all plots; see `validate_plot`."""
     _require_parts(library, schema)
     known = None if skills is None else _known(skills)
     return [finding for plot in library for finding in validate_plot(plot, library, schema, known, components)]
@@ -43,18 +43,18 @@ def validate_plot(
     skills: Iterable[SkillSignature] | None = None,
     components: Components | None = None,
 ) -> list[Finding]:
-    """What is wrong with a plot, at most `MAX_FINDINGS`; empty if nothing is.
+    """Return the findings about a plot, at most `MAX_FINDINGS`; empty for a valid plot.
 
     Args:
         plot: the plot.
-        library: where the plots it uses are found.
-        schema: to check conditions and types against; without it, they are not checked.
-        skills: the skills that are deployed; without them, triggers are not checked.
-        components: names of the components that are deployed, or also what they declare about their parameters;
-            without them, `set` and `switch` are not checked.
+        library: provider of the plots it uses.
+        schema: declares types for conditions; without it, types and conditions are not checked.
+        skills: the deployed skills; without them, triggers are not checked.
+        components: names of the deployed components, or their declared parameters as well; without them, `set` and
+            `switch` are not checked.
 
     Raises:
-        InputError: one of these is something else.
+        InputError: an argument is of another type.
     """
     require(plot, ActionPlot, "a plot is an ActionPlot, as load_plot and parse_plot give it")
     _require_parts(library, schema)
@@ -62,7 +62,7 @@ def validate_plot(
     nesting = Nesting(plot)
     for check in (check_structure, check_size):
         findings = list(islice(check(plot, library, nesting), MAX_FINDINGS))
-        if findings:  # what follows would only repeat them in other words, or take too long
+        if findings:  # later checks would repeat these findings in other words, or take too long
             return findings
     checks = [
         check_reach(plot, library, nesting),
@@ -92,6 +92,6 @@ def _known(skills: Iterable[SkillSignature]) -> list[SkillSignature]:
 
 
 def raise_findings(findings: list[Finding]) -> None:
-    """Raise them as one `PlotError`, if there are any."""
+    """Raise the findings as one `PlotError`, if there are any."""
     if findings:
         raise PlotError(findings)

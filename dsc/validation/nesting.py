@@ -1,4 +1,4 @@
-"""What is inside what in a plot, gathered in one walk: every check asks for it, some of them at every state."""
+"""Nesting of a plot's states, collected in one walk: every check uses it, some at every state."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ class Nesting:
         }
 
     def leaving(self, path: Path) -> tuple[tuple[FormPath, str, Transition], ...]:
-        """See `TransitionSource.placed_transitions`; nothing leaves what is no source."""
+        """Return `TransitionSource.placed_transitions`; empty for a state without transitions."""
         return self._leaving.get(path, ())
 
     def way(self, path: Path) -> Iterator[Path]:
-        """The paths of the states around the one at `path`, outermost first, and its own."""
+        """Yield the paths of the states around the one at `path`, outermost first, and its own."""
         return (path[:length] for length in range(1, len(path) + 1) if path[:length] in self._states)
 
     def around(self, path: Path) -> Iterator[State]:
-        """The composite and orthogonal states around the one at `path`, outermost first."""
+        """Yield the composite and orthogonal states around the one at `path`, outermost first."""
         states = (self._states[place] for place in self.way(path[:-1]))
         return (state for state in states if isinstance(state, State))
 
     def state(self, name: str) -> AnyState:
-        """The state of that name, which must be there."""
+        """Return the state of that name, which must exist."""
         return self._states[self.names[name]]
 
     def inside(self, name: str, path: Path) -> bool:
-        """Whether there is a state of that name inside the one at `path`; anywhere if `path` is empty."""
+        """Return whether the state at `path` contains a state of that name; the whole plot if `path` is empty."""
         found = self.names.get(name, path)
         return found != path and found[: len(path)] == path
 
     def within(self, path: Path) -> set[str]:
-        """The names of all states for which `inside` holds; for messages, since it looks at every state."""
+        """Return the names of all states for which `inside` holds; slow, for messages only."""
         return {name for name in self.names if self.inside(name, path)}

@@ -1,4 +1,4 @@
-"""Reach of a plot: every state is entered from the first one, and connectors always lead on."""
+"""Reach of a plot: every state is entered from the first one, and connectors always lead to a state."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from knowledge_base.errors import InputError, SchemaError
 
 
 def check_connectors(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about choices and selections."""
+    """Yield findings about choices and selections."""
     connectors = {name: path for name, state, path in nesting.states if isinstance(state, Connector)}
     circle = circle_of({name: _targets(nesting, path) for name, path in connectors.items()})
     for name, path in connectors.items():
@@ -48,10 +48,10 @@ def _targets(nesting: Nesting, path: Path) -> list[str]:
 
 
 def circle_of(ways: Mapping[str, list[str]]) -> frozenset[str]:
-    """The connectors of one circle; a second one is found when the first is mended.
+    """Return the connectors of one cycle, or nothing; a second cycle is found after the repair of the first.
 
     Args:
-        ways: connector -> where it leads.
+        ways: connector -> its targets.
     """
     try:
         TopologicalSorter(ways).prepare()
@@ -61,10 +61,10 @@ def circle_of(ways: Mapping[str, list[str]]) -> frozenset[str]:
 
 
 def check_reach(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about states that nothing leads to, choices of nothing, and plots that use each other in a circle.
+    """Yield findings about unreachable states, empty dynamic states, and plots that use each other in a cycle.
 
-    Connectors are reached and lead on as states do.
-    SCXML has no rule that all states can be reached, and a generated plot has its ends whether they are needed or not.
+    Connectors count as states. SCXML does not require that all states can be reached. A generated plot always has all
+    its final states.
     """
     holders = [(state, path) for _, state, path in nesting.states if isinstance(state, Step)]
     yield from _circle(plot, _used(holders), library)
@@ -76,10 +76,10 @@ def check_reach(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterato
 def _unreached(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
     try:
         expanded = library.expanded(plot)
-    except InputError:  # rules that cannot be carried out have a finding of their own
+    except InputError:  # rules that cannot be applied have a separate finding
         return
     ways = nesting if expanded is plot else Nesting(expanded)
-    responses = {rule.then for rule in plot.rules}  # the steps of plans may end with what no state here does
+    responses = {rule.then for rule in plot.rules}  # the steps of plans may have outcomes that no state here has
     for name in _unreached_in(expanded, (), ways, responses):
         if name in nesting.names:
             yield _nothing_leads_to(name, plot, library, nesting)
@@ -98,7 +98,7 @@ def _nothing_leads_to(name: str, plot: ActionPlot, library: Library, nesting: Ne
 
 
 def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]) -> Iterator[str]:
-    """The states that nothing leads to, without what is inside them; a transition stays in its scope (S0.3)."""
+    """Yield states without a transition to them, but not their inner states; a transition stays in its scope (S0.3)."""
     reached: set[str] = set()
     waiting = [initial_of(scope), *responses]
     while waiting:
@@ -127,7 +127,7 @@ def _empty_choices(plot: ActionPlot, holders: list[tuple[Step, Path]]) -> Iterat
 
 
 def _circle(plot: ActionPlot, used: dict[str, Path], library: Library) -> Iterator[Finding]:
-    """The first circle of submachine states that this plot runs into; its own or one further down."""
+    """Yield the first cycle of submachine states that this plot leads to, directly or through other plots."""
     for name, path in used.items():
         circle = _found_circle([plot.name, name], library)
         if circle:
@@ -139,7 +139,7 @@ def _circle(plot: ActionPlot, used: dict[str, Path], library: Library) -> Iterat
 
 
 def _found_circle(way: list[str], library: Library) -> list[str]:
-    """Depth first along what is used; `way` is the plots entered so far, the last of them not yet looked into."""
+    """Search depth first along used plots; `way` is the plots entered so far, the last one not yet searched."""
     seen = set(way[:-1])
     open_: list[Iterator[str]] = [iter((way[-1],))]
     way = way[:-1]
@@ -158,7 +158,7 @@ def _found_circle(way: list[str], library: Library) -> list[str]:
 
 
 def _used(states: Iterable[tuple[AnyState, Path]]) -> dict[str, Path]:
-    """The plots that submachine states name, each with the first state that does."""
+    """Return the plots that submachine states name, each with the first state that does."""
     found: dict[str, Path] = {}
     for state, path in states:
         if isinstance(state, SubmachineState) and not state.use.startswith("?"):

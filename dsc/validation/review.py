@@ -1,4 +1,4 @@
-"""Review of a plot: what can never happen, and candidates that overlap or leave gaps."""
+"""Review of a plot: unreachable parts, and candidates that overlap or leave gaps."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from knowledge_base.language.expression import (
 )
 
 MOST_OVERLAPPING = 32
-"""Candidates that are compared with each other; of states with more, nothing is said."""
+"""Upper bound of compared candidates; states with more are skipped."""
 Conditions = Mapping[str, Expression]
-"""Candidates in their order, with their conditions over what all of them are handed."""
+"""Candidates in their order, with their conditions over their common parameters."""
 
 
 def review_candidates(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    """Warnings about the candidates of dynamic states, and about those for the steps of plans."""
+    """Yield warnings about the candidates of dynamic states, and about those for the steps of plans."""
     planned = False
     for name, state, path in nesting.states:
         if not isinstance(state, DynamicState):
@@ -61,7 +61,7 @@ _GAP = "the conditions of its candidates leave a gap, where none of them fits"
 
 
 def _for_steps(library: Library) -> Iterator[Finding]:
-    """Overlaps are welcome there: when one has failed, another one is tried."""
+    """Ignore overlaps between implementations of a planning action: after one fails, another one is tried."""
     for action in dict.fromkeys(plot.implements for plot in library if plot.implements):
         plots = library.implementing(action)
         conditions = {plot.name: _condition(plot, plot.parameters) for plot in plots}
@@ -72,7 +72,7 @@ def _for_steps(library: Library) -> Iterator[Finding]:
 
 
 def _condition(plot: ActionPlot, given: Iterable[str]) -> Expression:
-    """The plot's condition; what only this candidate has stands under a name of its own, or as its default."""
+    """Return the plot's condition; a parameter that others lack is replaced by its default or a unique name."""
     own: dict[str, Term] = {}
     for name in free_variables(plot.when or TRUE) - set(given):
         default = plot.parameters[name].default if name in plot.parameters else None
@@ -91,16 +91,16 @@ def _never_chosen(conditions: Conditions) -> Iterator[str]:
 
 
 def _overlapping(conditions: Conditions) -> Iterator[str]:
-    """Pairs that look as if they were meant to exclude each other, as they are about the same things, and do not."""
+    """Yield pairs that overlap although they read the same facts, which suggests exclusive conditions."""
     for (one, first), (other, second) in combinations(conditions.items(), 2):
         about = subjects(first)
-        nested = implied(first, by=second) or implied(second, by=first)  # the special case before the general one
+        nested = implied(first, by=second) or implied(second, by=first)  # the special case precedes the general one
         if about and about == subjects(second) and not nested and not contradictory(first, second):
             yield f"the candidates '{one}' and '{other}' overlap: both can fit, and then '{one}' is chosen"
 
 
 def _leave_a_gap(conditions: Conditions) -> bool:
-    """Whether several candidates are about the same things, and together do not cover all cases."""
+    """Return whether several candidates read the same facts, and together do not cover all cases."""
     many = list(conditions.values())
     about = {subjects(condition) for condition in many}
     if len(many) < 2 or len(about) != 1 or about == {frozenset()}:
@@ -109,7 +109,7 @@ def _leave_a_gap(conditions: Conditions) -> bool:
 
 
 def _counts(conditions: Sequence[Expression]) -> Iterator[Expression]:
-    """What is only compared with numbers from 0 on is taken for a count, which is never below."""
+    """Yield bounds for counts: terms that are only compared with numbers from 0 on are taken as never negative."""
     compared: dict[Call, list[Constant]] = {}
     for comparison in _comparisons(conditions):
         for term, other in ((comparison.left, comparison.right), (comparison.right, comparison.left)):
@@ -129,11 +129,11 @@ def _comparisons(parts: Iterable[Expression | Term]) -> Iterator[Comparison]:
 
 
 MOST = 32
-"""Conditions looked at together; what comes after more than that is only looked at alone."""
+"""Upper bound of conditions compared together; later ones are only checked alone."""
 
 
 def review_plot(plot: ActionPlot, library: Library) -> list[Finding]:
-    """Warnings about a plot that `validate_plot` finds nothing wrong with, at most `MAX_FINDINGS`."""
+    """Return warnings about a plot that passes `validate_plot`, at most `MAX_FINDINGS`."""
     if plot.dialect != "dsc":
         return []
     nesting = Nesting(plot)
@@ -158,7 +158,7 @@ def _rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Fin
 
 
 def _handlers(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
-    """Those that interrupt, and those beside what goes on, have nothing to do with each other."""
+    """Check interrupting handlers and parallel ones separately, because they do not affect each other."""
     for number, handler in enumerate(plot.handlers):
         same = (one for one in plot.handlers[:number] if one.on == handler.on)
         earlier = [one for one in same if one.interrupt == handler.interrupt]
@@ -171,7 +171,7 @@ def _handlers(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
 
 
 def _all_answer(event: str, nesting: Nesting) -> bool:
-    """Whether each state that would be interrupted takes the event, whatever its conditions say."""
+    """Return whether each interruptible state takes the event under all conditions."""
     resting = [state for _, state, _ in nesting.states if isinstance(state, State)]
     own = [state for state in resting if not isinstance(state, CompositeState)]
     return all(any(way.guard is None for way in state.on.get(event, ())) for state in own)
@@ -182,7 +182,7 @@ def _listed(earlier: Sequence[Rule] | Sequence[Handler]) -> str:
 
 
 def _comes_before(earlier: Rule, later: Rule) -> bool:
-    """Whether the later one is not asked any more where the earlier one has answered, however often that was."""
+    """Return whether the later rule is never evaluated if the earlier one answers, with or without a limit."""
     if (earlier.place, earlier.on) != (later.place, later.on):
         return False
     if earlier.steps and not (later.steps and set(later.steps) <= set(earlier.steps)):
@@ -193,7 +193,7 @@ def _comes_before(earlier: Rule, later: Rule) -> bool:
 
 
 def _settled(rule: Rule, event: str, steps: dict[str, Step], library: Library) -> bool:
-    """Whether the states that a rule is for need no rule for its event."""
+    """Return whether the states of a rule already handle its event."""
     mine = [state for name, state in steps.items() if concerns(rule, name, state, library)]
     able = [state for state in mine if event in answerable(state, library)]
     return bool(able) and all(any(way.guard is None for way in state.on.get(event, ())) for state in able)
@@ -216,7 +216,7 @@ def _transitions(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
 
 
 def _never(condition: Expression | None, earlier: Sequence[Expression | None]) -> str | None:
-    """Why something never happens that needs this condition and comes after others with theirs."""
+    """Return the reason why an element with this condition, after others with theirs, can never happen."""
     if condition is not None and contradictory(condition):
         return "its condition cannot hold"
     others = [Not(one or TRUE) for one in earlier]

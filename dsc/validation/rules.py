@@ -1,4 +1,4 @@
-"""Rules and handlers: names that exist, and values that a rule can read (S1.4, S1.14)."""
+"""Rules and handlers: names exist, and rules read only available values (S1.4, S1.14)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError, UnknownNameError
 
 Attributes = Mapping[str, str | None]
-"""Names -> types as they were declared; `None` is anything."""
+"""Names -> declared types; `None` is any type."""
 Skills = Mapping[str, SkillSignature] | None
-"""The skills that are deployed by `component.skill`; `None` if that is not known."""
+"""The deployed skills by `component.skill`; `None` if unknown."""
 
 
 def attributes_of(event: str, state: State, plot: ActionPlot, library: Library, skills: Skills) -> Attributes | None:
-    """The attributes of an event that a state of the plot listens to; `None` if they are not known."""
+    """Return the attributes of an event that a state of the plot takes; `None` if they are unknown."""
     declared = outcomes_of(state, library)
     if event in declared:
         return declared[event] or {}
@@ -49,11 +49,11 @@ Types = Mapping[str, str | None]
 
 
 class RuleScope:
-    """Of the rules and handlers of one plot.
+    """Names and types that the rules and handlers of one plot can read.
 
     Args:
         plot, library, skills, nesting: as elsewhere in the validator.
-        type_: what is known about a value of a declared type.
+        type_: returns the kind of a declared type.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class RuleScope:
         self._fired = {event for way in ways for event in way.emitted if event not in plot.emits}  # those leave it
 
     def of(self, rule: Rule) -> Types | None:
-        """Names and types; `None` if what the rule answers never happens where it is for."""
+        """Return names and types; `None` if the rule's event never happens at its states."""
         steps = {**self._own(rule), **self._arguments(rule)}
         if rule.on is None:
             return steps
@@ -79,12 +79,12 @@ class RuleScope:
         return {**event, **steps} if sources else None
 
     def in_plans(self, rule: Rule) -> bool:
-        """Whether it may answer for steps of plans that are made for goals of this plot."""
+        """Return whether it may answer for steps of plans that are made for goals of this plot."""
         named = [plot for plot in self._implementing if not rule.steps or plot.implements in rule.steps]
         return any(rule.on is None or rule.on in FAILURES or rule.on in plot.emits for plot in named)
 
     def out_of_reach(self, rule: Rule, read: Iterable[str], path: Path) -> Iterator[Finding]:
-        """Findings about variables of the plot in a rule that answers for steps of plans."""
+        """Yield findings about variables of the plot in a rule that answers for steps of plans."""
         for name in sorted(self._declared.intersection(read) if self.in_plans(rule) else ()):
             error = SchemaError(
                 f"'?{name}' is a variable of this plot; a rule that answers for steps of plans cannot read it",
@@ -94,7 +94,7 @@ class RuleScope:
             yield Finding(error, "declared variable", fix)
 
     def never(self, rule: Rule, path: Path) -> Finding:
-        """The finding about a rule whose event never happens where it is for."""
+        """Return the finding about a rule whose event never happens at its states."""
         valid = {event for outcomes in self._sources(rule) for event in outcomes}
         what = " or ".join(f"'{name}'" for name in rule.of) or "no state of this plot"
         verb = "cannot" if rule.of else "can"
@@ -104,7 +104,7 @@ class RuleScope:
         return Finding(error, "rule event")
 
     def attributes(self, handler: Handler) -> Types | None:
-        """The attributes of a handler's event; `None` if they are not known."""
+        """Return the attributes of a handler's event; `None` if they are unknown."""
         if handler.on in self._plot.receives:
             declared = self._plot.receives[handler.on] or {}
             return {f"event.{name}": self._type(kind) for name, kind in declared.items()}
@@ -119,7 +119,7 @@ class RuleScope:
         }  # fmt: skip
 
     def check(self, handler: Handler, path: Path) -> Iterator[Finding]:
-        """Findings about where a handler's event comes from."""
+        """Yield findings about the source of a handler's event."""
         known = {*self._plot.receives, *self._fired}
         listen = handler.listen
         if listen is None:
@@ -135,7 +135,7 @@ class RuleScope:
 
     def _listened(self, handler: Handler, path: Path) -> Iterator[Finding]:
         listen = handler.listen
-        assert listen is not None  # noqa: S101  # the caller has looked
+        assert listen is not None  # noqa: S101  # the caller has checked it
         place = self._plot.place((*path, "listen", "trigger"))
         signature = self._skills.get(listen.trigger)
         if signature is None:
@@ -150,7 +150,7 @@ class RuleScope:
             yield Finding(other, "known event")
 
     def _own(self, rule: Rule) -> Types:
-        """The plot's variables, where the rule may read them."""
+        """Return the plot's variables, if the rule may read them."""
         if self.in_plans(rule):
             return {}
         plot = self._plot
@@ -166,7 +166,7 @@ class RuleScope:
                 yield plot.emits
 
     def _arguments(self, rule: Rule) -> Types:
-        """What all steps have that the rule names."""
+        """Return the arguments that all steps named by the rule share."""
         given = list(self._given(rule))
         common = [name for name in given[0] if all(name in one for one in given)] if given else []
         return {STEP + name: _common(name, given) for name in common}
@@ -184,13 +184,13 @@ class RuleScope:
 
 
 def _common(name: str, sources: Iterable[Types]) -> str | None:
-    """The type that it has wherever it may come from; `None` if it has several."""
+    """Return the type of a name in all its sources; `None` if they differ."""
     types = {one[name] for one in sources if name in one}
     return types.pop() if len(types) == 1 else None
 
 
 def check_rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about names in rules and handlers."""
+    """Yield findings about names in rules and handlers."""
     if plot.handlers and plot.dialect != "dsc":
         error = SchemaError("handlers are for plots of dialect dsc", place=plot.place(("handlers",)))
         yield Finding(error, "dialect", "write what they do as transitions")
@@ -214,7 +214,7 @@ def check_rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterato
 
 
 def _no_step(plot: ActionPlot, name: str, path: Path, library: Library, steps: set[str]) -> Finding:
-    """The finding about a step that is not there: of a plot's name, with the names by which it is spoken of."""
+    """Return the finding about a missing step; if it names a plot, list the names by which rules refer to it."""
     place = plot.place(path)
     if name not in library:
         message = f"there is no state '{name}', nor a plot that implements an action of that name"
@@ -248,7 +248,7 @@ def _used(plot: ActionPlot, name: str | None, path: Path, library: Library) -> I
 
 
 def unknown_plot(plot: ActionPlot, path: Path, name: str, library: Library) -> Finding:
-    """The finding about a plot that is not there."""
+    """Return the finding about a missing plot."""
     valid = {other.name for other in library}
     error = UnknownNameError(f"there is no plot '{name}'", place=plot.place(path), found=name, valid=valid)
     return Finding(error, "known plot")

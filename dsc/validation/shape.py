@@ -33,17 +33,17 @@ from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.language.expression import Constant, Term
 
 MAX_ANSWERS = 1_000
-"""Transitions made of rules; ten times what the largest plot we ship has, and made in a tenth of a second."""
+"""Upper bound of transitions from rules; ten times those of this project's largest plot, in a tenth of a second."""
 
 
 def check_size(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    """A finding if carrying out the plot's rules would take too long."""
+    """Yield a finding if the expansion of the plot's rules would take too long."""
     if not plot.rules and not plot.handlers:
         return
     answered = Counter(event for _, state, _ in nesting.states for event in answerable(state, library))
     steps = sum(isinstance(state, Step) for _, state, _ in nesting.states)
     made = sum(_answers(rule, answered[rule.on] if rule.on is not None else steps, nesting) for rule in plot.rules)
-    made += sum(bool(rule.before) for rule in plot.rules) * _passing(nesting)  # each has a way of its own
+    made += sum(bool(rule.before) for rule in plot.rules) * _passing(nesting)  # each needs a separate transition
     made += sum(handler.interrupt for handler in plot.handlers) * len(nesting.states)
     if made > MAX_ANSWERS:
         what = "rules and handlers" if plot.rules and plot.handlers else "rules" if plot.rules else "handlers"
@@ -53,18 +53,18 @@ def check_size(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator
 
 
 def _passing(nesting: Nesting) -> int:
-    """How many transitions pass arguments."""
+    """Return the number of transitions that pass arguments."""
     return sum(bool(way.passed) for _, _, path in nesting.states for _, _, way in nesting.leaving(path))
 
 
 def _answers(rule: Rule, at_most: int, nesting: Nesting) -> int:
-    """How many states it answers for, as far as that shows without looking at each."""
+    """Return an upper bound of the number of states that a rule answers for, without a look at each state."""
     by_state = rule.steps and all(name in nesting.names for name in rule.steps)
     return min(at_most, len(rule.steps)) if by_state else at_most
 
 
 def check_timing(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about timeouts that come while the state still has to wait."""
+    """Yield findings about timeouts before the state's least time has passed."""
     for name, state, path in nesting.states:
         least = _seconds(state.at_least) if isinstance(state, State) else None
         if not isinstance(state, State) or least is None:
@@ -80,12 +80,12 @@ def check_timing(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
 
 
 def _seconds(term: Term | None) -> float | None:
-    """The seconds that a constant says."""
+    """Return the seconds of a constant."""
     return float(term.value) if isinstance(term, Constant) else None
 
 
 def check_history(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about histories and about transitions that clear them."""
+    """Yield findings about histories and about transitions that clear them."""
     memory = _Memory(nesting)
     for _, state, path in nesting.states:
         if isinstance(state, HistoryState):
@@ -96,7 +96,7 @@ def check_history(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
 
 
 def _default(plot: ActionPlot, state: HistoryState, path: Path, nesting: Nesting) -> Iterator[Finding]:
-    """What a history leads to is inside the state that the history belongs to (SCXML 3.10)."""
+    """Require that a history's target is inside the state that the history belongs to (SCXML 3.10)."""
     around = path[:-2]
     if not nesting.inside(state.target, around):
         error = UnknownNameError(
@@ -107,7 +107,7 @@ def _default(plot: ActionPlot, state: HistoryState, path: Path, nesting: Nesting
 
 
 class _Memory:
-    """Which states have histories inside, gathered once.
+    """States with histories inside, collected once.
 
     Attributes:
         holders: name -> path of the composite and orthogonal states.
@@ -129,7 +129,7 @@ class _Memory:
 
 
 def _cleared(plot: ActionPlot, transition: Transition, path: Path, memory: _Memory) -> Iterator[Finding]:
-    """Harel's clear-history needs a history: directly inside the state, or with `*` at any level below."""
+    """Require a history for Harel's clear-history: directly inside the state, or with `*` at any level below."""
     for number, written in enumerate(transition.clear):
         name, place = written.removesuffix("*"), plot.place((*path, number))
         remembering = memory.below if written.endswith("*") else memory.directly
@@ -148,7 +148,7 @@ FIX = "write `dialect: scxml` if the plot is to be an SCXML chart"
 
 
 def check_dialect(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about what the plot's dialect does not have."""
+    """Yield findings about features outside the plot's dialect."""
     if plot.dialect == "scxml":
         return
     for name, state, path in nesting.states:
@@ -197,7 +197,7 @@ def _finding(plot: ActionPlot, what: str, path: Path) -> Finding:
 
 
 def check_structure(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    """Findings about the plot's own states, before anything is said about what they do."""
+    """Yield findings about the plot's states and targets, before checks of their behaviour."""
     sound = True
     for finding in _shape(plot, library, nesting):
         sound = False
@@ -225,7 +225,7 @@ def _shape(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Fin
 
 
 def _tables(plot: ActionPlot) -> Iterator[Finding]:
-    """What only shows when all targets are known."""
+    """Yield errors that the chart compiler finds once all targets are known."""
     try:
         compile_plot(plot)
     except SchemaError as error:
@@ -257,7 +257,7 @@ def _targets(plot: ActionPlot, path: Path, siblings: Mapping[str, AnyState], nes
 def _elsewhere(
     plot: ActionPlot, target: str, siblings: Mapping[str, AnyState], everywhere: Collection[str], path: Path
 ) -> Iterator[Finding]:
-    """Findings about a target that is not beside its source."""
+    """Yield findings about a target outside the scope of its source."""
     if target not in everywhere:
         missing = UnknownNameError(
             f"there is no state '{target}'", place=plot.place(path), found=target,
