@@ -103,7 +103,6 @@ PENDING = {
     "knowledge_base/exchange", "knowledge_base/journal", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
     "dsc", "dsc/components", "dsc/sequencer", "dsc/testing",
-    "dsc/viewer",
     "planning", "planning/cli", "planning/engines", "planning/execution", "planning/generation", "planning/ordering",
     "planning/problem",
     "domains", "domains/clean_up_table",

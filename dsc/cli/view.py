@@ -1,4 +1,4 @@
-"""Command `dsc view`, and the parts of it that `dsc run --view` shares."""
+"""Command `dsc view`, and the page of `dsc run --view`: its address is printed before the content exists."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dsc.viewer.records import RecordLog
 
 MOST_COMPLAINTS = 5
-"""Damaged records named on the terminal; the rest is counted."""
+"""Upper bound of damaged records named on the terminal; the rest is counted."""
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Where to listen on this machine; 0 picks a free port.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
 
@@ -57,13 +57,13 @@ class Page(Protocol):
         """The address for a browser's command line."""
 
     def start(self) -> None:
-        """Answer from now on."""
+        """Start answering."""
 
     def wait(self) -> None:
-        """Return when it is closed; an interrupt gets through."""
+        """Wait until the page is closed; an interrupt gets through."""
 
     def close(self) -> None:
-        """Answer no longer."""
+        """Stop answering."""
 
 
 P = TypeVar("P", bound=Page)
@@ -71,7 +71,7 @@ P = TypeVar("P", bound=Page)
 
 @contextmanager
 def page(shown: P, *, opens: bool) -> Iterator[P]:
-    """A page in a browser during the block; its address is printed first."""
+    """Show a page in a browser during the block; print its address first."""
     shown.start()
     typer.echo(shown.url)
     if opens:
@@ -86,7 +86,7 @@ def page(shown: P, *, opens: bool) -> Iterator[P]:
 
 
 def until_interrupt(viewer: Page) -> None:
-    """The page stays there until Ctrl-C."""
+    """Serve the page until Ctrl-C."""
     typer.echo("Ctrl-C ends it", err=True)
     try:
         viewer.wait()
@@ -95,7 +95,7 @@ def until_interrupt(viewer: Page) -> None:
 
 
 def viewer_installed() -> None:
-    """Raise `InputError` unless the extra is there."""
+    """Raise `InputError` unless the extra is installed."""
     from importlib.util import find_spec
 
     from knowledge_base.errors import InputError

@@ -1,1 +1,1 @@
-"""Runs in the browser: records in, a page out (see PROTOCOL.md); needs the extra `viewer`."""
+"""Viewer of runs in the browser, from records to a page (see PROTOCOL.md); needs the extra `viewer`."""

@@ -1,4 +1,4 @@
-"""Access to the page: by token any number of times, by code once, then by cookie; all else gets `403` and a reason."""
+"""Access to the page: token, one-time code or cookie; other requests get `403` and a reason."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MUST_HAVE_ORIGIN = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 CODE_LIFE_S = 60.0
-"""A browser that starts slowly still finds its code alive."""
+"""Seconds; enough for a browser that starts slowly."""
 COOKIE = "dsc-view-"
-"""Followed by the port: cookies belong to a machine, not to a port of it."""
+"""Prefix of the cookie's name before the port: browsers share cookies among the ports of a machine."""
 MOST_WRONG_CODES = 20
-"""Tabs that a browser restores bring codes of programs that have ended; more than these are guesses."""
+"""Upper bound of wrong codes: restored tabs send codes of ended programs; more are guesses."""
 MOST_PARAMETERS = 20
 MISSING = "the token is missing or wrong; open the address that was printed"
 USED = (
@@ -34,7 +34,7 @@ class Keys:
     Args:
         token: opens any number of times.
         code: opens once, within `CODE_LIFE_S` from now; `None` if no browser is opened.
-        now: the seconds of a clock that never goes back.
+        now: returns the seconds of a monotonic clock.
 
     Attributes:
         cookie: the value of the cookie; it opens any number of times, and differs from the token.
@@ -47,15 +47,15 @@ class Keys:
         self._wrong = 0
 
     def is_token(self, given: str) -> bool:
-        """Whether this is the token."""
+        """Return whether this is the token."""
         return _same(given, self._token)
 
     def is_cookie(self, given: str) -> bool:
-        """Whether this is the value of the cookie."""
+        """Return whether this is the value of the cookie."""
         return _same(given, self.cookie)
 
     def redeem(self, given: str) -> bool:
-        """Whether this is the code, still alive; if so it is dead from now on, as it is after too many wrong ones."""
+        """Return whether this is the valid code; the code expires by use, and after too many wrong ones."""
         alive = self._code is not None and self._now() < self._ends
         right = _same(given, self._code or "") and alive
         self._wrong += not right
@@ -65,10 +65,10 @@ class Keys:
 
 
 class Access:
-    """Checks key, Host and Origin in front of an application, for HTTP and sockets alike.
+    """Checks key, Host and Origin before an application, for HTTP and sockets alike.
 
-    A page somewhere in the web can make a browser ask this program, also under another name (DNS rebinding):
-    hence Host and Origin, besides the keys.
+    A foreign web page can make a browser send requests here, also under another host name (DNS rebinding). Host and
+    Origin are therefore checked besides the keys.
     """
 
     def __init__(self, app: ASGIApp, keys: Keys, port: int) -> None:
@@ -78,7 +78,7 @@ class Access:
         self._cookie = f"{COOKIE}{port}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let the request pass, or refuse it."""
+        """Pass the request on, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -88,7 +88,7 @@ class Access:
         if reason is None:
             await self._app(scope, receive, self._with_headers(headers, send, with_cookie=not has_cookie))
         elif scope["type"] == "websocket":
-            await receive()  # the request to connect; closing before accepting answers 403
+            await receive()  # the connect message; a close before the accept answers 403
             await send({"type": "websocket.close", "code": 1008, "reason": reason})
         else:
             await _refuse(send, reason)
@@ -135,9 +135,9 @@ class Access:
 
 
 def cookies(headers: Headers, name: str) -> Iterator[str]:
-    """Every value that comes under a name, among whatever cookies other programs of this machine have set.
+    """Yield every value of a cookie, besides malformed cookies of other programs on this machine.
 
-    Browsers send the cookies of all ports of a machine, so that names may come twice and values be no cookies at all.
+    Browsers send the cookies of all ports of a machine: a name may occur twice, and a value may be malformed.
     """
     for line in headers.getlist("cookie"):
         for part in line.split(";"):
@@ -154,7 +154,7 @@ def _parameters(scope: Scope) -> dict[str, list[str]]:
 
 
 def _same(given: str, wanted: str) -> bool:
-    """Compare in a time that does not tell where they differ."""
+    """Compare in constant time, which hides the position of a difference."""
     return hmac.compare_digest(given.encode(errors="replace"), wanted.encode())
 
 

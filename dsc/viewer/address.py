@@ -1,4 +1,4 @@
-"""The entrance to a page: a port of this machine, the token that opens it, and a code that opens it once."""
+"""Address of a page: a port of this machine, the token that opens it, and a one-time code."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from knowledge_base.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class PageAddress:
-    """A listening socket on 127.0.0.1, bound before anybody serves it, so that the address is known at once.
+    """A listening socket on 127.0.0.1, bound before the server starts, so that the address is known immediately.
 
     Attributes:
-        listening: the socket; who comes before it is served waits.
+        listening: the socket; early connections wait for the server.
         token: a key that opens the page any number of times.
-        code: a key that opens the page once, soon after it is served.
+        code: a key that opens the page once, soon after the server's start.
     """
 
     listening: socket.socket
@@ -25,10 +25,10 @@ class PageAddress:
 
     @classmethod
     def on(cls, port: int = 0) -> PageAddress:
-        """Listen there, with new keys; port 0 picks a free one.
+        """Listen on the port, with new keys; port 0 picks a free one.
 
         Raises:
-            InputError: somebody else listens there.
+            InputError: another program listens there.
         """
         made = socket.socket()
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -42,16 +42,16 @@ class PageAddress:
 
     @property
     def port(self) -> int:
-        """Its number."""
+        """The port's number."""
         number: int = self.listening.getsockname()[1]
         return number
 
     @property
     def url(self) -> str:
-        """The address for people: it opens the page as often as they like."""
+        """The address for people; it works any number of times."""
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
     @property
     def one_time_url(self) -> str:
-        """The address for a browser's command line, which others can read: it opens the page once."""
+        """The address for a browser's command line, which others can read: it works once."""
         return f"http://127.0.0.1:{self.port}/?code={self.code}"

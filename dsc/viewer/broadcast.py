@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 FORMAT = "dsc-view/1"
 UNSUPPORTED = 1003
-"""The code with which a socket is closed on which something else is said than can be answered."""
+"""Close code of a socket after a message that the page protocol does not have."""
 
 
 class BrowserStream:
-    """What goes to one browser.
+    """Sends records and status to one browser.
 
-    Records are read from the log when the socket has room for them, and of a status only the latest goes out. So a
-    slow browser costs nobody anything, and one that is gone even less.
+    The stream reads records from the log when the socket has room for them, and sends only the latest status. A slow or
+    vanished browser therefore delays no other one.
     """
 
     def __init__(self, socket: WebSocket, log: RecordLog, rounds: Broadcast, *, control: bool) -> None:
@@ -35,7 +35,7 @@ class BrowserStream:
         self._said: tuple[object, ...] | None = None
 
     async def serve(self) -> None:
-        """Until the browser goes away."""
+        """Serve until the browser leaves."""
         hello = {
             "type": "hello", "format": FORMAT, "header": self._log.header, "first": 1, "last": len(self._log),
             "live": self._log.live, "control": self._control,
@@ -55,7 +55,7 @@ class BrowserStream:
         while True:
             try:
                 wanted = await self._socket.receive_json()
-            except (ValueError, KeyError, RecursionError):  # no JSON, no text, nested too deeply
+            except (ValueError, KeyError, RecursionError):  # not JSON, not text, or nested too deeply
                 wanted = None
             seq = wanted.get("want") if isinstance(wanted, dict) else None
             if isinstance(seq, bool) or not isinstance(seq, int) or seq < 1:
@@ -65,7 +65,7 @@ class BrowserStream:
             self._rounds.wake()
 
     def offer(self, status: dict[str, Any]) -> None:
-        """Begin to send what is new, records and how the run is, unless something is still on its way."""
+        """Start sending new records and the status, unless the last message is still in transit."""
         if self._sending is None and (news := self._news(status)):
             self._sending = asyncio.create_task(self._send(news))
             self._sending.add_done_callback(self._sent)
@@ -75,14 +75,14 @@ class BrowserStream:
             await self._socket.send_text(text)
 
     def _sent(self, sending: asyncio.Task[None]) -> None:
-        if not sending.cancelled() and sending.exception() is None:  # else the browser is gone, as `serve` will hear
+        if not sending.cancelled() and sending.exception() is None:  # else the browser has left, and `serve` ends
             self._sending = None
             self._rounds.wake()
 
     def _news(self, status: dict[str, Any]) -> list[str]:
-        """The messages that go next, if there is anything to say."""
+        """Return the next messages; empty if nothing is new."""
         last = len(self._log)
-        # How far the run is can be seen from the records, unless more is to come than goes at once.
+        # The records show the progress of the run, unless one message cannot carry all of them.
         behind = self._cursor is None or last - self._cursor >= MOST_RECORDS
         said = (status, last if behind else None)
         news = []
@@ -96,24 +96,24 @@ class BrowserStream:
 
 
 INTERVAL_S = 1 / 30
-"""Between two rounds of a live run at least: more could not be seen."""
+"""Least time between two rounds of a live run; readers could not see more."""
 Sleep = Callable[[float], Awaitable[object]]
 
 
 class Served(Protocol):
-    """A browser that takes what is new, or is still busy with what it got."""
+    """A browser's stream, which may still be busy with its last message."""
 
     def offer(self, status: dict[str, Any]) -> None:
-        """Begin to send what is new; must not wait."""
+        """Start sending news; must not wait."""
 
 
 class Broadcast:
-    """Offers all browsers what is new, at most 30 times a second while a run is live.
+    """Offers news to all browsers, at most 30 times a second during a live run.
 
     Args:
         log: the records.
-        status: how the run is.
-        sleep: waits so many seconds.
+        status: returns the status of the run.
+        sleep: waits for a number of seconds.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class Broadcast:
 
     @contextmanager
     def serving(self, one: Served) -> Iterator[None]:
-        """Offer this one what is new while the block lasts; in the loop's thread, as `wake`."""
+        """Offer news to this stream during the block; in the loop's thread, as `wake`."""
         self._served.append(one)
         if self._going is None:
             self._going = asyncio.create_task(self._go_on())
@@ -144,14 +144,14 @@ class Broadcast:
                 self._going = None
 
     def wake(self) -> None:
-        """There is something new, or somebody has room for more."""
+        """Announce new records, or room in a socket."""
         self._more.set()
 
     async def _go_on(self) -> None:
         loop = asyncio.get_running_loop()
 
         def heard() -> None:
-            if not self._woken:  # who adds records wakes this thread once a round, however many follow
+            if not self._woken:  # one wake-up for all records of a round
                 self._woken = True
                 loop.call_soon_threadsafe(self._more.set)
 
@@ -166,10 +166,10 @@ class Broadcast:
             forget()
 
     async def _round(self) -> None:
-        """One browser after the other, spread over the interval: all at once they would want every processor."""
+        """Serve browsers in sequence, spread over the interval, to bound the load on the processor."""
         served = tuple(self._served)
         status = {"type": "status", "live": self._log.live, **self._status()}
         for one in served:
-            if one in self._served:  # else it has left meanwhile
+            if one in self._served:  # it may have left meanwhile
                 one.offer(status)
             await self._sleep(INTERVAL_S / len(served) if self._log.live else 0)

@@ -1,4 +1,4 @@
-"""A live run in the hands of who watches it: events and facts handed in, and the run held still at breakpoints."""
+"""Control of a live run by the page's reader: events, facts, parameters, and pauses at breakpoints."""
 
 from __future__ import annotations
 
@@ -22,73 +22,73 @@ if TYPE_CHECKING:
 
 AUTHOR = "viewer"
 MOST_SECONDS = 10
-"""That a command waits for the run, which computes."""
+"""Upper bound of a command's wait for the run, which may be computing."""
 MOST_WORK = 20_000
-"""Facts and things that a condition or effect from a browser may look at: about 20 ms of the run's thread."""
+"""Facts and objects that a browser's condition or effect may read: about 20 ms of the run's thread."""
 MOST_STATEMENTS = 1000
 MOST_BREAKS = 50
-"""Conditions of breakpoints are judged after every macrostep."""
+"""Upper bound: the run evaluates all breakpoints' conditions after every macrostep."""
 KINDS = ("state", "event", "condition", "plan_step")
 
 
 class Hands(Protocol):
-    """What a page needs of a run that it may change, in this process or another."""
+    """A page's interface to a controllable run, in this process or another."""
 
     @property
     def paused(self) -> str | None:
-        """Why the run stands still, if it does."""
+        """The reason of a pause, or `None`."""
 
     def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """Do what a page asks for; raises `InputError` if that makes no sense."""
+        """Execute a page's command; raise `InputError` for an invalid one."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Breakpoint:
-    """Where a run shall stand still: a state entered, an event taken, a condition true, a plan's step begun."""
+    """A condition for a pause: a state entered, an event taken, a condition true, or a plan's step begun."""
 
     kind: str
     text: str
     condition: Expression | None = None
 
     def __str__(self) -> str:
-        """As people say it: `state clear/execute`."""
+        """Return a short name: `state clear/execute`."""
         return f"{self.kind.replace('_', ' ')} {self.text}"
 
 
 class Control:
-    """Commands from the page's thread to a run in another; the run obeys before its next event.
+    """Commands from the page's thread to a run in another; the run executes them before its next event.
 
-    While it stands still simulated time does too. Real time goes on: skills work and timers fall due, and their
-    events are taken when it goes on.
+    During a pause simulated time stops. Real time continues: skills run and timers expire, and the run takes their
+    events after the pause.
     """
 
     def __init__(self, changed: Callable[[], None]) -> None:
-        """`changed` is called when what `paused` says may have changed."""
+        """Create a control; `changed` is called when `paused` may have changed."""
         self._changed = changed
         self._sequencer: Sequencer | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._go: asyncio.Event | None = None
         self._breaks: dict[int, Breakpoint] = {}
         self._numbers = 0
-        self._steps: int | None = None  # macrosteps until it stands still; None: none is counted
+        self._steps: int | None = None  # remaining macrosteps before a pause; `None` without a count
         self._was_true: set[int] = set()
-        self._plan_steps: dict[str, str] = {}  # path of a generated plot's state -> the plan's step that it carries out
+        self._plan_steps: dict[str, str] = {}  # path of a generated plot's state -> its plan step
         self._dropped: list[str] = []
         self.paused: str | None = None
-        """Why the run stands still, if it does."""
+        """The reason of a pause, or `None`."""
 
     def attach(self, sequencer: Sequencer) -> None:
-        """The run begins, in the loop that calls this."""
+        """Attach to a run before its start, in the loop that calls this."""
         self._sequencer, self._loop, self._go = sequencer, asyncio.get_running_loop(), asyncio.Event()
         sequencer.listen(self._after_step)
         sequencer.wait_before_events(self._before_event)
 
     def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """Do what a page asks for.
+        """Execute a page's command.
 
         Raises:
-            InputError: it asks for something that is not known, or the run is over.
+            InputError: it names an unknown element, or the run is over.
         """
         verbs: dict[str, Callable[[Mapping[str, Any]], object]] = {
             "event": self._event, "tell": self._tell, "retract": self._tell, "set": self._set, "pause": self._pause,
@@ -110,7 +110,7 @@ class Control:
         self._in_run(lambda run: run.post(event))
 
     def _tell(self, command: Mapping[str, Any]) -> None:
-        from knowledge_base.statements import retracted, told  # noqa: PLC0415  read where somebody controls a run
+        from knowledge_base.statements import retracted, told  # noqa: PLC0415  imported only for a controlled run
 
         said = command.get("statements")
         if not isinstance(said, list) or not all(isinstance(one, str) for one in said):
@@ -122,11 +122,11 @@ class Control:
         if command["do"] == "tell":
             delta = told(said, known, "FACT", Bounds(work=MOST_WORK))
         else:
-            delta = retracted(said, known, "FACT")  # a statement takes back what it names, no more
+            delta = retracted(said, known, "FACT")  # a statement retracts only the facts that it names
         self._in_run(lambda run: run.change(delta, AUTHOR))
 
     def _set(self, command: Mapping[str, Any]) -> None:
-        """A parameter of a component or plot, within what it leaves to operators."""
+        """Set a parameter of a component or plot that operators may change."""
         owner, name = str(command.get("owner")), str(command.get("name"))
         self._in_run(lambda run: run.set_parameter(owner, name, command.get("value")))
 
@@ -169,13 +169,13 @@ class Control:
         return self._sequencer
 
     def _in_run(self, act: Callable[[Sequencer], None]) -> None:
-        """Let the run's own thread act; what is wrong comes back to the one who asked."""
+        """Let the run's own thread act; pass errors back to the page."""
         run, loop = self._run(), self._loop
 
         async def acting() -> None:
             act(run)
 
-        assert loop is not None  # noqa: S101  told apart by _run
+        assert loop is not None  # noqa: S101  checked by _run
         try:
             asyncio.run_coroutine_threadsafe(acting(), loop).result(timeout=MOST_SECONDS)
         except TimeoutError:
@@ -197,7 +197,7 @@ class Control:
         for number, one in tuple(self._breaks.items()):
             try:
                 met = self._is_met(number, one, step)
-            except InputError as error:  # it asks for too much by now, or for what is no more
+            except InputError as error:  # it has become too expensive, or names a removed element
                 self._drop(number, f"{one}: {error}")
                 continue
             if met:
@@ -205,7 +205,7 @@ class Control:
                 self.paused = str(one)
 
     def _drop(self, number: int, why: str) -> None:
-        """The run goes on without the breakpoint; whoever asks for something next learns why."""
+        """Drop a breakpoint without a pause; the next command from the page gets the reason."""
         self._breaks.pop(number, None)
         self._was_true.discard(number)
         self._dropped = [*self._dropped, why][-MOST_BREAKS:]
@@ -226,7 +226,7 @@ class Control:
         return rose
 
     async def _before_event(self) -> None:
-        """Stand still until somebody says go on."""
+        """Wait for the end of a pause."""
         if self._steps != 0 or self._go is None:
             return
         self.paused = self.paused or "on request"

@@ -1,4 +1,4 @@
-"""The page of a run that goes on. A process of its own serves it: the run pays for telling it what happens, no more."""
+"""Page of a live run. A separate process serves it, so that the run only pays for the transfer of records."""
 
 from __future__ import annotations
 
@@ -23,29 +23,28 @@ if TYPE_CHECKING:
 
 COMMAND = (sys.executable, "-P", "-m", "dsc.viewer.page_process")
 TELL_EVERY_S = 1 / 30
-"""Lines of a run go out together, no more often than a page may show something new."""
+"""Least time between two transfers of a run's lines: a page shows no more."""
 STOPPING_S = 5.0
 _NO_MORE = ""
 
 
 class LivePage:
-    """A live run in the browser: hears its records from the beginning, answers at `url` from `start` to `close`.
+    """A live run in the browser: receives its records from the beginning, answers at `url` from `start` to `close`.
 
-    Records become lines in the run's thread: that is cheaper than to keep them for another thread, as the collector of
-    garbage would look at them again and again. They wait in a queue for a thread that does nothing but write; nothing
-    that happens to the page makes the run wait.
+    The run's thread converts records to lines. Kept records would cost more, because the garbage collector would scan
+    them repeatedly. A separate thread writes the queued lines; the run never waits for the page.
 
     Args:
         first_line: the header of the run's trace.
-        entrance: where the page is to be had; it is given away.
-        control: whether who looks may change the run.
+        entrance: the page's address; the page takes it over.
+        control: whether the page may change the run.
 
     Attributes:
-        control: the hands that the run is to be put in; `None` if it may only be looked at.
+        control: the control to attach to the run; `None` for a read-only page.
         url: the address for people.
         one_time_url: the address for a browser's command line.
         port: of the address.
-        token: in the address for people, a key that stays.
+        token: the permanent key in the address for people.
     """
 
     def __init__(self, first_line: str, entrance: PageAddress, *, control: bool = False) -> None:
@@ -63,9 +62,9 @@ class LivePage:
         self._tell({"begin": first_line, "socket": socket, **keys, "control": control})
 
     def start(self) -> None:
-        """Answer from now on; who comes at once waits until the process is there."""
+        """Start answering; early connections wait for the process."""
         socket = self._entrance.listening
-        self._process = subprocess.Popen(  # noqa: S603  the command is ours
+        self._process = subprocess.Popen(  # noqa: S603  a constant command
             COMMAND,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -73,7 +72,7 @@ class LivePage:
             process_group=0,  # an interrupt from the terminal is for the run
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             encoding="utf-8",
-            errors="backslashreplace",  # half a character that UTF-8 cannot say: JSON can, by just that
+            errors="backslashreplace",  # JSON escapes half a surrogate pair in just this form; UTF-8 cannot encode it
         )
         socket.close()
         works = ((self._write, self._process.stdin), (self._obey, self._process.stdout))
@@ -82,21 +81,21 @@ class LivePage:
             thread.start()
 
     def hear(self, record: Record) -> None:
-        """Take in a record; a `Listener` of a trace."""
+        """Receive a record; a `Listener` of a trace."""
         if not self._gone:
             self._lines.put(record.to_line())
 
     def end(self) -> None:
-        """There are no more records."""
+        """Mark the end of the records."""
         self._tell({"end": True})
 
     def wait(self) -> None:
-        """Until it is closed; an interrupt gets through."""
+        """Wait until the page is closed; an interrupt gets through."""
         if self._process is not None:
             self._process.wait()
 
     def close(self) -> None:
-        """Answer no longer; whoever looks is told by the end of the socket, after what there was to tell."""
+        """Stop answering; the socket delivers all records, then its end informs the browsers."""
         process, self._process = self._process, None
         if process is None:
             self._entrance.listening.close()
@@ -111,7 +110,7 @@ class LivePage:
             thread.join(STOPPING_S)
 
     def _tell(self, said: dict[str, Any]) -> None:
-        """Something that is no record: those begin with their number."""
+        """Send a message other than a record; a record begins with its number."""
         self._lines.put(json.dumps(said))
 
     def _tell_paused(self) -> None:
@@ -119,12 +118,12 @@ class LivePage:
             self._tell({"paused": self.control.paused})
 
     def _write(self, to: IO[str]) -> None:
-        """Tell the process what there is, until there is no more or it has ended."""
+        """Write queued lines to the process until the end, or until the process has ended."""
         with suppress(OSError), to:
             more = True
             while more:
                 lines = [self._lines.get()]
-                time.sleep(TELL_EVERY_S)  # what comes meanwhile goes with it
+                time.sleep(TELL_EVERY_S)  # lines of the meantime go together
                 while not self._lines.empty():
                     lines.append(self._lines.get())
                 more = _NO_MORE not in lines
@@ -133,7 +132,7 @@ class LivePage:
         self._gone = True
 
     def _obey(self, commands: IO[str]) -> None:
-        """Do what the page asks for; what must wait for the run keeps nothing else waiting."""
+        """Execute the page's commands; one that waits for the run delays no other."""
         with commands, ThreadPoolExecutor(thread_name_prefix="viewer") as hands:
             for line in commands:
                 asked = json.loads(line)

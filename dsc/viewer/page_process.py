@@ -1,8 +1,11 @@
-"""The process that serves the page of a run in another process: lines of its trace come in, commands go out.
+"""Process that serves the page of a run in another process: lines of its trace come in, commands go out.
 
-Lines on standard input are records as in a trace, or something else to be told: `begin` (first, with the `socket` to
-serve, its keys `token` and `code`, and whether there is `control`), `paused`, an `answer` to a command, `end`. Lines
-on standard output are commands of who looks, with a number. The end of the input is that of the page.
+Lines on standard input are records as in a trace, or messages:
+
+- `begin` comes first, with the `socket` to serve, its keys `token` and `code`, and whether there is `control`.
+- `paused`, an `answer` to a command, and `end` follow.
+
+Lines on standard output are the page's commands, with a number. The end of the input ends the page.
 """
 
 from __future__ import annotations
@@ -23,16 +26,16 @@ from dsc.viewer.server import Viewer
 from knowledge_base.errors import InputError
 
 NICENESS = 5
-"""Where there is not enough processor for both, the run goes first."""
+"""The run has priority over its page on a busy processor."""
 _RECORD = '{"seq": '
 
 
 class FarHands:
-    """A run in another process, in the hands of who looks.
+    """Control of a run in another process.
 
     Args:
-        to: where commands go.
-        changed: is called when what `paused` says has changed.
+        to: receives the commands.
+        changed: is called after a change of `paused`.
     """
 
     def __init__(self, to: IO[str], changed: Callable[[], None]) -> None:
@@ -42,7 +45,7 @@ class FarHands:
         self.paused: str | None = None
 
     def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """What the run answers to a command; raises `InputError` if that makes no sense to it."""
+        """Return the run's answer to a command; raise `InputError` if the run refuses it."""
         number = next(self._numbers)
         answer = self._asked[number] = Future()
         self._to.write(json.dumps({"number": number, "command": command}) + "\n")
@@ -50,12 +53,12 @@ class FarHands:
         return answer.result()
 
     def hold(self, why: str | None) -> None:
-        """The run stands still, or goes on."""
+        """Record that the run pauses, or continues."""
         self.paused = why
         self._changed()
 
     def answer(self, number: int, said: dict[str, Any] | None, wrong: str) -> None:
-        """What came of a command."""
+        """Record the answer to a command."""
         asked = self._asked.pop(number)
         if said is not None:
             asked.set_result(said)
@@ -64,7 +67,7 @@ class FarHands:
 
 
 def take_in(lines: Iterable[str], log: RecordLog, hands: FarHands) -> None:
-    """All that a run tells about itself."""
+    """Read all messages of a run."""
     for line in lines:
         if line.startswith(_RECORD):
             log.append(line.rstrip("\n"))
@@ -79,7 +82,7 @@ def take_in(lines: Iterable[str], log: RecordLog, hands: FarHands) -> None:
 
 
 def main() -> None:
-    """Serve until the run's process closes the pipe, or is no more."""
+    """Serve until the run's process closes the pipe or ends."""
     os.nice(NICENESS)
     lines = TextIOWrapper(sys.stdin.buffer, encoding="utf-8")
     begin = json.loads(lines.readline())

@@ -1,4 +1,4 @@
-"""Queries of the page: the knowledge of a moment, replayed from records with checkpoints, within bounds."""
+"""Queries of the page: the knowledge at a record, replayed from records with checkpoints, within bounds."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 CHECKPOINT_EVERY = 500
-"""Records that are replayed at most to get to a moment."""
+"""Upper bound of records replayed to reach a moment."""
 
 _TYPE = re.compile(r'"type": "([^"]*)"')
 _S = TypeVar("_S")
 
 
 class RecordReplay(Generic[_S]):
-    """A state that records make, at any of them.
+    """A state derived from records, at any record.
 
     Args:
         log: the records.
-        types: which of them matter.
+        types: the relevant types of records.
         begin: the state before the first record.
-        copy: an independent state that says the same.
-        advance: the state after a record, made from the one before, which it may change.
+        copy: returns an equal, independent state.
+        advance: returns the state after a record from the state before, which it may change.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class RecordReplay(Generic[_S]):
         self._lock = Lock()
 
     def at(self, seq: int) -> _S:
-        """The state after the record with that number.
+        """Return the state after the record with that number.
 
         Raises:
             InputError: there is no such record.
@@ -78,10 +78,10 @@ class RecordReplay(Generic[_S]):
         try:
             return self._advance(state, self._log.record(seq))
         except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
-            raise InputError(f"record {seq} is damaged, and what follows from it is not known: {error!r}") from None
+            raise InputError(f"record {seq} is damaged, so later knowledge is unknown: {error!r}") from None
 
     def _scan(self, seq: int) -> None:
-        """Find the records that matter, up to `seq`; their type stands at the beginning of the line."""
+        """Find the relevant records up to `seq`; a line begins with its type."""
         while self._scanned < seq:
             self._scanned += 1
             found = _TYPE.search(self._log.line(self._scanned), 0, 120)
@@ -98,7 +98,7 @@ class Known:
 
 
 def knowledge(log: RecordLog) -> RecordReplay[Known]:
-    """The knowledge at any record."""
+    """Return the replay of the knowledge."""
     begin = Known(WorldState(Schema()), 0)
     return RecordReplay(
         log, frozenset({"world", "knowledge"}), begin, lambda k: Known(k.state.copy(), k.version), _known
@@ -116,16 +116,16 @@ def _known(before: Known, record: Mapping[str, Any]) -> Known:
 
 Form = Mapping[str, Any]
 Left = Callable[[], bool]
-"""Whether whoever asked is gone."""
+"""Returns whether the browser has left."""
 
 MOST_TEXT = 10_000
 """Characters of an expression or statement from a browser."""
 MOST_SECONDS = 5.0
-"""Of an answer to a browser; behind it the question is given up."""
+"""Upper bound of an answer's time; then the query is abandoned."""
 MOST_ANSWERS = 10_000
-"""Answers, facts and numbers that a browser gets at once; `more` says that there are others."""
+"""Upper bound of answers, facts and numbers in one message; `more` marks an incomplete one."""
 MOST_EXPLAINED = 1.0
-"""Seconds to find out why an answer is what it is, which is left out otherwise."""
+"""Seconds for the explanation of an answer, which is otherwise omitted."""
 
 
 def _still_there() -> bool:
@@ -133,9 +133,9 @@ def _still_there() -> bool:
 
 
 class PageQueries:
-    """Answers to one page's questions, each a JSON value; a question that makes no sense is an `InputError`.
+    """Answers to one page's queries, each a JSON value; an invalid query is an `InputError`.
 
-    A question takes `MOST_SECONDS` at most, and ends when `left` says that whoever asked is gone.
+    A query takes `MOST_SECONDS` at most, and ends when `left` reports that the browser has left.
     """
 
     def __init__(self, log: RecordLog) -> None:
@@ -143,7 +143,7 @@ class PageQueries:
         self._knowledge = knowledge(log)
 
     def query(self, asked: Form, left: Left = _still_there) -> dict[str, Any]:
-        """Who makes the expression true, or whether it is true and why."""
+        """Return the bindings that make the expression true, or its truth value with a reason."""
         view = self._view(asked)
         params = asked.get("params") or {}
         condition = parse_condition(_text(asked, "expression"), "EXPR")
@@ -156,7 +156,7 @@ class PageQueries:
         return said if variables else {**said, "why": _why(view, condition, params, left, holds=bool(answers))}
 
     def facts(self, asked: Form, left: Left = _still_there) -> dict[str, Any]:  # noqa: ARG002  it takes a moment
-        """All that is known, or all that is known about one thing."""
+        """Return all facts, or all facts about one object."""
         view, about = self._view(asked), asked.get("about")
         things, facts, values = view.nodes(), view.facts(), view.values()
         if about is not None:

@@ -27,7 +27,7 @@ LOOK_EVERY_S = 0.2
 
 @contextmanager
 def followed(log: RecordLog, look: Callable[[], bool]) -> Iterator[RecordLog]:
-    """The log, which `look` adds to while the block lasts, until it says that there will be no more or cannot go on."""
+    """Poll `look` during the block, which adds to the log, until it returns false or fails."""
     over = Event()
 
     def looking() -> None:
@@ -50,10 +50,10 @@ def followed(log: RecordLog, look: Callable[[], bool]) -> Iterator[RecordLog]:
 
 @contextmanager
 def following_run(path: Path) -> Iterator[RecordLog]:
-    """The records of the last run in a store; while the block lasts, those that it goes on to make as well.
+    """Yield the records of the last run in a store; add new ones during the block.
 
     Raises:
-        StoreError: the file is not there, not a store, has no run, or cannot be read.
+        StoreError: the file is missing, not a store, has no run, or cannot be read.
     """
     with archive(path) as runs:
         run = runs.run()
@@ -86,13 +86,13 @@ def _record(line: str, last: int, path: Path) -> Record:
 
 @contextmanager
 def following_store(path: Path) -> Iterator[RecordLog]:
-    """The records of a store; while the block lasts, those of changes that others make as well.
+    """Yield the records of a store; add changes of other programs during the block.
 
-    Time begins with the first change that is still kept. Changes are followed until the store is compacted beyond
-    what was taken in, or its schema grows; then the log ends.
+    Time begins with the first kept change. The log ends when the store is compacted beyond the changes read, or its
+    schema grows.
 
     Raises:
-        StoreError: it is not there, is no store, or cannot be read.
+        StoreError: it is missing, is not a store, or cannot be read.
     """
     with KnowledgeBase.open(None, path, read_only=True) as kb:
         changes = kb.changes(kb.oldest)
@@ -123,12 +123,12 @@ def _header(path: Path, changes: list[Change]) -> str:
 
 @contextmanager
 def records_of(path: Path) -> Iterator[RecordLog]:
-    """The records in a file, by what the file is; of a store, also those that come while the block lasts.
+    """Yield the records in a file by its kind; for a store, add new ones during the block.
 
-    Of a store with runs in it, those of its last run; of another one, the changes of what is known.
+    A store with runs gives its last run; another one gives the changes of its knowledge.
 
     Raises:
-        InputError: there is no such file, or it is neither a trace nor a store.
+        InputError: the file is missing, or it is neither a trace nor a store.
     """
     if is_database(path):
         with (following_run if has_run(path) else following_store)(path) as log:

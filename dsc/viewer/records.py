@@ -1,4 +1,4 @@
-"""All records of a run as the lines of its trace: appended while it goes on, read at any place by anybody."""
+"""Records of a run as the lines of its trace: one writer appends during the run, readers read at any position."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from knowledge_base.pddl.files import read_lines
 
 MOST_RECORDS = 2000
 MOST_CHARACTERS = 400_000
-"""What goes out at once at most: a browser takes it in without a stutter."""
+"""Upper bound of one message: a browser handles it without a visible delay."""
 DAMAGED = "damaged"
-"""The type of a record that stands for one that cannot be read."""
+"""Type of a record that replaces an unreadable one."""
 MOST_SHOWN = 200
-"""Characters of a damaged line."""
+"""Characters shown of a damaged line."""
 _T = re.compile(r'"t": (-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)')
 _NO_CHARACTER = re.compile("[\ud800-\udfff]")
 MAX_TRACE_BYTES = 1024 * 1024 * 1024
-"""Of a trace: all its lines are kept in memory."""
+"""Upper bound of a trace: all its lines are kept in memory."""
 MAX_LINE_BYTES = 64 * 1024 * 1024
-"""Of one line of a trace: the longest record is the first, the whole world."""
+"""Upper bound of one line of a trace: the longest record is the first, the whole world."""
 
 
 class RecordLog:
-    """The lines of a trace; the record with number `seq` is line `seq`, counted from 1 behind the header.
+    """The lines of a trace; the record with number `seq` is line `seq`, counted from 1 after the header.
 
-    One thread appends, any thread reads. Nothing is ever taken away, so that readers need no queues of their own.
+    One thread appends, any thread reads. Records are never removed, so that readers need no queues.
 
     Attributes:
         header: the first line of the trace, as data.
@@ -57,30 +57,30 @@ class RecordLog:
         self._batch: tuple[int, int, str] = (0, 0, "")
 
     def __len__(self) -> int:
-        """The number of the last record."""
+        """Return the number of the last record."""
         return len(self._lines)
 
     @property
     def live(self) -> bool:
-        """Whether there may be more records."""
+        """Whether more records may come."""
         return self._live
 
     def hear(self, record: Record) -> None:
-        """Take in a record; a `Listener` of a trace."""
+        """Receive a record; a `Listener` of a trace."""
         self.append(record.to_line())
 
     def append(self, line: str) -> None:
-        """Take in a record as its line, which nobody looks at."""
+        """Append a record as its line, without a check."""
         self._lines.append(line)
         self.wake()
 
     def end(self) -> None:
-        """There are no more records."""
+        """Mark the end of the records."""
         self._live = False
         self.wake()
 
     def on_more(self, waker: Callable[[], None]) -> Callable[[], None]:
-        """Call `waker` whenever there is more to read, from whatever thread; the function returned ends that."""
+        """Call `waker` for new records, from any thread; the returned function ends that."""
         with self._lock:
             self._wakers = (*self._wakers, waker)
 
@@ -91,27 +91,27 @@ class RecordLog:
         return forget
 
     def wake(self) -> None:
-        """Tell everybody who waits that there is something new."""
-        for waker in self._wakers:  # a tuple that nobody changes: no record needs a lock
+        """Notify all readers of new records."""
+        for waker in self._wakers:  # the tuple is immutable: no record needs a lock
             waker()
 
     def batch(self, seq: int) -> tuple[str, int]:
-        """The message with the records from `seq` on, as many as go at once, and the seq that follows them."""
+        """Return a message with the records from `seq` on, up to the bound, and the next `seq`."""
         end, characters = seq - 1, 0
         last = min(len(self._lines), seq - 1 + MOST_RECORDS)
         while end < last and characters < MOST_CHARACTERS:
             end += 1
             characters += len(self._lines[end - 1])
         kept = self._batch
-        if kept[:2] != (seq, end):  # browsers that have caught up get the same: it is put together once
-            # The lines are JSON already; writing them anew would cost more than everything else here.
+        if kept[:2] != (seq, end):  # browsers at the same position share one message
+            # The lines are already JSON: a second encoding would cost more than the rest of the viewer.
             lines = ",\n".join(self._lines[seq - 1 : end])
             text = f'{{"type":"records","from":{seq},"records":[\n{lines}\n]}}'
             kept = self._batch = (seq, end, text)
         return kept[2], end + 1
 
     def line(self, seq: int) -> str:
-        """The record as its line.
+        """Return the record as its line.
 
         Raises:
             InputError: there is no such record.
@@ -121,7 +121,7 @@ class RecordLog:
         return self._lines[seq - 1]
 
     def record(self, seq: int) -> dict[str, Any]:
-        """The record as data; errors as for `line`, and if the line is no JSON."""
+        """Return the record as data; errors as for `line`, and if the line is not JSON."""
         try:
             found: dict[str, Any] = json.loads(self.line(seq))
         except (ValueError, RecursionError) as error:
@@ -130,11 +130,11 @@ class RecordLog:
 
 
 def read_trace(path: Path) -> RecordLog:
-    """The records of a trace file; a damaged line is a record of type `damaged`, named in `complaints` of the log.
+    """Return the records of a trace file; a damaged line becomes a record of type `damaged` and one of `complaints`.
 
     Raises:
-        InputError: there is no such file, or it cannot be read.
-        ParseError: it is no trace, one of another version, or records are missing, doubled or in another order.
+        InputError: the file is missing, or cannot be read.
+        ParseError: it is not a trace, has another version, or its records are missing, doubled or in another order.
     """
     lines = read_lines(path, MAX_TRACE_BYTES, MAX_LINE_BYTES, errors="surrogateescape")
     first = next(lines, "")
@@ -144,13 +144,13 @@ def read_trace(path: Path) -> RecordLog:
 
 
 def damaged(seq: int, t: float, line: int, why: str, text: str) -> str:
-    """The record that stands for one that cannot be read, as its line."""
+    """Return the line of a record that replaces an unreadable one."""
     said = {"line": line, "why": why, "text": text[:MOST_SHOWN]}
     return json.dumps({"seq": seq, "t": t, "type": DAMAGED, "cause": None, **said})
 
 
 def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterator[str]:
-    """The lines of records without a gap; between two that can be read, damaged ones stand for what is lost."""
+    """Yield the lines of records without a gap; damaged records replace lost ones."""
     last, before, lost = 0, "", list[tuple[int, str]]()
 
     def substitutes(count: int) -> Iterator[str]:
@@ -174,13 +174,13 @@ def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterat
         elif line.strip():
             lost.append((number, line))
     for place, (number, line) in enumerate(lost, 1):
-        if _seq_of(line, 0) is not None:  # a sound one in a wrong place: more is wrong than some lines
+        if _seq_of(line, 0) is not None:  # a sound record in a wrong place: the damage exceeds single lines
             raise ParseError(f"this is not record {last + place} of a trace", place=Place(str(path), number))
     yield from substitutes(len(lost))
 
 
 def _seq_of(line: str, expected: int) -> int | None:
-    """The number of the record in a line; `None` if there is none, as far as its two ends tell."""
+    """Return the number of the record in a line, or `None`; only both ends of the line are checked."""
     if line.endswith("}") and (line.isascii() or not _NO_CHARACTER.search(line)):
         if line.startswith(f'{{"seq": {expected}, '):
             return expected
@@ -201,10 +201,10 @@ def _why_unreadable(line: str) -> str:
 
 
 def _parsed(line: str) -> Any:
-    """What the line says if that is an object, the reason if it is no JSON, else `None`."""
+    """Return the line's object, the reason if it is not JSON, else `None`."""
     try:
         said = from_json(line)
-    except (TypeError, ValueError) as error:  # TypeError: half a character
+    except (TypeError, ValueError) as error:  # TypeError: half a surrogate pair
         return str(error)
     return said if isinstance(said, dict) else None
 

@@ -1,4 +1,4 @@
-"""Requests as the page sends them: JSON of bounded size and depth, every field of its type, or an `InputError`."""
+"""Requests of the page: JSON of bounded size and depth with typed fields; others are an `InputError`."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pydantic_core import from_json
 from knowledge_base.errors import InputError
 
 MOST_BYTES = 1 << 20
-"""Of a request's body."""
+"""Upper bound of a request's body."""
 Form = Mapping[str, tuple[Callable[[Any], bool], str]]
-"""The fields of a request: the test of a value, and the words for what it is. A field may be left out."""
+"""Optional fields of a request: the test of a value, and the words for its type."""
 
 
 def asked(body: bytes | str, form: Form = MappingProxyType({})) -> dict[str, Any]:
-    """The request in a text.
+    """Return the request in a text.
 
     Raises:
-        InputError: it is no JSON object, nested too deeply, or a field has a value of another type.
+        InputError: it is not a JSON object, is nested too deeply, or a field has a value of another type.
     """
     try:
         said = from_json(body, allow_inf_nan=False)

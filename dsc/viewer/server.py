@@ -1,4 +1,4 @@
-"""The program's side of PROTOCOL.md: one Starlette application for one run."""
+"""Server side of PROTOCOL.md: one Starlette application for one run."""
 
 from __future__ import annotations
 
@@ -37,26 +37,26 @@ if TYPE_CHECKING:
 
 STATIC = Path(__file__).parent / "static"
 MOST_HEADER_BYTES = 1 << 20
-"""Browsers send the cookies of all programs of this machine: as many as a browser keeps."""
+"""Upper bound: browsers send the cookies of all programs of this machine."""
 MOST_DIGITS = 15
-"""Of a record's number."""
+"""Upper bound of a record number's digits."""
 COMPLAIN_EVERY_S = 10.0
-"""Failures in between say nothing."""
+"""Least time between two messages about failures."""
 
 
 class Viewer:
-    """A run in the browser: made with its records, it answers at `url` from `start` to `close`.
+    """A run in the browser: answers at `url` from `start` to `close`.
 
     Args:
         log: the records.
-        entrance: where it is to be had; it is given away.
-        control: the run, if whoever looks may change it.
+        entrance: the page's address; the viewer takes it over.
+        control: the run's control, if the page may change it.
 
     Attributes:
         url: the address for people.
         one_time_url: the address for a browser's command line.
         port: of the address.
-        token: in the address for people, a key that stays.
+        token: the permanent key in the address for people.
     """
 
     def __init__(self, log: RecordLog, entrance: PageAddress, control: Hands | None = None) -> None:
@@ -73,16 +73,16 @@ class Viewer:
             http=_Protocol,
             h11_max_incomplete_event_size=MOST_HEADER_BYTES,
             ws_max_size=1 << 16,
-            ws_per_message_deflate=False,  # nothing leaves this machine, so that it would only cost
+            ws_per_message_deflate=False,  # local transfer needs no compression
             log_config=None,
-            log_level=logging.CRITICAL + 1,  # what strangers send is no news for a terminal
+            log_level=logging.CRITICAL + 1,  # invalid requests from strangers do not belong on the terminal
             access_log=False,
         )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._serve, daemon=True)
 
     def application(self) -> ASGIApp:
-        """The application behind the check of who may come in."""
+        """Return the application behind the access check."""
         return Access(self._calm, self._keys, self.port)
 
     def _routed(self) -> ASGIApp:
@@ -100,16 +100,16 @@ class Viewer:
         return Starlette(routes=routes)
 
     def start(self) -> None:
-        """Answer from now on, in a thread of its own."""
+        """Start answering, in a separate thread."""
         self._thread.start()
 
     def wait(self) -> None:
-        """Until it is closed; an interrupt gets through."""
+        """Wait until the page is closed; an interrupt gets through."""
         while self._thread.is_alive():
             self._thread.join(timeout=0.5)
 
     def close(self) -> None:
-        """Answer no longer; whoever looks is told by the end of the socket."""
+        """Stop answering; the end of the socket informs the browsers."""
         self._server.should_exit = True
         self._server.force_exit = True
         if self._thread.is_alive():
@@ -165,33 +165,33 @@ class Viewer:
 
 
 class Calm:
-    """An application whose failures cost one request, and the terminal a line now and then, never a traceback."""
+    """An application whose failures cost one request and at times a line on the terminal, never a traceback."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
         self._complained = -COMPLAIN_EVERY_S
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let the application answer; it has said 500 where it failed."""
+        """Let the application answer; after a failure it has answered 500."""
         try:
             await self._app(scope, receive, send)
         except (ClientDisconnect, OSError):
-            pass  # whoever asked is gone
-        except Exception as error:  # noqa: BLE001  a traceback would be uvicorn's answer
+            pass  # the browser has left
+        except Exception as error:  # noqa: BLE001  uvicorn would print a traceback
             self.complain(error)
 
     def complain(self, error: BaseException | None) -> None:
-        """Say in a line what failed, unless something was said lately."""
+        """Print a failure on one line, unless another one was printed recently."""
         if error is not None and time.monotonic() - self._complained >= COMPLAIN_EVERY_S:
             self._complained = time.monotonic()
             sys.stderr.write(f"the page: {type(error).__name__}: {error}"[:300].replace("\n", " ") + "\n")
 
 
 class _Protocol(H11Protocol):
-    """HTTP as uvicorn speaks it, whose sockets are not refused for the cookies of other programs."""
+    """uvicorn's HTTP protocol, which also accepts sockets with large cookies of other programs."""
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        """Hand over to the socket's protocol, which takes lines of 8 KB at most, without foreign cookies."""
+        """Remove foreign cookies before the switch to the socket protocol, which accepts lines of 8 KB at most."""
         self.headers = [(name, _own(value) if name == b"cookie" else value) for name, value in self.headers]
         super().handle_websocket_upgrade(event)
 
@@ -203,7 +203,7 @@ def _own(cookie: bytes) -> bytes:
 async def _while_there(
     request: Request, answer: Callable[[Mapping[str, Any], Left], Any], said: Mapping[str, Any]
 ) -> Any:
-    """What `answer` gives in a thread of its own; it learns when whoever asked has left. The body was read."""
+    """Return the result of `answer`, run in a separate thread that learns whether the browser has left."""
     left = threading.Event()
 
     async def watch() -> None:
@@ -228,7 +228,7 @@ async def _body(request: Request) -> bytes:
 
 
 def _json(said: Any, status: int = 200) -> Response:
-    """JSON in ASCII: half a character is no UTF-8; numbers that JSON lacks are as in a trace."""
+    """Return JSON in ASCII, because UTF-8 lacks half surrogate pairs; numbers that JSON lacks are as in a trace."""
     return Response(json.dumps(said), status_code=status, media_type="application/json")
 
 
