@@ -102,7 +102,7 @@ PENDING = {
     "knowledge_base", "knowledge_base/cli", "knowledge_base/conditions", "knowledge_base/drawing",
     "knowledge_base/exchange", "knowledge_base/journal", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
-    "dsc", "dsc/components", "dsc/sequencer", "dsc/testing",
+    "dsc", "dsc/components", "dsc/sequencer",
     "planning", "planning/cli", "planning/engines", "planning/execution", "planning/generation", "planning/ordering",
     "planning/problem",
     "domains", "domains/clean_up_table",

@@ -1,6 +1,6 @@
-"""For tests of plots: rehearsals, stand-ins, questions about steps, coverage; faults, crashes and what must hold.
+"""Tools for tests of plots: rehearsals, substitutes, predicates over steps, coverage; faults, crashes and invariants.
 
-Nothing else of the project imports it.
+No other room of the project imports it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the skills of a script answer, and what they were asked."""
+"""Scripted skills' answers, and the calls of these skills."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from knowledge_base.facts import Delta
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How a scripted skill ends.
+    """The end of a scripted skill.
 
     Attributes:
         event: its outcome event.
         attributes: the event's attributes.
-        after: seconds of run time it takes; `math.inf`: it never ends by itself.
-        observed: what is known with the outcome: a change, or a PDDL effect in which `?name` stands for an argument
-            of the call, e.g. `(holding ?item)`.
-        reports: what it reports on the way, each `after` the one before.
+        after: its duration in seconds of run time; `math.inf` means that it never ends by itself.
+        observed: knowledge that comes with the outcome: a change, or a PDDL effect. In an effect such as
+            `(holding ?item)`, `?name` stands for an argument of the call.
+        reports: its intermediate reports, each `after` the one before.
     """
 
     event: str
@@ -33,7 +33,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One call of a scripted skill: `component.skill`, its arguments, and the second of run time at which it came."""
+    """One call of a scripted skill: `component.skill`, its arguments, and its second of run time."""
 
     skill: str
     arguments: Mapping[str, Any]
@@ -41,19 +41,19 @@ class Call:
 
 
 Reply = str | Answer | Exception
-"""An answer; an outcome's name alone takes one second; an exception is raised, as by a skill that breaks."""
+"""An answer; an outcome's name alone takes one second; an exception is raised, as by a defective skill."""
 Replies = Reply | Sequence[Reply] | Callable[[Call], Reply]
-"""The same answer to every call, one for each call in order, or whatever a function makes of the call."""
+"""The same answer to every call, one for each call in order, or the result of a function of the call."""
 
 
 class RepliesOfSkill:
-    """The answers of one skill, one after the other.
+    """The answers of one skill, in sequence.
 
     Attributes:
-        known: the answers that can be seen before any call.
+        known: the answers that are known before any call.
 
     Raises:
-        InputError: what shall be answered is no `Reply`.
+        InputError: an answer is not a `Reply`.
     """
 
     def __init__(self, skill: str, replies: Replies) -> None:
@@ -72,7 +72,7 @@ class RepliesOfSkill:
         self.known = tuple(one for one in self._in_order if isinstance(one, Answer))
 
     def next(self, call: Call) -> Answer | Exception:
-        """The answer to the next call; raises `InputError` if there is none."""
+        """Return the answer to the next call; raise `InputError` if there is none."""
         if self._always is not None:
             return self._answer(self._always(call))
         self._given += 1
@@ -85,13 +85,13 @@ class RepliesOfSkill:
             return reply
         if not isinstance(reply, str):
             raise InputError(
-                f"the script of '{self._skill}' answers {reply!r}, which is no outcome's name, Answer or exception"
+                f"the script of '{self._skill}' answers {reply!r}, which is not an outcome's name, Answer or exception"
             )
         return Answer(reply)
 
 
 def check_outcome(skill: str, signature: SkillSignature, answer: Answer) -> None:
-    """Whether a skill of that signature may answer so.
+    """Raise an error if a skill of that signature cannot give the answer.
 
     Raises:
         UnknownNameError: it has no such outcome, or the outcome no such attribute.

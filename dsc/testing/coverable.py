@@ -1,4 +1,4 @@
-"""What there is to cover in a plot: its states, its transitions, its rules."""
+"""Items of a plot for coverage: its states, its transitions, its rules."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Key = tuple[Kind, str, Path]
 
 @dataclass(frozen=True, slots=True)
 class CoverageItem:
-    """Something that a run may reach.
+    """A part of a plot that a run may reach.
 
     Attributes:
-        key: what it is, within its plot.
-        text: what people call it.
-        path: where it stands in the plot's form.
-        place: where it was written, if the plot was read from a text.
+        key: its identity within its plot.
+        text: its short name.
+        path: its path in the plot's form.
+        place: its place in the text, if the plot was read from one.
     """
 
     key: Key
@@ -39,21 +39,21 @@ class CoverageItem:
         return self.key[0]
 
     def __str__(self) -> str:
-        """One line: where, and what was missed."""
+        """Return one line with place and name."""
         return f"{self.place or '/'.join(map(str, self.path))}: {self.text}"
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return the item as plain data."""
         place = self.place
         written = {} if place is None else {"file": place.source, "line": place.line}
         return {"kind": self.kind, "text": self.text, "path": list(self.path), **written}
 
 
 def items_of(plot: ActionPlot) -> Iterator[CoverageItem]:
-    """Everything in a plot as it was written, in document order; rules of one label are one item.
+    """Yield all items of a plot in its written form, in document order; rules with equal labels are one item.
 
-    What rules expand to is not the plot's own: however many states a rule answers for, it is there once. History
-    stands for other states and is never entered itself.
+    The expansion of a rule adds no items: a rule is one item, for any number of states. A history stands for other
+    states and is never entered itself.
     """
     for name, state, path in plot.walk():
         if not isinstance(state, HistoryState):

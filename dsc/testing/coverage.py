@@ -1,4 +1,4 @@
-"""Which states, transitions and rules of which plots the runs of a test reached, and which they did not."""
+"""Coverage of plots: states, transitions and rules that the runs of a test reached or missed."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from knowledge_base.errors import InputError, UnknownNameError
 
 
 class Coverage:
-    """Counts over many runs, the steps of one after those of another.
+    """Counts over many runs, one run after another.
 
-    A plot that stands in for one of these (`Library.substitute`) is not counted as it. A rule counts where it stands:
-    also when it answered in a plot that was made from a plan and inherited it.
+    A substitute of a plot (`Library.substitute`) does not count for the original. A rule counts in its plot, also when
+    it answered in a generated plot that inherited it.
 
     Args:
         plots: the library, or its plots.
-        only: names of the plots to be covered; all if left out.
+        only: names of the plots to be covered; by default all.
 
     Raises:
-        UnknownNameError: `only` names a plot that is not there.
+        UnknownNameError: `only` names a missing plot.
     """
 
     def __init__(self, plots: Iterable[ActionPlot], only: Collection[str] = ()) -> None:
@@ -31,17 +31,17 @@ class Coverage:
         wanted = [self._library.plot(name) for name in only] or list(self._library)
         self._items = {plot.name: {item.key: item for item in items_of(plot)} for plot in wanted}
         self._reached: set[tuple[str, Key]] = set()
-        self._inside: dict[str, str | None] = {}  # path of the holding state -> plot, None if it is none of ours
+        self._inside: dict[str, str | None] = {}  # path of the host state -> plot; None if not covered
         self._seen: dict[int, tuple[ActionPlot, bool]] = {}
 
     def add(self, *steps: Step) -> None:
-        """Count what the steps did; also a listener for `Sequencer.listen`.
+        """Count the contents of the steps; also a listener for `Sequencer.listen`.
 
         Raises:
             InputError: the steps of a run before these are missing.
         """
         for micro in (micro for step in steps for micro in step.microsteps):
-            for taken in micro.taken:  # stands before what was bound by it
+            for taken in micro.taken:  # a transition precedes the plots that it binds
                 self._take(taken)
             self._bind(micro)
             for path in micro.entered:
@@ -49,7 +49,7 @@ class Coverage:
                 self._count(self._holding(holder), ("state", name, ()))
 
     def missing(self, plot: str | None = None) -> tuple[CoverageItem, ...]:
-        """What was not reached, in the order of plots and texts; of one plot, or of all.
+        """Return the missed items, in the order of plots and texts; of one plot, or of all.
 
         Raises:
             UnknownNameError: that plot is not covered.
@@ -57,7 +57,7 @@ class Coverage:
         return tuple(item for name in self._names(plot) for item in self._missing(name))
 
     def count(self, plot: str, kind: Kind) -> tuple[int, int]:
-        """How many of a plot's states, transitions or rules were reached, and how many there are.
+        """Return the numbers of reached and of all states, transitions or rules of a plot.
 
         Raises:
             UnknownNameError: that plot is not covered.
@@ -68,18 +68,18 @@ class Coverage:
 
     @property
     def ratio(self) -> float:
-        """The part of everything that was reached, from 0 to 1; 1 if there is nothing."""
+        """The reached share of all items, from 0 to 1; 1 without items."""
         reached, total = self._total()
         return reached / total if total else 1.0
 
     def report(self) -> str:
-        """A table of plots, and under each one a line with place for everything that was missed."""
+        """Return a table of plots, with a line and a place for each missed item."""
         width = max(map(len, self._items), default=0)
         head = " " * width + "".join(f"  {kind + 's':>11}" for kind in KINDS)
         return "\n".join([head.rstrip(), *(line for name in self._items for line in self._lines(name, width))])
 
     def assert_complete(self, at_least: float = 1.0) -> None:
-        """Raise `AssertionError` with the report if less than that part of everything was reached.
+        """Raise `AssertionError` with the report if the reached share is smaller.
 
         Args:
             at_least: from 0 to 1.
@@ -91,7 +91,7 @@ class Coverage:
             )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data: per plot how many were reached and what was missed, with file and line."""
+        """Return, for each plot, the number of reached items and the missed ones, with file and line."""
         return {
             name: {
                 **{f"{kind}s": dict(zip(("reached", "all"), self.count(name, kind), strict=True)) for kind in KINDS},
@@ -105,7 +105,7 @@ class Coverage:
         if taken.rule is None:
             self._count(self._holding(holder), ("transition", source, taken.place))
             return
-        # The innermost plot around that has such a rule: a generated plot inherits its holder's.
+        # The innermost plot around has the rule: a generated plot inherits its holder's.
         key: Key = ("rule", taken.rule, ())
         for around in _outwards(holder):
             name = self._holding(around)
@@ -120,7 +120,7 @@ class Coverage:
     def _is_ours(self, plot: ActionPlot) -> bool:
         if plot.name not in self._items:
             return False
-        kept = self._seen.get(id(plot))  # the same object time and again; comparing texts is for the first time
+        kept = self._seen.get(id(plot))  # the same object comes often; only its first time needs a comparison of texts
         if kept is None or kept[0] is not plot:
             kept = (plot, self._library.expanded(self._library.plot(plot.name)) == plot)
             self._seen[id(plot)] = kept
@@ -158,7 +158,7 @@ class Coverage:
 
 
 def _outwards(path: str) -> Iterator[str]:
-    """The path of the state that holds a plot, then of the one that holds that state's plot, up to the outermost."""
+    """Yield the path of the state that holds a plot, then of the one around it, and so on outwards."""
     yield path
     while path:
         path = path.rpartition("/")[0]

@@ -1,7 +1,7 @@
-"""Runs with a store that are killed where it makes a difference, and gone on with until they end.
+"""Crashes of runs with a store at critical moments, and their recovery until the run ends.
 
-What `kill -9` leaves are the files as they are at that moment. So they are copied at the boundary, the program that
-wrote them is abandoned, and a new one goes on with the copy.
+`kill -9` leaves the files in their present state. A crash therefore copies the files at the boundary and abandons the
+old program; a new one resumes the run from the copy.
 """
 
 from __future__ import annotations
@@ -26,35 +26,39 @@ KILLED = "killed"
 DISK_FULL = "disk full"
 OVERTAKEN = "overtaken"
 _AFTER_COMMIT = (KILLED, KILLED, DISK_FULL, OVERTAKEN, OVERTAKEN)
-"""What may happen between commit and dispatch, as often as that."""
+"""Faults between commit and dispatch; repeated entries are more likely."""
 _REACHED = (KILLED, OVERTAKEN)
-"""What may happen where nothing is being committed."""
+"""Faults outside a commit."""
 _Result = TypeVar("_Result")
 _Component = TypeVar("_Component", bound=Component)
 
 
 class Killed(SystemExit):
-    """The program has died here."""
+    """The program ends here."""
 
 
 class Crashes(Generic[_Result]):
-    """Lives a run, life after life, until it has ended.
+    """Runs a program with crashes, life after life, until the run has ended.
 
-    Boundaries are: before and after each commit (after it nothing has left yet), when a component has acted and its
-    answer is not kept, and whatever else says that it is `reached`. After a commit the disk may be full from then on,
-    which SQLite itself says. Anywhere but before a commit, another program may take the run over, where locks do not
-    work, and live it to its end, while this one then goes on as if nothing had been.
+    A crash may happen at these boundaries:
+
+    - before each commit, and after it, when nothing is dispatched yet;
+    - after a component's action, when its answer is not committed yet;
+    - at every call of `reached`.
+
+    After a commit, the disk may be full from then on; SQLite reports it. Except before a commit, another program may
+    take over the run, as on a file system without locks. It runs to the end, while the old program continues unaware.
 
     Args:
-        folder: each life has a folder of its own inside.
+        folder: each life has a separate folder inside.
         seed: of all draws.
         chance: of a crash at each boundary, in [0, 1].
-        most: crashes of a run, so that it comes to an end.
+        most: crashes of a run, so that it ends.
 
     Attributes:
-        fired: how often what happened where, as `killed after commit`.
-        problems: what an old program did that had been overtaken.
-        life: the number of the life that is being lived, from 0.
+        fired: number of each fault at each boundary, with keys such as `killed after commit`.
+        problems: writes of an old program after the takeover.
+        life: the number of the current life, from 0.
     """
 
     def __init__(self, folder: Path, seed: int, chance: float = 0.02, most: int = 3) -> None:
@@ -74,18 +78,18 @@ class Crashes(Generic[_Result]):
 
     @property
     def folder(self) -> Path:
-        """Where the present life finds what the one before has left, and keeps all that shall outlive it."""
+        """Folder of the present life: it has the files of the life before, and keeps all files for the next one."""
         return self._root / f"life{self.life}"
 
     def survive(self, live: Callable[[Path], _Result]) -> _Result:
-        """What comes of it in the end.
+        """Run `live` in life after life, and return its final result.
 
         Args:
-            live: begins the run in that folder or, if one is there, goes on with it, and runs it to its end. What
-                outlives the program, e.g. a simulated world, has to be in files there.
+            live: starts the run in that folder, or resumes the one there, and runs it to its end. Data that outlive the
+                program, e.g. a simulated world, must be in files there.
 
         Raises:
-            StoreError: not because of a crash of ours.
+            StoreError: an error without a crash as its cause.
         """
         self._live = live
         self.folder.mkdir()
@@ -107,9 +111,9 @@ class Crashes(Generic[_Result]):
                 return result if self._heir is None else self._heir.result(self.problems)
 
     def watch(self, sequencer: Sequencer) -> None:
-        """Let crashes happen around the commits of this run; to be called before it starts or is resumed."""
+        """Let crashes happen around the commits of this run; call it before the run starts or is resumed."""
         store = sequencer.store
-        assert store is not None  # noqa: S101  without one there is nothing to be resumed
+        assert store is not None  # noqa: S101  a run without a store cannot be resumed
         self._store = store.path
 
         def boundary(what: Boundary) -> None:
@@ -120,14 +124,14 @@ class Crashes(Generic[_Result]):
             if happens == DISK_FULL:
                 self._disk_full = self._calm = True
                 with sequencer.knowledge.together() as connection:
-                    connection.execute("PRAGMA max_page_count = 1")  # not less than it has now
+                    connection.execute("PRAGMA max_page_count = 1")  # SQLite keeps at least the present size
             if happens == OVERTAKEN:
                 self._overtake()
 
         store.writing.listen(boundary)
 
     def inject(self, component: _Component) -> _Component:
-        """Let crashes happen when this component has done something, before its answer is kept; returns it."""
+        """Let crashes happen after this component's actions, before their answers are committed; return it."""
         execute = component.execute
 
         async def carried_out(skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
@@ -139,14 +143,14 @@ class Crashes(Generic[_Result]):
         return component
 
     async def reached(self, boundary: str) -> None:
-        """The program may die here, or be overtaken."""
+        """Let the program be killed or overtaken here."""
         happens = self._drawn(boundary, _REACHED)
         if happens == OVERTAKEN:
             self._overtake()
         if happens == KILLED:
             self._leave_behind()
             loop = asyncio.get_running_loop()
-            loop.call_soon(_die)  # not from here: that of a task would be heard of only later
+            loop.call_soon(_die)  # an exception in a task would surface only later
             await loop.create_future()
 
     def _drawn(self, boundary: str, possible: tuple[str, ...]) -> str | None:
@@ -159,21 +163,21 @@ class Crashes(Generic[_Result]):
         return what
 
     def _overtake(self) -> None:
-        assert self._store is not None  # noqa: S101  somebody watches
+        assert self._store is not None  # noqa: S101  `watch` has set it
         self._calm = True
         self._heir = _Heir(self._store, self._live, self.folder)
 
     def _leave_behind(self) -> None:
-        """What the next life finds; nothing happens any more to the program that dies."""
+        """Copy the files for the next life; the dying program has no further crashes."""
         self._calm = True
         _copy(self.folder, self._root / f"life{self.life + 1}")
 
 
 class _Heir(Generic[_Result]):
-    """Another program that has gone on with a run to its end, while the first still believes that it is its own."""
+    """Another program that has run a run to its end, while the first still writes as its owner."""
 
     def __init__(self, store: Path, live: Callable[[Path], _Result] | None, folder: Path) -> None:
-        assert live is not None  # noqa: S101  somebody is living
+        assert live is not None  # noqa: S101  `survive` has set it
         self._store = store
         self._results: list[_Result] = []
         for lock in folder.glob("*-lock"):
@@ -184,7 +188,7 @@ class _Heir(Generic[_Result]):
         self._left = _told(store)
 
     def result(self, problems: list[str]) -> _Result:
-        """What came of it; it is a problem if anything was written since."""
+        """Return its result; add a problem if the old program has written since."""
         if _told(self._store) != self._left:
             problems.append("an old sequencer went on writing a run that another had taken over")
         if not self._results:

@@ -1,4 +1,4 @@
-"""The machine alone: events by hand, a clock that moves when it is told to, no skills and no loop."""
+"""Dry run of the machine alone: events by hand, and a clock that moves on command; without skills and loop."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
 _ROUNDING = 1e-9
-"""Seconds by which sums of floating-point numbers may miss each other."""
+"""Tolerance in seconds for sums of floating-point numbers."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Due:
-    """An event that comes at a certain time, unless its activation is left, its skill answers, or it is withdrawn.
+    """A pending event; an exit of its activation, its skill's answer or a withdrawal drops it.
 
-    `action_id` is that of the skill, `sent` the plot instance and id by which it can be withdrawn.
+    `action_id` identifies the skill, `sent` the plot instance and the id for a withdrawal.
     """
 
     at: float
@@ -39,17 +39,17 @@ class _Due:
 
 
 class DryRun:
-    """A plot that has been started and waits for what the test does to it.
+    """A started plot that waits for calls of the test.
 
     Args:
         plots: the library, or its plots.
         plot: the name of the one to run.
         arguments: values for its parameters.
-        knowledge: the world model, which the plot changes; an empty one if left out.
+        knowledge: the world model, which the plot changes; by default an empty one.
 
     Attributes:
         library: its plots.
-        machine: the machine; its state can be looked at.
+        machine: the machine, with its state.
         knowledge: the world model.
         now: seconds since the start.
         steps: all steps so far; see `predicates`.
@@ -57,7 +57,7 @@ class DryRun:
 
     Raises:
         InputError: the plot is unknown, or a parameter is missing or unknown.
-        RunawayError: the chart does not come to rest.
+        RunawayError: a macrostep does not end.
     """
 
     def __init__(
@@ -92,22 +92,22 @@ class DryRun:
         return tuple(event for step in self.steps for event in step.emitted)
 
     def send(self, event: str, /, **attributes: Any) -> Step:
-        """An event from outside, which everybody sees."""
+        """Send an event from outside to all states."""
         return self._send(Event(event, attributes))
 
     def answer(
         self, skill: str, event: str, attributes: Mapping[str, Any] | None = None, *, observed: Delta | str = ""
     ) -> Step:
-        """A running skill (`component.skill`; the one started first, if there are several) ends with an outcome.
+        """End a running skill (`component.skill`; the one started first, if there are several) with an outcome.
 
         Args:
-            skill: which.
+            skill: its name.
             event: its outcome, under the skill's own name for it.
             attributes: the event's attributes.
-            observed: what is known with it: a change, or a PDDL effect in which `?name` stands for an argument.
+            observed: knowledge that comes with it: a change, or a PDDL effect in which `?name` stands for an argument.
 
         Returns:
-            The step; where it is not `handled`, a sequencer would end the run.
+            The step; if it is not `handled`, a sequencer would end the run.
 
         Raises:
             UnknownNameError: no such skill is running.
@@ -121,16 +121,16 @@ class DryRun:
         return self._send(Event(start.names.get(event, event), attributes or {}, to=start.activation))
 
     def change(self, what: Delta | str, author: str = "somebody") -> Step:
-        """Somebody changes the knowledge: a change, or a PDDL effect on the world as it is now."""
+        """Change the knowledge from outside: a change, or a PDDL effect on the present world."""
         self.knowledge.apply(change_of(what, self.knowledge), author)
         return self._send(None)
 
     def leave(self) -> Step:
-        """The run is ended from outside: everything active is left, and its exit actions put components at rest."""
+        """End the run from outside: exit all active states, whose exit actions stop the components."""
         return self._keep(self.machine.leave(self._situation()))
 
     def advance(self, seconds: float) -> tuple[Step, ...]:
-        """Let time pass; what is due meanwhile comes in order, a skill that has not answered in time as `timed_out`.
+        """Advance the time; pending events come in order, a skill beyond its time limit ends with `timed_out`.
 
         Raises:
             InputError: time does not go backwards.

@@ -1,7 +1,7 @@
-"""Faults around any component, planner or sequencer: each a function of the seed and of what it hits (S0.15).
+"""Faults around any component, planner or sequencer: each a function of the seed and of its subject (S0.15).
 
-No draw depends on how many were made before. So a run that is resumed, whose actions have the ids they had, meets the
-same faults again, and a seed is all that is needed to see a failure once more.
+No draw depends on the number of earlier draws. A resumed run, whose actions keep their ids, therefore meets the same
+faults again. A seed suffices to reproduce a failure.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 
 SOMEBODY = "somebody"
-"""Author of the changes that others make."""
+"""Author of the changes by others."""
 LATE = 5.0
-"""Seconds that an answer, an event or somebody's change comes late at most."""
+"""Upper bound in seconds of the delay of an answer, an event or another's change."""
 AT_THE_END = 0.5
-"""Share of what others say while an action is under way that they say just when it ends."""
+"""Share of external changes and events during an action that come exactly at its end."""
 DEAD = 20.0
-"""Seconds until a component that died is back."""
+"""Seconds until a dead component is back."""
 
 
 class Fault(StrEnum):
-    """What can go wrong."""
+    """Kinds of faults."""
 
     SKILL_FAILS = "skill fails"
     SKILL_HANGS = "skill hangs"
@@ -56,7 +56,7 @@ class Fault(StrEnum):
 
 
 USUAL = frozenset(Fault) - {Fault.ANSWER_LOST}
-"""All after which the plot still knows what was done: in the others nothing was, or it is told in the end."""
+"""Faults after which the plot knows what was done: the action had no effect, or its answer arrives at last."""
 _OF_SKILLS = (
     Fault.SKILL_FAILS, Fault.SKILL_HANGS, Fault.COMPONENT_DIES, Fault.ANSWER_LATE, Fault.ANSWER_TWICE,
     Fault.ANSWER_LOST,
@@ -66,26 +66,26 @@ _Component = TypeVar("_Component", bound=Component)
 
 
 class InjectedError(Exception):
-    """A skill failed because it was to."""
+    """A skill that failed by injection."""
 
 
 class Faults:
-    """Decides on faults, makes them happen, and remembers them.
+    """Draws faults, injects them, and records them.
 
-    A skill that fails or hangs, and one whose component dies, has done nothing. An answer that is lost belongs to a
-    skill that has done its work and hangs then. Events (`@event`) come late, and so in another order, or twice; they
-    are never lost, since who waits for one may wait for ever: what a network loses, `LossyTransport` loses.
+    A skill that fails or hangs, and one whose component dies, has done nothing. A skill with a lost answer has done its
+    work and then hangs. Events (`@event`) come late, and so in another order, or twice. They are never lost, because a
+    plot might wait for one without end; `LossyTransport` models such losses.
 
     Args:
         seed: of all draws.
-        chance: of a fault for each call, each event and each problem that is planned for, in [0, 1].
-        kinds: what may happen.
+        chance: of a fault for each call, each event and each planning problem, in [0, 1].
+        kinds: the possible faults.
 
     Attributes:
-        fired: what happened, by what it happened to: the same fault met again in a resumed run is one.
+        fired: subject -> its fault; a resumed run that meets the fault again adds no entry.
 
     Raises:
-        InputError: the chance is none.
+        InputError: the chance is outside its range.
     """
 
     def __init__(self, seed: int, chance: float = 0.1, kinds: Collection[Fault] = USUAL) -> None:
@@ -98,9 +98,9 @@ class Faults:
         self._at_end: dict[str, list[Callable[[], None]]] = {}
 
     def draw(self, subject: str, possible: Collection[Fault], part: float = 1.0) -> Fault | None:
-        """The fault that hits the subject, e.g. an action by its id, if one does, with that part of the chance.
+        """Return the fault of a subject, e.g. an action by its id, or `None`; `part` scales the chance.
 
-        It counts as fired.
+        The fault counts as fired.
         """
         kinds = [kind for kind in possible if kind in self.kinds]
         if not kinds or uniform(self.seed, subject, "fault") >= self.chance * part:
@@ -109,24 +109,24 @@ class Faults:
         return self.fired[subject]
 
     def share(self, subject: str) -> float:
-        """How much of it: a number in [0, 1) that belongs to the subject."""
+        """Return the subject's number in [0, 1), for the extent of its fault."""
         return uniform(self.seed, subject, "share")
 
     def counts(self) -> Counter[str]:
-        """How often each kind fired."""
+        """Return the number of each kind that fired."""
         return Counter(map(str, self.fired.values()))
 
     def inject(self, component: _Component) -> _Component:
-        """Let faults happen in all that this component carries out from now on; returns it."""
+        """Inject faults into all later actions of this component; return it."""
         component.execute = _Injected(component, self)  # type: ignore[method-assign]
         return component
 
     def meddle(self, sequencer: Sequencer, changes: Callable[[], Sequence[Delta]]) -> None:
-        """Let somebody change the knowledge while actions are under way, or just when they end.
+        """Let another author change the knowledge during actions, or exactly at their end.
 
         Args:
             sequencer: of the run, before it starts.
-            changes: what somebody else might truly say at that moment; one of them is handed in.
+            changes: returns true changes that another author might make at that moment; one of them is made.
         """
 
         def hand_in(subject: str) -> None:
@@ -137,19 +137,19 @@ class Faults:
         self._during_actions(sequencer, Fault.KNOWLEDGE_CHANGED, "during", hand_in)
 
     def interrupt(self, sequencer: Sequencer, event: Event, part: float = 0.3) -> None:
-        """Let an event come from outside while actions are under way or just when they end, e.g. an operator's `stop`.
+        """Let an event come from outside during actions or exactly at their end, e.g. an operator's `stop`.
 
         Args:
             sequencer: of the run, before it starts.
-            event: what is handed in.
-            part: of the chance of other faults; a run that is stopped has not much left that could go wrong.
+            event: the event.
+            part: of the chance of other faults; a stopped run has few remaining faults.
         """
         self._during_actions(
             sequencer, Fault.INTERRUPTED, f"{event.name} during", lambda _: sequencer.post(event), part
         )
 
     def ended(self, action_id: str) -> None:
-        """An action of a component with faults has done its work, and says so now; others speak at the same moment."""
+        """Report the end of an action of a component with faults; trigger the faults at this moment."""
         for happen in self._at_end.pop(action_id, ()):
             asyncio.get_running_loop().call_soon(happen)
 
@@ -170,7 +170,7 @@ class Faults:
 
 
 class _Injected:
-    """Stands in the place of a component's `execute`."""
+    """Replaces a component's `execute`."""
 
     def __init__(self, component: Component, faults: Faults) -> None:
         self._component = component
@@ -188,7 +188,7 @@ class _Injected:
         if fault is Fault.ANSWER_LOST:
             await _never(call)
         if fault is Fault.ANSWER_LATE:
-            with suppress(asyncio.CancelledError):  # it is done: told to stop, it can only say so
+            with suppress(asyncio.CancelledError):  # its work is done: a cancellation can only return its outcome
                 await call.clock.sleep(min(LATE, call.remaining / 2) * self._faults.share(call.action_id))
         if fault is Fault.ANSWER_TWICE:
             call.report(outcome)
@@ -206,7 +206,7 @@ class _Injected:
             await _never(call)
 
     def _events(self, call: SkillCall) -> Callable[[Outcome], None]:
-        """Hands events over, as late and as often as it falls to each."""
+        """Return a report function that delivers events with the delay or repetition drawn for each."""
         number = 0
 
         def report(outcome: Outcome) -> None:
@@ -230,8 +230,8 @@ def _revive(life: LifeCycle) -> None:
 
 
 async def _never(call: SkillCall) -> NoReturn:
-    """Until the deadline, or until the dispatcher has heard that the component is dead."""
+    """Wait for the deadline, or for the dispatcher's reaction to the component's death."""
     if math.isinf(call.deadline):
-        raise InjectedError("it was to hang, and would for ever")
+        raise InjectedError("it was to hang, and has no deadline")
     await asyncio.get_running_loop().create_future()
     raise AssertionError

@@ -1,4 +1,4 @@
-"""What reaches a sequencer at one moment, in another order in which it might have come as well."""
+"""Interleaving of simultaneous messages to a sequencer, in an order that could also have occurred."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from dsc.sequencer.sequencer import Sequencer
 
 
 class Interleaving:
-    """Shuffles from a seed what simulated time lets come at one moment.
+    """Shuffles messages of one moment of simulated time by a seed.
 
-    Before each macrostep it waits until nothing more happens at the moment, and draws whose message is taken first.
-    What comes from one place keeps its order, as every communication pattern promises: the events and the answer of
-    one action, the chart's timers, the changes that one author makes, what comes from outside. All else may come in
-    any order: answers of different actions, an answer and the timeout that is due with it, a change that somebody
-    else makes and what the robot sees itself.
+    Before each macrostep it waits for all messages of the moment, and draws the source of the next one. Messages of one
+    source keep their order, as every communication pattern promises. Sources are the events and the answer of one
+    action, the chart's timers, the changes of one author, and events from outside. Messages of different sources may
+    come in any order, such as an answer and its timeout.
 
     Args:
         seed: of all draws.
 
     Attributes:
-        turned: how often another message was taken than the one that came first.
+        turned: number of messages taken before an earlier one.
     """
 
     def __init__(self, seed: int) -> None:
@@ -33,7 +32,7 @@ class Interleaving:
         self._turn = 0
 
     def attach(self, sequencer: Sequencer) -> None:
-        """Shuffle what this sequencer takes, from before its run starts or is resumed."""
+        """Shuffle the messages of this sequencer; call it before its run starts or is resumed."""
 
         async def settle() -> None:
             await sequencer.clock.settled()
@@ -42,7 +41,7 @@ class Interleaving:
         sequencer.wait_before_events(settle)
 
     def _shuffled(self, waiting: Iterable[Message]) -> Iterable[Message]:
-        """One source goes first, and all others keep their places: they are drawn anew before the next macrostep."""
+        """Move one source to the front and keep the order of the others; the next macrostep draws again."""
         messages = list(waiting)
         sources = list(dict.fromkeys(map(_source, messages)))
         if len(sources) > 1:
@@ -55,7 +54,7 @@ class Interleaving:
 
 
 def _source(message: Message) -> str:
-    """Where it comes from; what comes from one source comes in its order."""
+    """Return the source of a message; messages of one source keep their order."""
     match message:
         case LateMessage():
             return _source(message.message)

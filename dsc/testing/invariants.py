@@ -1,4 +1,4 @@
-"""What must hold of every run that is kept, however it went; asked of its store, also while it goes on."""
+"""Invariants of every kept run, checked in its store, also during the run."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class KeptRun:
 
     Attributes:
         path: the store.
-        ended: `finished` and `problem`, how it came to its end; `None` while it has not.
+        ended: `finished` and `problem` of its end; `None` before the end.
         steps: its macrosteps.
-        knowledge: what is known now; read only.
+        knowledge: the present knowledge; read only.
     """
 
     path: Path
@@ -37,22 +37,22 @@ class KeptRun:
 
     @property
     def records(self) -> Iterator[Record]:
-        """The records of its trace, in order."""
+        """Yield the records of its trace, in order."""
         return (record for step in self.steps for record in step.records)
 
     @property
     def started(self) -> list[str]:
-        """The ids of the actions that were started, in order, as far as it is committed."""
+        """Return the ids of the started actions, in order, up to the last commit."""
         return [one.data["id"] for one in self.records if one.type == "action" and one.data["action"] == "start"]
 
 
 Invariant = Callable[[KeptRun], Iterable[str]]
-"""Says what is wrong; nothing if it holds."""
+"""Yields a message for each violation."""
 
 
 @contextmanager
 def kept_run(store: Path) -> Iterator[KeptRun]:
-    """The last run of a store, to be looked at; raises `StoreError` if there is none."""
+    """Yield the last run of a store; raise `StoreError` if there is none."""
     with archive(store) as runs:
         run = runs.run()
         steps = tuple(runs.steps(run.number))
@@ -61,7 +61,7 @@ def kept_run(store: Path) -> Iterator[KeptRun]:
 
 
 def violations(store: Path, invariants: Iterable[Invariant]) -> list[str]:
-    """All that is wrong with the last run of a store, or that the store is damaged; `StoreError` if there is none."""
+    """Return all violations in the last run of a store, or its damage; raise `StoreError` if there is none."""
     try:
         with kept_run(store) as run:
             return [wrong for invariant in invariants for wrong in invariant(run)]
@@ -70,7 +70,7 @@ def violations(store: Path, invariants: Iterable[Invariant]) -> list[str]:
 
 
 def comes_to_an_end(seconds: float) -> Invariant:
-    """It has ended, within so many seconds of run time."""
+    """Require an end within this number of seconds of run time."""
 
     def invariant(run: KeptRun) -> Iterable[str]:
         last = run.steps[-1].time
@@ -83,16 +83,16 @@ def comes_to_an_end(seconds: float) -> Invariant:
 
 
 def executed_once(executed: Iterable[str]) -> Invariant:
-    """What the robot did, by action id, was committed before, and is done once.
+    """Require that each executed action, by id, was committed before, and executed once.
 
     Args:
-        executed: an id for each time that something was done.
+        executed: an id for each execution.
 
     Raises:
-        InputError: it is a mapping or a set, in which no action could stand twice.
+        InputError: it is a mapping or a set, which cannot contain an action twice.
     """
     if isinstance(executed, Mapping | AbstractSet):
-        raise InputError(f"what was done is told in order, each time anew; a {type(executed).__name__} has an id once")
+        raise InputError(f"executions form a sequence, with repeated ones; a {type(executed).__name__} has an id once")
     counts = Counter(executed)
 
     def invariant(run: KeptRun) -> Iterable[str]:
@@ -110,7 +110,7 @@ def executed_once(executed: Iterable[str]) -> Invariant:
 
 
 def knows(facts: Iterable[Fact], predicates: Iterable[str]) -> Invariant:
-    """Of these predicates exactly those facts are known that hold in the world."""
+    """Require that the knowledge of these predicates equals the facts that hold in the world."""
     true, judged = frozenset(facts), frozenset(predicates)
 
     def invariant(run: KeptRun) -> Iterable[str]:
@@ -124,7 +124,7 @@ def knows(facts: Iterable[Fact], predicates: Iterable[str]) -> Invariant:
 
 
 def claims_nothing_false(claims: Callable[[KeptRun], bool], *, reached: bool) -> Invariant:
-    """The goal is claimed only when it is reached in the world."""
+    """Require that the run claims the goal only when the world has reached it."""
 
     def invariant(run: KeptRun) -> Iterable[str]:
         if claims(run) and not reached:
@@ -134,17 +134,17 @@ def claims_nothing_false(claims: Callable[[KeptRun], bool], *, reached: bool) ->
 
 
 def one_history(run: KeptRun) -> Iterable[str]:
-    """Its macrosteps follow one another: nobody else has written any beside."""
+    """Require that its macrosteps are consecutive: no other program has added any."""
     numbers = [step.number for step in run.steps]
     if numbers != list(range(1, len(numbers) + 1)):
         yield f"its macrosteps are numbered {numbers}"
 
 
 def replays(library: Library | None = None) -> Invariant:
-    """The messages that were taken lead to the same once more.
+    """Require that a replay of the messages gives the same results.
 
     Args:
-        library: the plots it was begun with, which are read from the store if left out.
+        library: the plots at its start; by default those of the store.
     """
 
     def invariant(run: KeptRun) -> Iterable[str]:

@@ -1,4 +1,4 @@
-"""A transport that does everything a bad network does, from a seed."""
+"""Transport with the faults of a bad network, drawn from a seed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from dsc.components.transport import LocalTransport
 
 
 class LossyTransport(LocalTransport):
-    """Loses, doubles, delays and so reorders frames, the same with the same seed in simulated time.
+    """Loses, doubles, delays and so reorders frames; the same seed gives the same faults in simulated time.
 
     Args:
-        seed: of the frames' fates.
+        seed: of all draws.
         loss: chance that a frame is lost.
         double: chance that one arrives twice.
-        delay: seconds that one takes at most.
+        delay: upper bound of a frame's delay in seconds.
     """
 
     def __init__(self, seed: int, *, loss: float = 0.2, double: float = 0.2, delay: float = 0.1) -> None:
@@ -29,7 +29,7 @@ class LossyTransport(LocalTransport):
         self._sent: Counter[str] = Counter()
 
     def send(self, sender: str, to: str, frame: bytes) -> None:
-        """Let the frame meet its fate, which is its own: the same frame sent again meets another."""
+        """Send a frame with a separate draw of its faults: the same frame sent again has other faults."""
         name = hashlib.blake2b(f"{sender} {to} ".encode() + frame, digest_size=8).hexdigest()
         self._sent[name] += 1
         subject = f"{name} {self._sent[name]}"

@@ -1,8 +1,8 @@
-"""Questions about a step, or about all steps of a run, that read well behind `assert`.
+"""Predicates over a step, or over all steps of a run, for use in `assert`.
 
-States are named by their name or by their path from the outermost plot, e.g. `clear/execute/step_2`. Of a run that
-knows its library (`Rehearsal`, `DryRun`), a question about a state, trigger, rule or skill that no plot has is an
-`UnknownNameError`: the answer could only be no.
+A state is named by its name or by its path from the outermost plot, e.g. `clear/execute/step_2`. A `Rehearsal` or a
+`DryRun` knows its library. Its predicates raise `UnknownNameError` for a state, trigger, rule or skill of no plot,
+because they could never be true.
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ class HasSteps(Protocol):
 
     @property
     def steps(self) -> Sequence[Step]:
-        """In order."""
+        """All steps, in order."""
         ...
 
 
 Run = Step | Iterable[Step] | HasSteps
-"""What can be asked about: one step, several, or whatever has them."""
+"""Subject of a predicate: one step, several, or an object with steps."""
 
 
 def entered(run: Run, state: str) -> bool:
-    """Whether the state was entered."""
+    """Return whether the state was entered."""
     _check(run, state=state)
     return any(step.entered(state) for step in _steps(run))
 
 
 def exited(run: Run, state: str) -> bool:
-    """Whether the state was left."""
+    """Return whether the state was exited."""
     _check(run, state=state)
     return any(step.exited(state) for step in _steps(run))
 
 
 def trail(run: Run) -> tuple[str, ...]:
-    """The paths of all states that were entered, in order."""
+    """Return the paths of all entered states, in order."""
     return tuple(path for micro in _microsteps(run) for path in micro.entered)
 
 
@@ -63,11 +63,11 @@ def took(
     *,
     rule: str | None = None,
 ) -> bool:
-    """Whether a transition was taken; what is left out may be anything.
+    """Return whether a transition was taken; `None` matches any value.
 
     Args:
         run: the steps.
-        source: the state it leaves from.
+        source: the state it leaves.
         trigger: its event, `after` or `always`.
         target: the state it leads to.
         rule: label of the contingency rule it comes from, e.g. `no_path: wait, retry`.
@@ -84,23 +84,23 @@ def took(
 
 
 def consumed(run: Run, event: str, /, **attributes: Any) -> bool:
-    """Whether a transition took such an event, from outside or fired within; attributes left out may be anything."""
+    """Return whether a transition took such an event, from outside or inside; omitted attributes match any value."""
     _check(run, trigger=event)
     return any(_is_event(micro.event, event, attributes) for micro in _microsteps(run))
 
 
 def ignored(run: Run, event: str, /, **attributes: Any) -> bool:
-    """Whether such an event came and no transition took it."""
+    """Return whether such an event came and no transition took it."""
     return any(_is_event(step.event, event, attributes) and not step.handled for step in _steps(run))
 
 
 def emitted(run: Run, event: str, /, **attributes: Any) -> bool:
-    """Whether the outermost plot ended with, or emitted, such an outcome; see `consumed` for those further in."""
+    """Return whether the outermost plot emitted such an outcome; see `consumed` for inner plots."""
     return any(_is_event(one, event, attributes) for step in _steps(run) for one in step.emitted)
 
 
 def started(run: Run, skill: str, /, **arguments: Any) -> bool:
-    """Whether the skill (`component.skill`) was started; arguments left out may be anything."""
+    """Return whether the skill (`component.skill`) was started; omitted arguments match any value."""
     _check(run, skill=skill)
     return any(
         f"{output.component}.{output.skill}" == skill and _has(output.arguments, arguments)
@@ -110,7 +110,7 @@ def started(run: Run, skill: str, /, **arguments: Any) -> bool:
 
 
 def configured(run: Run, parameter: str, value: Any) -> bool:
-    """Whether a component's parameter (`component.parameter`) was set to the value."""
+    """Return whether a component's parameter (`component.parameter`) was set to the value."""
     return any(
         f"{output.component}.{output.parameter}" == parameter and output.value == value
         for output in _outputs(run)
@@ -119,7 +119,7 @@ def configured(run: Run, parameter: str, value: Any) -> bool:
 
 
 def switched(run: Run, component: str, mode: str) -> bool:
-    """Whether the component was put into the mode."""
+    """Return whether the component was put into the mode."""
     return any(
         (output.component, output.mode) == (component, mode)
         for output in _outputs(run)
@@ -128,7 +128,7 @@ def switched(run: Run, component: str, mode: str) -> bool:
 
 
 def chose(run: Run, state: str, plot: str | None) -> bool:
-    """Whether a dynamic state chose the plot; `None`: no candidate fitted."""
+    """Return whether a dynamic state chose the plot; `None` means that no candidate fitted."""
     _check(run, state=state)
     return any(
         _named(made.state, state) and made.decision.chosen == plot and not made.decision.satisfied
@@ -138,12 +138,12 @@ def chose(run: Run, state: str, plot: str | None) -> bool:
 
 
 def told(run: Run, what: str) -> bool:
-    """Whether one step told the knowledge base all of it, e.g. `(and (tidy cup) (not (seen cup)))`.
+    """Return whether one step made the whole change, e.g. `(and (tidy cup) (not (seen cup)))`.
 
-    A number is written as in an effect: `(assign (failures cup) 2)` is what came out of any arithmetic.
+    A number is written as in an effect: `(assign (failures cup) 2)` matches the result of any arithmetic.
 
     Raises:
-        InputError: it is not made of facts, facts that no longer hold, and numbers.
+        InputError: a part is not a fact, a negated fact, or an assigned number.
     """
     wanted = tuple(_parts(parse_effect(what)))
     return any(all(_tells(step, part) for part in wanted) for step in _steps(run))
@@ -152,7 +152,7 @@ def told(run: Run, what: str) -> bool:
 def _check(run: Run, **names: str | None) -> None:
     if isinstance(run, Step | Iterable):
         return
-    bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)  # with what rules and planners added
+    bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)  # includes those of rules and planners
     KnownNames([*run.library, *bound]).check(**names)
 
 
@@ -193,7 +193,7 @@ def _parts(effect: Effect) -> Iterator[Add | Delete | NumericEffect]:
     elif isinstance(effect, Add | Delete) or (isinstance(effect, NumericEffect) and effect.operator == "assign"):
         yield effect
     else:
-        raise InputError("what was told is asked for as facts, (not FACT) and (assign (FUNCTION ...) NUMBER)")
+        raise InputError("a change consists of facts, (not FACT) and (assign (FUNCTION ...) NUMBER)")
 
 
 def _tells(step: Step, part: Add | Delete | NumericEffect) -> bool:
@@ -207,5 +207,5 @@ def _fact(form: Atom | Call) -> Fact:
     name = form.predicate if isinstance(form, Atom) else form.function
     for argument in form.args:
         if not isinstance(argument, Constant):
-            raise InputError(f"'{argument}' has no value; what was told has none but things and numbers in it")
+            raise InputError(f"'{argument}' has no value; a change contains only objects and numbers")
     return Fact(name, tuple(argument.value for argument in form.args if isinstance(argument, Constant)))

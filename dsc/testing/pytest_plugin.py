@@ -1,8 +1,7 @@
-"""For pytest, where it is asked for: `pytest_plugins = ["dsc.testing.pytest_plugin"]`.
+"""Plugin for pytest, on request: `pytest_plugins = ["dsc.testing.pytest_plugin"]`.
 
-With `dsc_plots = FOLDER ...` in pytest's own settings, the fixture `plot_coverage` counts for the whole session
-what tests add to it, and the summary ends with its report. Workers of pytest-xdist count each for themselves, and
-nobody reports.
+With `dsc_plots = FOLDER ...` in pytest's own settings, the fixture `plot_coverage` counts the steps that tests add
+during the session. The summary ends with its report. Each worker of pytest-xdist counts separately, without a report.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ _COVERAGE = pytest.StashKey[Coverage]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The setting `dsc_plots`."""
+    """Add the setting `dsc_plots`."""
     parser.addini("dsc_plots", "folders of the plots that plot_coverage covers", type="paths", default=[])
 
 
 @pytest.fixture(scope="session")
 def plot_coverage(pytestconfig: pytest.Config) -> Coverage:
-    """One `Coverage` of all plots in the folders of `dsc_plots`, for the whole session."""
+    """Return one `Coverage` of all plots in the folders of `dsc_plots`, for the whole session."""
     folders: list[Path] = pytestconfig.getini("dsc_plots")
     if not folders:
         raise pytest.UsageError("plot_coverage needs the setting `dsc_plots`: the folders with the plots")
@@ -32,7 +31,7 @@ def plot_coverage(pytestconfig: pytest.Config) -> Coverage:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """The report, if any test used the fixture."""
+    """Print the report, if any test used the fixture."""
     coverage = config.stash.get(_COVERAGE, None)
     if coverage is not None:
         terminalreporter.section("plot coverage")

@@ -1,4 +1,4 @@
-"""A whole run of a plot without a robot: scripted skills, simulated time, everything that happened at hand."""
+"""Rehearsal of a whole run without a robot: scripted skills, simulated time, and all steps for inspection."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
 SOMEBODY = "somebody"
-"""Author of the changes that a test hands in."""
+"""Author of the changes that a test makes."""
 A_DAY = 86400.0
-"""Seconds after which a rehearsal ends if nothing else is said: none goes on for ever."""
+"""Seconds after which a rehearsal ends by default: every rehearsal ends."""
 MOST_STEPS = 100_000
-"""Nor does one in which time stands still."""
+"""Upper bound, also for a run in which time does not advance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
-    """What happened.
+    """The record of a rehearsed run.
 
     Attributes:
-        library: the plots that could be used.
-        end: how the run ended.
-        seconds: how long it took, in simulated time.
+        library: the available plots.
+        end: the end of the run.
+        seconds: its duration, in simulated time.
         steps: all macrosteps; see `predicates`.
         calls: the calls of scripted skills, in order.
         records: the trace.
-        knowledge: what is known at the end.
+        knowledge: the knowledge at the end.
     """
 
     library: Library
@@ -59,7 +59,7 @@ class Rehearsal:
 
     @property
     def problem(self) -> str | None:
-        """Why it did not, or what went wrong in its last step."""
+        """The reason why it did not, or an error of its last step."""
         return self.end.problem
 
     @property
@@ -81,25 +81,25 @@ def rehearse(
     changes: Iterable[tuple[float, Delta | str]] = (),
     until: float = A_DAY,
 ) -> Rehearsal:
-    """Run a plot to its end in simulated time; it takes no real time to speak of.
+    """Run a plot to its end in simulated time, which takes almost no real time.
 
     Args:
         plots: the library, or its plots.
         plot: the name of the one to run.
         arguments: values for its parameters.
-        skills: what scripted skills answer; see `ScriptedSkills`.
-        like: components whose signatures the scripted skills keep to.
-        components: others to be deployed, as they are.
-        knowledge: the world model, which the run changes; see `world`. An empty one if left out.
-        events: what comes from outside, each with the second at which it does; a name alone has no attributes.
-        changes: how others change the knowledge, each with the second: a change, or a PDDL effect on the world at
+        skills: the answers of scripted skills; see `ScriptedSkills`.
+        like: components with the signatures of the scripted skills.
+        components: others to be deployed, unchanged.
+        knowledge: the world model, which the run changes; see `world`. By default an empty one.
+        events: events from outside, each with its second; a name alone has no attributes.
+        changes: changes of the knowledge by others, each with its second: a change, or a PDDL effect on the world at
             the start.
         until: seconds after which the run is ended, with that as its problem.
 
     Raises:
-        InputError: the plot is unknown, an argument is wrong, an event or change cannot be handed in, or the
-            script does not fit: a skill that was called without an answer, an answer that is none of the skill's.
-        Exception: what a function of the script raised, e.g. a failed assertion about its call.
+        InputError: the plot is unknown, an argument is wrong, or an event or change is invalid. The script does not
+            match: a called skill has no answer, or an answer is not one of the skill's.
+        Exception: an exception of a function of the script, e.g. a failed assertion about its call.
     """
     known = knowledge if knowledge is not None else world()
     scripted = ScriptedSkills(known, skills or {}, like)

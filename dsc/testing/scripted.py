@@ -1,4 +1,4 @@
-"""Components whose skills answer what the test has laid down, and remember how they were called."""
+"""Components with scripted skills, which answer by the test's script and record their calls."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from knowledge_base.store import KnowledgeBase
 
 
 class ScriptedSkills:
-    """A robot made of answers.
+    """A robot with scripted answers.
 
     Args:
-        knowledge: the world model of the run; effects in answers are applied to what it knows.
-        script: `component.skill` -> what it answers.
-        like: components whose skills are imitated: only what they declare is answered, and only with the arguments
-            that they take can they be called. A component that is not among them takes any arguments.
+        knowledge: the world model of the run; effects in answers apply to it.
+        script: `component.skill` -> its answers.
+        like: components to imitate: their skills accept only the declared arguments and give only declared answers. A
+            component outside this list accepts any arguments.
 
     Attributes:
-        components: to be deployed in place of the real ones.
-        calls: what was called, in order.
-        problems: where the script and the run did not fit, and what functions of the script raised; see `check`.
+        components: replacements for the real ones, to be deployed.
+        calls: the calls, in order.
+        problems: mismatches of script and run, and exceptions of the script's functions; see `check`.
 
     Raises:
         InputError: the script names a skill, outcome or attribute that a component in `like` does not have.
@@ -47,15 +47,15 @@ class ScriptedSkills:
                     component.check(skill, replies.known)
 
     def check(self) -> None:
-        """Raise the first problem: a call without an answer, an answer that is none of the skill's, a failed assertion.
+        """Raise the first problem: a call without an answer, an answer that is not the skill's, a failed assertion.
 
-        Seen from the plot such a skill has merely broken, and the plot may well cope with that.
+        To the plot such a skill has merely failed, and the plot may handle the failure.
         """
         if self.problems:
             raise self.problems[0]
 
     def reply(self, call: Call) -> Answer | Exception:
-        """The answer to a call.
+        """Return the answer to a call.
 
         Raises:
             UnknownNameError: the script does not have the skill.
@@ -68,7 +68,7 @@ class ScriptedSkills:
 
 
 class _ScriptedComponent(Component):
-    """One component of the script, imitating another's skills or free."""
+    """One component of the script, which imitates another's skills or is free."""
 
     def __init__(self, name: str, script: ScriptedSkills, imitated: Mapping[str, SkillSignature] | None) -> None:
         super().__init__(name)
@@ -77,11 +77,11 @@ class _ScriptedComponent(Component):
         self._signatures = dict(imitated or {})
 
     def skills(self) -> dict[str, SkillSignature]:
-        """The imitated skills, or those of the script as far as they are known."""
+        """Return the imitated skills, or the known ones of the script."""
         return self._signatures
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-        """Take the time that the script says, and answer."""
+        """Wait for the scripted time, and answer."""
         made = Call(f"{self.name}.{skill_name}", dict(arguments), call.clock.now())
         answer = self._reply(skill_name, made)
         if isinstance(answer, Exception):
@@ -105,10 +105,10 @@ class _ScriptedComponent(Component):
         return answer
 
     def check(self, skill: str, answers: Iterable[Answer]) -> None:
-        """Whether the skill may answer so; a free one may answer anything, and declares it from now on.
+        """Check an answer of the skill; a free one may give any answer, and declares it from now on.
 
         Raises:
-            InputError: it may not.
+            InputError: the skill does not have this answer.
         """
         name = skill.partition(".")[2]
         if not self._imitates:
@@ -129,7 +129,7 @@ class _ScriptedComponent(Component):
         except Exception as problem:
             self._script.problems.append(problem)
             raise
-        self.check(call.skill, (answer,))  # a free one declares it anew: other answers may have had other attributes
+        self.check(call.skill, (answer,))  # a free one declares it again: attributes may differ
         return Outcome(answer.event, answer.attributes, observed)
 
 

@@ -1,4 +1,4 @@
-"""Plots that just end, to stand in for a whole branch in a test."""
+"""Stub plots that only end, as substitutes for a whole branch in a test."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def ends_with(
     tell: str | None = None,
     after: float = 0.0,
 ) -> ActionPlot:
-    """A plot with the original's interface and part that does nothing but end; for `Library.substitute`.
+    """Return a plot with the original's interface and role that only ends; for `Library.substitute`.
 
     Args:
-        original: the plot whose place it shall take.
+        original: the plot to replace.
         outcome: one of its outcome events, or `done`.
-        attributes: the event's attributes, as a plot writes them: constants, or `?name` for a parameter; with
-            `done`, values for its outputs.
-        tell: what it tells the knowledge base, as a PDDL effect: what the original would have achieved.
+        attributes: the event's attributes as in a plot: constants, or `?name` for a parameter; with `done`, values for
+            its outputs.
+        tell: a PDDL effect on the knowledge base, in place of the original's work.
         after: seconds until it ends.
 
     Raises:
@@ -55,7 +55,7 @@ def ends_with(
 
 
 def _output(output: PlotVariable) -> dict[str, Any]:
-    """An output that has a value in any case, though nobody reads it where the ending is not `done`."""
+    """Return an output with a value in every case; it is only read if the outcome is `done`."""
     nothing = 0 if output.type == "number" else "nothing"
     return {"type": output.type, "initial": nothing if output.initial is None else output.initial}
 

@@ -1,4 +1,4 @@
-"""What any transport must pass: subclass `TransportSuite` in a test file and say how one is made.
+"""Test suite for any transport: subclass `TransportSuite` in a test file, with a function that creates a transport.
 
     class TestZenoh(TransportSuite):
         run = staticmethod(run_real)
@@ -6,8 +6,8 @@
         def transport(self) -> Transport:
             return ZenohTransport()
 
-Two endpoints, or a hosted component and its user, talk over one transport; what the patterns promise is judged, so a
-transport may lose, double, delay and reorder frames.
+Two endpoints, or a hosted component and its user, talk over one transport. The suite checks the promises of the
+patterns, so that a transport may lose, double, delay and reorder frames.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 
 PATIENCE = 20.0
-"""Seconds of loop time in which what was promised has to come true."""
+"""Seconds of loop time within which each promise must be kept."""
 
 
 class SuiteRobot(Component):
-    """Has every port there is."""
+    """Has every kind of port."""
 
     name = "robot"
     modes = ("scanning", "resting")
@@ -76,21 +76,21 @@ class SuiteRobot(Component):
 
     @event({"level": "number"})
     def low(self, level: float, below: float = 20.0) -> dict[str, Any] | None:
-        """Whether the level is low."""
+        """Return the event's attributes if the level is low."""
         return {"level": level} if level < below else None
 
     @takes
     async def say(self, text: str) -> None:
-        """Remember it."""
+        """Record the text."""
         self.log.append(text)
 
     async def configure(self, parameter: str, value: object) -> None:
-        """Remember it."""
+        """Record the setting."""
         self.log.append((parameter, value))
 
 
 class Laser(Component):
-    """Pushes."""
+    """Publishes values."""
 
     name = "laser"
     scan = Push({"metres": "number"})
@@ -98,12 +98,12 @@ class Laser(Component):
 
     @query({"metres": "number"})
     async def measure(self) -> dict[str, Any]:
-        """Ask for what is pushed."""
+        """Return the published value."""
         return {"metres": 9}
 
 
 class Mapper(Component):
-    """Takes what is pushed."""
+    """Subscribes to values."""
 
     name = "mapper"
     scan = Stream("laser.scan", {"metres": "number"})
@@ -111,15 +111,15 @@ class Mapper(Component):
 
 
 async def until(holds: Callable[[], bool]) -> None:
-    """Wait until something holds; fails after `PATIENCE`."""
+    """Wait until a condition holds; fail after `PATIENCE`."""
     async with asyncio.timeout(PATIENCE):
-        while not holds():  # noqa: ASYNC110  # of anything, which may have no event
+        while not holds():  # noqa: ASYNC110  # the condition may have no event
             await asyncio.sleep(0.05)
 
 
 @asynccontextmanager
 async def running(*work: Coroutine[Any, Any, None]) -> AsyncIterator[list[asyncio.Task[None]]]:
-    """Run something meanwhile."""
+    """Run coroutines during the block."""
     tasks = [asyncio.ensure_future(one) for one in work]
     try:
         yield tasks
@@ -139,13 +139,13 @@ class TransportSuite:
     run: Callable[[Coroutine[Any, Any, Any]], Any] = staticmethod(run_simulated)
 
     def transport(self) -> Transport:
-        """A fresh transport; called inside the running loop."""
+        """Return a new transport; called inside the running loop."""
         raise NotImplementedError
 
     # -- calls -------------------------------------------------------------------------------------------
 
     def test_a_call_is_carried_out_once_and_answered(self) -> None:
-        """However often its frame arrives."""
+        """The number of its frames does not matter."""
 
         async def main() -> None:
             transport, done = self.transport(), []
@@ -167,7 +167,7 @@ class TransportSuite:
         self.run(main())
 
     def test_what_cannot_be_done_is_refused_with_the_reason(self) -> None:
-        """A handler that raises, a kind that nobody answers, an answer that is no plain data."""
+        """Cases: a handler that raises, an unknown kind, an answer other than plain data."""
 
         async def main() -> None:
             transport = self.transport()
@@ -188,7 +188,7 @@ class TransportSuite:
         self.run(main())
 
     def test_a_call_has_a_timeout(self) -> None:
-        """To nobody, and to somebody who left."""
+        """Cases: a missing endpoint, and one that has left."""
 
         async def main() -> None:
             transport = self.transport()
@@ -203,7 +203,7 @@ class TransportSuite:
         self.run(main())
 
     def test_nothing_is_shared_by_accident(self) -> None:
-        """Messages are encoded, whatever the distance."""
+        """Messages are encoded, at any distance."""
 
         async def main() -> None:
             transport, kept = self.transport(), []
@@ -223,7 +223,7 @@ class TransportSuite:
         self.run(main())
 
     def test_who_came_back_is_somebody_new(self) -> None:
-        """Its calls are not taken for those of its earlier life."""
+        """Its calls are separate from those of its earlier life."""
 
         async def main() -> None:
             transport, done = self.transport(), []
@@ -245,7 +245,7 @@ class TransportSuite:
     # -- pushes ------------------------------------------------------------------------------------------
 
     def test_the_newest_value_arrives_and_time_never_runs_backwards(self) -> None:
-        """*Push newest*: values may be left out, never go back, and the last one comes through."""
+        """*Push newest*: values may be lost, never go back, and the last one arrives."""
 
         async def main() -> None:
             transport, seen = self.transport(), []
@@ -278,7 +278,7 @@ class TransportSuite:
                 assert mapper.heat.age < 2.0
             assert mapper.scan.value is None
             await host.close()
-            await asyncio.sleep(2.0)  # what is still under way
+            await asyncio.sleep(2.0)  # messages in transit
             with pytest.raises(NoAnswerError, match=r"nothing has come from 'laser\.heat' within 4 s"):
                 await mapper.heat.next(4.0)
             assert mapper.heat.age > 3.0
@@ -287,7 +287,7 @@ class TransportSuite:
         self.run(main())
 
     def test_a_component_that_pushes_is_one_like_any_other(self) -> None:
-        """Its ports share its address with its skills, and are known to its users."""
+        """Its ports share its address with its skills, and its users find them."""
 
         async def main() -> None:
             transport, laser, mapper = self.transport(), Laser(), Mapper()
@@ -308,7 +308,7 @@ class TransportSuite:
         self.run(main())
 
     def test_a_stream_of_something_else_is_refused_with_the_reason(self) -> None:
-        """Where what is pushed is not what is wanted."""
+        """Case: the published type differs from the subscribed one."""
 
         async def main() -> None:
             transport, mapper = self.transport(), Mapper()
@@ -322,7 +322,7 @@ class TransportSuite:
         self.run(main())
 
     def test_a_publisher_that_came_back_is_heard(self) -> None:
-        """It counts anew; its subscribers find it."""
+        """It restarts its count; its subscribers find it."""
 
         async def main() -> None:
             transport = self.transport()
@@ -350,7 +350,7 @@ class TransportSuite:
             await host.close()
 
     def test_a_skill_reports_in_order_and_ends_once(self) -> None:
-        """With what was observed; asked again under the same id it is not carried out again."""
+        """The outcome has its observations; a repeated request with the same id executes nothing."""
 
         async def main() -> None:
             async with self._robot() as (robot, remote, _):
@@ -366,7 +366,7 @@ class TransportSuite:
         self.run(main())
 
     def test_a_skill_that_fails_there_fails_here(self) -> None:
-        """With the reason."""
+        """The failure has the reason."""
 
         async def main() -> None:
             async with self._robot() as (_, remote, __):
@@ -376,7 +376,7 @@ class TransportSuite:
         self.run(main())
 
     def test_a_cancellation_arrives(self) -> None:
-        """And has arrived when the one who cancels goes on."""
+        """The cancellation has arrived before the caller continues."""
 
         async def main() -> None:
             async with self._robot() as (robot, remote, _):
@@ -416,7 +416,7 @@ class TransportSuite:
         self.run(main())
 
     def test_what_a_component_is_told_arrives_once_in_order(self) -> None:
-        """*Param* and *send*, one after the other."""
+        """*Param* and *send*, in sequence."""
 
         async def main() -> None:
             async with self._robot() as (robot, remote, _):
@@ -433,14 +433,14 @@ class TransportSuite:
         self.run(main())
 
     def test_whom_a_component_needs_is_said_when_it_changes(self) -> None:
-        """Whoever has changed it: its user, or the component itself."""
+        """Either its user or the component itself has made the change."""
 
         async def main() -> None:
             async with self._robot() as (robot, remote, _):
                 assert remote.needed() == ()
                 await remote.change_mode("scanning")
                 assert remote.needed() == ("power", "light")
-                await remote.become_active(1, active=True)  # else nobody watches it
+                await remote.become_active(1, active=True)  # otherwise the component is not watched
                 robot.mode = "resting"
                 await until(lambda: remote.mode == "resting")
                 assert remote.needed() == ()
@@ -449,7 +449,7 @@ class TransportSuite:
         self.run(main())
 
     def test_what_a_component_needs_is_waited_for_and_missed(self) -> None:
-        """Deployed here, or offered where the component is; late, lost without a word, and back again."""
+        """Cases: deployed here or with the component; late, lost without a message, and back again."""
 
         async def main() -> None:
             transport, robot, clock = self.transport(), SuiteRobot(), LoopClock()
@@ -482,7 +482,7 @@ class TransportSuite:
         self.run(main())
 
     def test_an_event_comes_once_for_each_time_it_happens(self) -> None:
-        """In order, until it is deactivated."""
+        """Events come in order, until the deactivation."""
 
         async def main() -> None:
             async with self._robot() as (robot, remote, _):
@@ -523,7 +523,7 @@ class TransportSuite:
     # -- activation trees --------------------------------------------------------------------------------
 
     def test_components_are_active_while_somebody_active_needs_them(self) -> None:
-        """From the root down, whoever comes late; freed when no longer needed, and when their activator dies."""
+        """Activation goes from the root down, in any order of arrival, and ends with the need or the activator."""
 
         async def main() -> None:
             transport = self.transport()
@@ -557,7 +557,7 @@ class TransportSuite:
         self.run(main())
 
     def test_a_silent_death_frees_what_the_dead_one_needed(self) -> None:
-        """Without a last word."""
+        """The dead component sends no last message."""
 
         async def main() -> None:
             transport, told = self.transport(), []

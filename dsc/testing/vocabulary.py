@@ -1,4 +1,4 @@
-"""The names that can occur in a run, so that a question about a misspelt one is an error and not a quiet no."""
+"""Names that can occur in a run, so that a predicate with a misspelt name raises an error."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class KnownNames:
 
     Attributes:
         states: names of states.
-        triggers: what transitions are labelled with; `None` if one of the plots takes events by prefix (SCXML 3.12.1).
+        triggers: labels of transitions; `None` if one of the plots takes events by prefix (SCXML 3.12.1).
         rules: labels of rules.
-        skills: `component.skill`, as far as a state starts them.
+        skills: `component.skill` of every skill that a state starts.
     """
 
     def __init__(self, plots: Iterable[ActionPlot]) -> None:
@@ -51,7 +51,7 @@ class KnownNames:
 
     def check(self, *, state: str | None = None, trigger: str | None = None, rule: str | None = None,
               skill: str | None = None) -> None:  # fmt: skip
-        """Raise `UnknownNameError` for a name that cannot occur; a state's may be a path."""
+        """Raise `UnknownNameError` for a name that cannot occur; a state may be given by its path."""
         for name in state.split("/") if state is not None else ():
             _check("state", name, self.states)
         if self.triggers is not None:

@@ -1,4 +1,4 @@
-"""A world model for a test, in a line or two of PDDL."""
+"""World models for tests, in a line or two of PDDL."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 
 EMPTY = Schema()
-"""What may be said where nothing needs to be known."""
+"""Schema of a world without declared names."""
 
 
 def world(domain: Schema | Path | str = EMPTY, objects: str = "", facts: str = "") -> KnowledgeBase:
-    """A knowledge base with these things and facts in it, as in a PDDL problem.
+    """Return a knowledge base with these objects and facts, as in a PDDL problem.
 
     Args:
         domain: a schema, a PDDL domain file, or its text.
@@ -26,7 +26,7 @@ def world(domain: Schema | Path | str = EMPTY, objects: str = "", facts: str = "
         facts: as after `:init`, e.g. `"(on cup1 table) (= (failures cup1) 2)"`.
 
     Raises:
-        InputError: something is not declared, or does not have the form of PDDL.
+        InputError: a name is not declared, or a text is not PDDL.
     """
     schema = domain if isinstance(domain, Schema) else Schema.from_text(read_domain(domain))
     problem = f"(define (problem test) (:domain test) (:objects {objects}) (:init {facts}))"
@@ -36,10 +36,10 @@ def world(domain: Schema | Path | str = EMPTY, objects: str = "", facts: str = "
 
 
 def change_of(what: Delta | str, knowledge: KnowledgeBase, bindings: Bindings | None = None) -> Delta:
-    """A change as a value, or as a PDDL effect such as `(not (on ?item table))` on the world as it is now.
+    """Return a change as a value; a PDDL effect such as `(not (on ?item table))` applies to the present world.
 
     Raises:
-        InputError: the text is no effect, or names something that is not declared or not bound.
+        InputError: the text is not an effect, or names an undeclared or unbound element.
     """
     if isinstance(what, Delta):
         return what

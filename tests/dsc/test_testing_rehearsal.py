@@ -273,7 +273,7 @@ def test_a_failed_assertion_about_a_call_fails_the_test_whatever_the_plot_makes_
 
 @pytest.mark.parametrize("replies", [[None], lambda _call: None, ["grasped", 3]])
 def test_what_is_no_answer_is_refused(replies):
-    with pytest.raises(InputError, match=r"the script of 'arm.grasp' answers (None|3), which is no outcome's name"):
+    with pytest.raises(InputError, match=r"the script of 'arm.grasp' answers (None|3), which is not an outcome's name"):
         fetch({"base.drive": "arrived", "arm.grasp": replies})
 
 
