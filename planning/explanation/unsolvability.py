@@ -104,7 +104,7 @@ class _Reach:
         return _Reach(frozenset(map(numbering.fact, named)), tuple(changes), world)
 
     def allows(self, condition: Residual) -> bool:
-        """Whether the condition holds, or may hold: each of its leaves by itself."""
+        """Return whether each leaf of the condition holds or may hold alone."""
         match condition:
             case bool():
                 return condition
@@ -142,7 +142,7 @@ class _Causes:
     index: ReachedFacts
 
     def of(self, wanted: Residual) -> Iterator[str]:
-        """A sentence for each literal that is out of reach."""
+        """Yield a sentence for each unreachable literal."""
         match wanted:
             case Literal():
                 if as_fact(wanted) not in self.reached:
@@ -232,7 +232,7 @@ def _cases(action: PlanningAction) -> Iterator[PlanningAction]:
 def _effects(
     effect: Effect, variables: tuple[TypedVariable, ...] = (), conditions: tuple[Expression, ...] = ()
 ) -> Iterator[tuple[Effect, tuple[TypedVariable, ...], tuple[Expression, ...]]]:
-    """The changes an effect consists of, each with the variables and conditions around it."""
+    """Yield the leaves of an effect, each with the variables and conditions around it."""
     match effect:
         case AllOf(parts):
             for part in parts:
@@ -250,7 +250,7 @@ def _parts(e: Expression) -> tuple[Expression, ...]:
 
 
 def _present(rules: Iterable[JoinRule], world: World) -> Iterator[Fact]:
-    """The facts that hold now, of all predicates that the actions ask for."""
+    """Yield the facts that hold now, of all predicates in the actions' preconditions."""
     for predicate in dict.fromkeys(atom.predicate for rule in rules for atom in rule.atoms):
         arity = len(world.schema.predicates[predicate].parameters)
         for args in world.match(predicate, (None,) * arity):

@@ -1,1 +1,1 @@
-"""From a domain, a world and a goal to a problem that engines can be asked: only what matters, ground, positive."""
+"""Problem construction: from a domain, a world and a goal to a relevant, ground, positive problem for an engine."""

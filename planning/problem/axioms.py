@@ -1,12 +1,13 @@
-"""Predicates that follow from themselves and from what actions change, as actions that derive them.
+"""Recursive derived predicates whose bodies actions change, compiled into actions that derive them.
 
-`(above ?a ?b)` where blocks are moved: nothing can take its place, and no engine here knows axioms. But it can be
-worked out step by step: each axiom becomes an action of bookkeeping that adds what follows, and every action that may
-end something derived takes all of it back, to be derived anew (Gazen & Knoblock 1997; Thiébaux, Hoffmann & Nebel 2005).
-A fact that is derived in this way follows; one that is not may follow all the same. So that such a predicate does *not*
-hold cannot be asked for.
+An expression cannot replace `(above ?a ?b)` where actions move blocks, and no engine here supports axioms. Each axiom
+becomes a bookkeeping action that adds its head. Each action that may falsify a derived fact deletes all of them, and
+bookkeeping actions derive them again (Gazen & Knoblock 1997; Thiébaux, Hoffmann & Nebel 2005).
 
-A plan of that kind is for looking at: what a robot watches while it carries a plan out are facts and numbers.
+A fact derived in this way holds in the original domain. A fact not yet derived may hold too, so a condition cannot
+require that such a predicate is false.
+
+Plans of that kind are for display only: a monitor watches facts and numbers, never derived predicates.
 """
 
 from __future__ import annotations
@@ -32,17 +33,17 @@ if TYPE_CHECKING:
     from planning.problem.derived import Derivation
     from planning.strips import GroundAction, Problem
 
-_DERIVE = "derive "  # with a blank, which no declared name has
+_DERIVE = "derive "  # with a blank, which no declared name contains
 
 
 @dataclass(frozen=True, slots=True)
 class Derivable:
-    """A domain in which axioms are actions, and what cannot be asked for.
+    """A domain whose axioms are actions, and the derivation that it comes from.
 
     Attributes:
-        original: what its derived predicates stand for.
-        domain: without derived predicates; engines plan with it, and why there is no plan is said of it.
-        predicates: those that its actions derive.
+        original: the derivation of the domain with derived predicates.
+        domain: the domain without derived predicates, which engines and explanations use.
+        predicates: the predicates that its bookkeeping actions derive.
     """
 
     original: Derivation
@@ -51,7 +52,7 @@ class Derivable:
 
     @staticmethod
     def of(domain: PlanningDomain) -> Derivable | None:
-        """`None` if it has no such predicate, or durative actions change what one follows from."""
+        """Return `None` without such a predicate, or if durative actions may falsify a derived fact."""
         original = derivation(domain)
         predicates = frozenset(original.unsupported)
         plain = original.domain
@@ -74,7 +75,7 @@ class Derivable:
         return Derivable(original, replace(plain, actions=actions), predicates)
 
     def world(self, world: World) -> World:
-        """The world with everything that follows now."""
+        """Return the world with all derived facts."""
         return self.original.complete(world)
 
     def build_problem(
@@ -89,7 +90,8 @@ class Derivable:
         """As `planning.problem.construction.build_problem`; plans show no steps that derive facts.
 
         Raises:
-            UnsupportedGoalError, UnsupportedActionError: also if it is asked for that a predicate does not follow.
+            UnsupportedGoalError, UnsupportedActionError: also if a condition requires that a
+                derived predicate is false.
         """
         wanted = self.original.expand(goal)
         self._refuse_denied(wanted)
@@ -102,7 +104,7 @@ class Derivable:
         return self.domain, self.world(world), self.original.expand(goal)
 
     def _refuse_denied(self, goal: Expression) -> None:
-        """What is derived step by step is known to hold when it does, and never not to."""
+        """Raise an error if a condition needs a derived fact to be false; bookkeeping proves only true ones."""
         for atom in self._unknowable(goal):
             raise UnsupportedGoalError(self._said("the goal", atom), place=atom.place)
         for action in relevant(goal, None, self.domain.actions.values()).actions:
@@ -123,7 +125,7 @@ class Derivable:
 
 @dataclass(frozen=True, slots=True)
 class _Harmed:
-    """What may end something derived: these facts becoming false, and those becoming true."""
+    """The predicates whose changes may falsify a derived fact, by direction of the change."""
 
     when_false: frozenset[str]
     when_true: frozenset[str]
@@ -136,7 +138,7 @@ class _Harmed:
         return _Harmed(frozenset(wanted), frozenset((asked - wanted) | unwanted))
 
     def by(self, effect: Effect) -> bool:
-        """Whether the effect may do so; a number that changes may, whichever way."""
+        """Return whether the effect may falsify a derived fact; a numeric effect may, in either direction."""
         return any(
             name_of(leaf) in (self.when_false if isinstance(leaf, Delete) else self.when_true)
             for leaf in effect_leaves(effect)
@@ -151,7 +153,7 @@ def _forgotten(predicate: str, domain: PlanningDomain) -> Effect:
 
 
 def _deriving(axiom: Axiom, body: Expression) -> Iterator[PlanningAction]:
-    """An action for each alternative; what the body only says there is becomes a parameter, which is found by joins."""
+    """Yield an action for each alternative; variables of `exists` become parameters, which joins bind."""
     match body:
         case Or(parts):
             for part in parts:
@@ -169,7 +171,7 @@ def _names(parameters: Collection[TypedVariable]) -> set[str]:
 
 
 def _kept_books(problem: Problem) -> Problem:
-    """Who derives something is no step of a plan, and costs nothing."""
+    """Return the problem with bookkeeping actions that no plan shows and that cost nothing."""
 
     def whole() -> Problem:
         return _kept_books(problem.unsliced()) if problem.unsliced is not None else problem

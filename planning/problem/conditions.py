@@ -1,8 +1,8 @@
-"""Conditions after everything that cannot change was evaluated: what is left for a planner to decide.
+"""Ground conditions after partial evaluation: the residual formula that a planner decides.
 
-Quantifiers are expanded over the known objects; types, equality, numbers and predicates that no action
-changes, computed ones too, are evaluated on the world (partial evaluation). What remains is in negation normal form,
-its leaves literals and bounds on numbers that actions change.
+Quantifiers are expanded over the known objects. Types, equality, numbers, and predicates that no action changes are
+evaluated on the world, computed predicates included. The residual is in negation normal form; its leaves are literals
+and bounds on numbers that actions change.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Literal:
-    """A ground fact that shall hold, or shall not."""
+    """A ground fact that must be true, or must be false."""
 
     fact: Fact
     positive: bool = True
 
     def __hash__(self) -> int:
-        """As a dataclass would, in one go: literals are looked up all the time."""
+        """The hash of the dataclass in one call: literals are dictionary keys on the hot path."""
         return hash((self.fact.predicate, self.fact.args, self.positive))
 
     @property
@@ -61,25 +61,25 @@ class Literal:
 
 @dataclass(frozen=True, slots=True)
 class Every:
-    """All parts; never empty, never nested."""
+    """A conjunction; never empty, never nested."""
 
     parts: tuple[Residual, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Some:
-    """At least one part; never empty, never nested."""
+    """A disjunction; never empty, never nested."""
 
     parts: tuple[Residual, ...]
 
 
 Leaf = Literal | NumericBound
 Residual = bool | Leaf | Every | Some
-"""What is left of a condition: already decided, or a formula of literals and bounds."""
+"""The residual of a condition: decided already, or a formula of literals and bounds."""
 
 
 def every(parts: Iterable[Residual]) -> Residual:
-    """The conjunction, simplified."""
+    """Return the simplified conjunction."""
     kept: dict[Residual, None] = {}
     for part in parts:
         if part is False:
@@ -90,7 +90,7 @@ def every(parts: Iterable[Residual]) -> Residual:
 
 
 def some(parts: Iterable[Residual]) -> Residual:
-    """The disjunction, simplified."""
+    """Return the simplified disjunction."""
     kept: dict[Residual, None] = {}
     for part in parts:
         if part is True:
@@ -101,7 +101,7 @@ def some(parts: Iterable[Residual]) -> Residual:
 
 
 def negation(residual: Residual) -> Residual:
-    """The opposite, in negation normal form."""
+    """Return the negation, in negation normal form."""
     match residual:
         case bool():
             return not residual
@@ -118,14 +118,14 @@ def negation(residual: Residual) -> Residual:
 
 
 def _apart(left: Quantity, right: Quantity) -> Residual:
-    """`!=` as engines take it."""
+    """Return `!=` as a disjunction, for engines take only `<` and `>`."""
     return Some((NumericBound("<", left, right), NumericBound(">", left, right)))
 
 
 def alternatives(residual: Residual) -> Iterator[tuple[Leaf, ...]]:
-    """The disjunctive normal form, one conjunction of leaves after the other, contradictory literals left out.
+    """Yield the disjunctive normal form, one conjunction of leaves at a time, without contradictory ones.
 
-    There may be exponentially many; take as many as you can bear.
+    The number of conjunctions may be exponential; the caller bounds it.
     """
     match residual:
         case bool():
@@ -150,7 +150,7 @@ class GroundEffect:
 
 
 def is_so(fact: Fact, world: World) -> bool:
-    """Whether the fact holds; worlds keep no facts of computed predicates."""
+    """Return whether the fact holds; a world stores no facts of computed predicates."""
     if fact.predicate in world.schema.computed:
         return holds(Atom(fact.predicate, tuple(map(Constant, fact.args))), world)
     return world.holds(fact.predicate, fact.args)
@@ -158,14 +158,13 @@ def is_so(fact: Fact, world: World) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Grounder:
-    """Evaluates what cannot change.
+    """Partial evaluation of conditions and effects on a world.
 
     Attributes:
         world: the present.
         changing: the predicates and functions that the considered actions change.
-        keep_false: leave unchangeable facts that do not hold in the result, so that a goal which needs them
-            can say which they are.
-        patience: for how long; every choice of objects takes some of it.
+        keep_false: keep unchangeable facts that do not hold in the residual, so that a goal can name the missing ones.
+        patience: the limit of the work; each choice of objects counts.
     """
 
     world: World
@@ -174,9 +173,9 @@ class Grounder:
     patience: WorkLimit = field(default_factory=WorkLimit, compare=False)
 
     def precondition(self, e: Expression, bindings: Mapping[str, Value]) -> Residual:
-        """As `residual`, but facts that must hold or not hold in any case are left in, also unchangeable ones.
+        """Return the residual, but keep each fact that must hold or not hold, unchangeable ones included.
 
-        What is left then does not depend on them, and can be used again when somebody else changed them.
+        The result does not depend on these facts, so that it stays valid when an external change touches them.
         """
         match e:
             case And(parts):
@@ -189,10 +188,10 @@ class Grounder:
                 return self.residual(e, bindings)
 
     def residual(self, e: Expression, bindings: Mapping[str, Value], *, wanted: bool = True) -> Residual:
-        """What is left of `e` (of its negation if not `wanted`) for the planner.
+        """Return the residual of `e`, or of its negation if not `wanted`.
 
         Raises:
-            UnsupportedActionError: a fact is about a number that actions change.
+            UnsupportedActionError: an argument of a fact is a number that actions change.
         """
         match e:
             case Atom():
@@ -218,7 +217,7 @@ class Grounder:
         bindings: Mapping[str, Value],
         condition: Residual = True,  # noqa: FBT002  a formula that is decided already
     ) -> Iterator[GroundEffect]:
-        """The ground effects on changing predicates and functions."""
+        """Yield the ground effects on changing predicates and functions."""
         match effect:
             case Add(atom) | Delete(atom):
                 if atom.predicate in self.changing:
@@ -238,10 +237,10 @@ class Grounder:
                     yield GroundEffect(condition, self._assignment(effect, bindings))
 
     def choices(self, variables: Iterable[TypedVariable], bindings: Mapping[str, Value]) -> Iterator[dict[str, Value]]:
-        """The bindings extended by every choice of objects for `variables`.
+        """Yield the bindings extended by every choice of objects for `variables`.
 
         Raises:
-            OutOfPatienceError: there are too many for the time that is left.
+            WorkLimitError: the limit is reached before the last choice.
         """
         chosen = list(variables)
         for values in itertools.product(*map(self.objects, chosen)):
@@ -249,24 +248,24 @@ class Grounder:
             yield {**bindings, **dict(zip((v.name for v in chosen), values, strict=True))}
 
     def objects(self, variable: TypedVariable) -> dict[str, None]:
-        """What the variable may stand for, as a set in order."""
+        """Return the objects of the variable's types, as a set in order."""
         types = variable.types or ("object",)
         return dict.fromkeys(name for one in types for name in self.world.objects(one))
 
     def fact(self, atom: Atom | Call, bindings: Mapping[str, Value]) -> Fact:
-        """The atom, or the numeric fluent, with values for its terms.
+        """Return the atom or numeric fluent with values for its terms.
 
         Raises:
-            UnsupportedActionError: one of them is a number that actions change.
+            UnsupportedActionError: a term is a number that actions change.
         """
         name = atom.predicate if isinstance(atom, Atom) else atom.function
         return Fact(name, tuple([self._value(term, bindings) for term in atom.args]))
 
     def quantity(self, term: Term, bindings: Mapping[str, Value]) -> Quantity:
-        """What the term is worth, as far as that cannot change.
+        """Return the value of the term; fluents that actions change stay symbolic.
 
         Raises:
-            InputError: it is no number, or divides by zero.
+            InputError: the value is not a number, or a divisor is zero.
         """
         match term:
             case Call(function) if function in self.changing:
@@ -279,11 +278,11 @@ class Grounder:
             case _:
                 number = evaluate_term(term, self.world, bindings)
                 if not isinstance(number, int | float):
-                    raise InputError(f"'{number}' is no number", place=term.place)
+                    raise InputError(f"'{number}' is not a number", place=term.place)
                 return number
 
     def changes(self, e: Expression | Term) -> bool:
-        """Whether it asks for a number that actions change."""
+        """Return whether the term or condition reads a number that actions change."""
         return (isinstance(e, Call) and e.function in self.changing) or any(map(self.changes, parts_of(e)))
 
     def _comparison(self, e: Comparison, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:

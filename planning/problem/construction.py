@@ -1,8 +1,13 @@
-"""Posing a problem: the slice of the world and of the domain that matters for a goal, ready for an engine.
+"""Problem construction: the part of a world and a domain that matters for a goal, as a ground problem for an engine.
 
-The steps of it: choose the relevant actions; ground them along what is reachable, evaluating what cannot
-change; turn a disjunctive goal into bookkeeping actions after the last real one; leave out what cannot matter;
-leave out objects that others can stand in for; make negative conditions positive.
+The steps, in order:
+
+- Select the relevant actions.
+- Ground them by relaxed reachability, and evaluate all conditions that cannot change.
+- Compile a disjunctive goal into bookkeeping actions after the last real action.
+- Prune facts and actions that cannot contribute.
+- Remove objects that others can replace.
+- Make negative conditions positive.
 """
 
 from __future__ import annotations
@@ -42,7 +47,7 @@ if TYPE_CHECKING:
     from planning.domain import PlanningDomain
     from planning.problem.numbering import Numbering
 
-# Names with blanks, which no declared name can clash with.
+# Names with blanks, which clash with no declared name.
 _ACTING, _FINISHED = Literal(Fact("still acting")), Literal(Fact("finished acting"))
 _ONE_OF = "one of"
 _MOST_KEPT = 8  # goals of different kinds, each with its ground actions
@@ -57,43 +62,43 @@ def build_problem(
     durations: bool = False,
     patience: WorkLimit | None = None,
 ) -> Problem:
-    """The problem of reaching `goal` from `world`, which stays as it is.
+    """Return the problem of reaching `goal` from `world`, which it does not change.
 
-    What the next problem of the same domain needs again is kept; see `ProblemBuilder`.
+    `ProblemBuilder` keeps ground actions of the same domain for later problems.
 
     Args:
         domain: the planning actions.
         world: the present.
-        goal: what shall hold.
-        metric: what makes a plan better than another; to minimize `(total-cost)` if the domain declares that.
-        durations: whether there is somebody to ask who plans with durations: `timed` of the problem is for him.
-        patience: for how long; for ever if left out.
+        goal: the condition to reach.
+        metric: the plan metric; by default the domain's `(total-cost)`, minimized, if it is declared.
+        durations: also construct `timed`, for an engine that plans with durations.
+        patience: the limit of the work; unlimited if omitted.
 
     Raises:
-        InputError: the goal has a free variable, or names something that is not declared or not known.
-        UnsupportedGoalError: the goal states a fact about a number that actions change, or asks for a derived
-            predicate that cannot be planned with, or for what no engine can foresee (`unforeseeable`).
-        UnsupportedActionError: so does an action that matters, or it has too many alternatives.
-        OutOfPatienceError: it takes too long, as it may where many objects can be chosen for many parameters.
+        InputError: the goal has a free variable, or names something undeclared or unknown.
+        UnsupportedGoalError: the goal has a fact about a number that actions change, a derived predicate without
+            support, or a condition that no engine can foresee (`unforeseeable`).
+        UnsupportedActionError: a relevant action has one of these, or too many alternatives.
+        WorkLimitError: the limit is reached, as it may be with many objects for many parameters.
     """
     builder = _builders.find(domain, None) or _builders.keep(domain, None, ProblemBuilder(domain))
     return builder.build_problem(world, goal, metric, durations=durations, patience=patience)
 
 
 def check_goal(goal: Expression, world: World) -> None:
-    """Raise an `InputError` unless the goal says something about the things of this world."""
+    """Raise an `InputError` unless the goal fits the schema and names only objects of this world."""
     check(goal, world.schema, objects=things_of(world))
 
 
 @dataclass(frozen=True, slots=True)
 class GroundedProblem:
-    """A problem before anything that cannot contribute is left out.
+    """A ground problem before pruning.
 
     Attributes:
-        relevant: what of the domain matters.
-        wanted: what is left of the goal; `False` if it can never hold.
+        relevant: the relevant actions, predicates and functions.
+        wanted: the residual of the goal; `False` if it can never hold.
         task: the ground problem; `None` if the goal can never hold.
-        assembly: makes a `Problem` of the task.
+        assembly: makes a `Problem` from the task.
     """
 
     relevant: Relevant
@@ -103,9 +108,9 @@ class GroundedProblem:
 
 
 class ProblemBuilder:
-    """Poses one problem after the other for a domain, and keeps what the next one needs again.
+    """Constructs the problems of one domain, and keeps ground actions for the next problem.
 
-    The problem is the same as that of a new builder, only sooner. May be used by several threads.
+    A new builder returns the same problem, only later. Threads may share a builder.
     """
 
     def __init__(self, domain: PlanningDomain) -> None:
@@ -124,7 +129,7 @@ class ProblemBuilder:
         durations: bool = False,
         patience: WorkLimit | None = None,
     ) -> Problem:
-        """See `planning.problem.construction.pose`."""
+        """Return the problem; see `planning.problem.construction.build_problem`."""
         check_goal(goal, world)
         world, wanted = self._derivation.world(world), self._derivation.expand(goal)
         if holds(wanted, world):
@@ -141,7 +146,7 @@ class ProblemBuilder:
         return replace(problem, one_at_a_time=True, timed=timed if durations else None)
 
     def _one_at_a_time(self, world: World, goal: Expression, metric: Metric | None, patience: WorkLimit) -> Problem:
-        """The problem with durative actions as ordinary ones."""
+        """Return the problem with durative actions as instantaneous ones."""
         amount = metric_of(metric, world.schema)
         with self._lock:
             grounded = self.grounded(world, goal, amount, patience)
@@ -157,16 +162,16 @@ class ProblemBuilder:
     def grounded(
         self, world: World, goal: Expression, metric: Term | None = None, patience: WorkLimit | None = None
     ) -> GroundedProblem:
-        """The problem of reaching a checked goal, with everything evaluated that cannot change.
+        """Return the ground problem of a checked goal, partially evaluated.
 
         Args:
             world: the present, with derived facts.
-            goal: what shall hold.
-            metric: what plans shall have little of.
-            patience: for how long.
+            goal: the condition to reach.
+            metric: the term to minimize.
+            patience: the limit of the work.
 
         Raises:
-            UnsupportedGoalError, UnsupportedActionError, OutOfPatienceError: as for `pose`.
+            UnsupportedGoalError, UnsupportedActionError, WorkLimitError: as for `build_problem`.
         """
         goal = self._derivation.expand(goal)
         matters = self._relevant(goal, metric)
@@ -189,7 +194,7 @@ class ProblemBuilder:
         return GroundedProblem(matters, wanted, task, assembly)
 
     def _relevant(self, goal: Expression, metric: Term | None) -> Relevant:
-        """What matters for the goal; the same for all that ask about the same predicates and functions."""
+        """Return the relevant part of the domain, cached by the predicates and functions of the goal."""
         key = frozenset(names_of(goal)), metric
         if key not in self._matters:
             if len(self._matters) >= _MOST_KEPT:
@@ -200,9 +205,9 @@ class ProblemBuilder:
     def _prepared(
         self, matters: Relevant, metric: Term | None, world: World, patience: WorkLimit
     ) -> tuple[OperatorCache, Assembly]:
-        """The ground actions that may matter, those of an earlier problem if they serve."""
+        """Return the cached ground actions if they are valid for this world, else new ones."""
         key = (tuple(action.name for action in matters.actions), matters.changing, metric)
-        known = self._kept.pop(key, None)  # taken out, so that an error on the way leaves nothing half done
+        known = self._kept.pop(key, None)  # removed while in use, so that an error leaves no partial entry
         if known is None or not known[0].serves(world):
             groundwork = OperatorCache(matters, metric, world)
             known = groundwork, Assembly(groundwork.numbering)
@@ -213,7 +218,7 @@ class ProblemBuilder:
         return known
 
     def _sliced(self, task: Task, assembly: Assembly, world: World, notes: tuple[str, ...]) -> Problem:
-        """Without the objects that others can stand in for; what they need to reach the goal is there all the same."""
+        """Return the problem without objects that others can replace; their actions return with `unsliced`."""
         left, gone, things = task.left or {}, spared(task), things_of(world)
 
         def problem(task: Task, world: World | None) -> Problem:
@@ -228,18 +233,18 @@ class ProblemBuilder:
         slice_ = pruned(task, _only(left.keys() - set(gone), len(task.ways.all)))
         if notes:
             slice_ = _evenly_priced(slice_)
-        if task.numbering.fluents:  # they have the values of now
+        if task.numbering.fluents:  # numeric fluents have the values of this version
             now = problem(task, world)
             return replace(problem(slice_, world), unsliced=lambda: now)
         return replace(problem(slice_, None), unsliced=whole)
 
     def _nothing(self, *unreachable: str) -> Problem:
-        """A problem that needs no engine: the goal holds, or cannot be reached."""
+        """Return a problem that needs no engine: the goal holds, or is unreachable."""
         return Problem(self._domain.name, {}, (), (), (), unreachable)
 
 
 def _priced(task: Task, metric: Term | None) -> tuple[Task, tuple[str, ...]]:
-    """The task with costs; all the same, and a note why, if the metric is no cost of actions."""
+    """Return the task with action costs; with equal costs and a note if the metric is not an action cost."""
     if metric is None or all(way.cost is not None for way in (task.left or {}).values()):
         return task, ()
     return _evenly_priced(task), (ignored(metric),)
@@ -260,9 +265,9 @@ def _evenly_priced(task: Task) -> Task:
 def _with_conjunctive_goal(
     ways: OperatorIndex, goal: Residual, numbering: Numbering
 ) -> tuple[OperatorIndex, tuple[int, ...]]:
-    """The goal as literals and bounds; a disjunction in it becomes a fact that bookkeeping actions can add.
+    """Return the goal as literals and bounds; bookkeeping actions add a fact for each disjunction in it.
 
-    They can be taken only after the last real action: a disjunct that held once might be undone later.
+    A plan takes them only after the last real action, since a later action may falsify a disjunct.
     """
     bookkeeping: list[Variant] = []
     wanted = tuple(map(numbering.of, _conjunction(goal, bookkeeping)))
@@ -294,7 +299,7 @@ _builders: IdentityCache[PlanningDomain, ProblemBuilder] = IdentityCache(size=8)
 
 
 def said(numbering: Numbering, missing: int, goal: Expression) -> str:
-    """A part of the goal as its reader knows it."""
+    """Return a goal number in the words of the goal's author."""
     what = numbering.named(missing)
     if isinstance(what, Fact) and what.predicate == _ONE_OF:
         return to_text(goal)

@@ -1,4 +1,4 @@
-"""Constructs of a domain or goal that not every engine can plan with, and those that none can."""
+"""Constructs of a domain or goal that no engine, or not every engine, can plan with."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 def refuse_unforeseeable(goal: Expression, actions: Iterable[PlanningAction], domain: PlanningDomain) -> None:
-    """Raise an error if the goal, or one of the relevant actions, asks for what no engine can foresee.
+    """Raise an error if the goal or a relevant action has a condition that no engine can foresee.
 
     Raises:
-        UnsupportedGoalError, UnsupportedActionError: with the place, and what is asked for.
+        UnsupportedGoalError, UnsupportedActionError: with the place and the condition.
     """
     schema = domain.schema
     changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
@@ -54,7 +54,7 @@ def _asked(
 def _computed_from(
     e: Expression | Term, schema: Schema, changing: Collection[str]
 ) -> Iterator[tuple[Atom, Expression | Term]]:
-    """The computed atoms in `e`, each with what it reads of the functions and predicates in `changing`."""
+    """Yield the computed atoms in `e`, each with the expressions it reads from `changing`."""
     if isinstance(e, Atom) and e.predicate in schema.computed:
         for read in schema.computed[e.predicate].inputs(e.args):
             yield from ((e, part) for part in _parts(read) if _name(part) in changing)
@@ -70,7 +70,7 @@ def _parts(e: Expression | Term) -> Iterator[Expression | Term]:
 
 
 def _name(e: Expression | Term) -> str | None:
-    """The function or predicate that it asks about."""
+    """Return the function or predicate of the expression."""
     return e.function if isinstance(e, Call) else e.predicate if isinstance(e, Atom) else None
 
 
@@ -79,9 +79,9 @@ class Construct:
     """A condition on numbers that actions change.
 
     Attributes:
-        owner: whose condition it is: `the goal`, or a planning action.
+        owner: `the goal`, or the planning action with the condition.
         text: the condition, in PDDL.
-        place: where it is written.
+        place: its place in the source file.
     """
 
     owner: str
@@ -95,7 +95,7 @@ class Construct:
 
 
 def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Construct]:
-    """What makes the problem of reaching `goal` numeric: the goal's own conditions first, then those of actions."""
+    """Yield the numeric conditions relevant to `goal`: the goal's own first, then those of actions."""
     derived = derivation(domain)
     goal = derived.expand(goal)
     matters = relevant(goal, None, derived.domain.actions.values())
@@ -110,12 +110,12 @@ def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Con
 
 
 def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: NobodyCan) -> str:
-    """Why no engine can be asked, in one line: the construct, its place, who could, and how to get him.
+    """Return in one line the construct that no installed engine supports, its place, and an engine to install.
 
     Args:
         domain: the planning domain.
-        goal: what shall hold.
-        nobody: what came of asking.
+        goal: the condition to reach.
+        nobody: the engine selection's answer.
     """
     construct = next(numeric_constructs(domain, goal), None)
     return nobody.message if construct is None else f"{construct}; {nobody.who}"

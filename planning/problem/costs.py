@@ -1,7 +1,7 @@
-"""What a plan shall cost as little as possible (PDDL `:metric`), as a cost of each ground action.
+"""Plan metrics (PDDL `:metric`) as a cost of each ground action.
 
-A metric is an action cost when it is a sum of numbers that actions only raise, and by amounts that do not change:
-`total-cost`, or `(+ (* 2 (fuel-used)) (tolls))`.
+A metric is an action cost if it is a sum of numbers that actions only increase, by fixed amounts: `total-cost`, or `(+
+(* 2 (fuel-used)) (tolls))`.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from planning.problem.conditions import Grounder
 
 TOTAL_COST = Call("total-cost")
-"""What PDDL calls the sum of action costs; the metric of a domain that declares it, unless another is asked for."""
+"""The sum of action costs in PDDL; the default metric of a domain that declares it."""
 
 
 def metric_of(metric: Metric | None, schema: Vocabulary) -> Term | None:
-    """What plans shall have as little of as possible: by default `(total-cost)`, if it is declared."""
+    """Return the term to minimize: by default `(total-cost)`, if it is declared."""
     if metric is not None:
         return metric.term if metric.direction == "minimize" else Arithmetic("-", (metric.term,))
     declared = schema.functions.get(TOTAL_COST.function)
@@ -36,7 +36,7 @@ def metric_of(metric: Metric | None, schema: Vocabulary) -> Term | None:
 
 
 def ignored(metric: Term) -> str:
-    """The note for a metric that is no action cost."""
+    """Return the note for a metric that is not an action cost."""
     if TOTAL_TIME.function in names_of(metric):
         return f"the metric {to_text(metric)} is ignored: one action at a time is planned for without regard to time"
     return f"the metric {to_text(metric)} is ignored: it is no sum of numbers that actions raise by fixed amounts"
@@ -47,14 +47,14 @@ class Costs:
     """Action costs.
 
     Attributes:
-        coefficients: of each numeric fluent in the metric; `None` if the metric is no sum of fluents.
+        coefficients: factor of each numeric fluent in the metric; `None` if the metric is not a linear sum.
     """
 
     coefficients: Mapping[Fact, float] | None
 
     @staticmethod
     def of(metric: Term | None, grounder: Grounder) -> Costs | None:
-        """The costs that a metric stands for; `None` without one."""
+        """Return the costs by a metric; `None` without one."""
         if metric is None:
             return None
         declared = grounder.world.schema.functions
@@ -62,7 +62,7 @@ class Costs:
         return Costs(linear(grounder.quantity(metric, {})) if known else None)
 
     def cost(self, assignments: Iterable[Assignment]) -> float | None:
-        """What an action with these effects costs; `None` if it changes the metric in another way than a cost."""
+        """Return the cost of an action with these effects; `None` if its change of the metric is not a cost."""
         if self.coefficients is None:
             return None
         total = 0.0

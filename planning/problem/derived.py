@@ -1,8 +1,8 @@
-"""Derived predicates (PDDL 2.2 axioms): compiled away, or evaluated where no action changes what they follow from.
+"""Derived predicates (PDDL 2.2 axioms): compiled away, or evaluated where no action changes their inputs.
 
-A predicate that does not follow from itself is replaced by its condition wherever it is asked for. One that does
-(`above`: on it, or on something above it) becomes facts, if nothing it follows from is changed by an action: the
-least fixpoint, stratum by stratum as in Datalog. Otherwise it cannot be planned with.
+The condition of a non-recursive predicate replaces each atom with it. A recursive one, such as `above`, becomes facts
+if no action changes its inputs: the least fixpoint, stratum by stratum as in Datalog. Otherwise planning does not
+support it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _AXIOMS = "planners with axioms of their own, such as Fast Downward run by itsel
 
 
 def derivation(domain: PlanningDomain) -> Derivation:
-    """What the derived predicates of a domain stand for; worked out once.
+    """Return the derivation of a domain, cached by identity.
 
     Raises:
         SchemaError: a predicate follows from its own negation.
@@ -58,12 +58,12 @@ def derivation(domain: PlanningDomain) -> Derivation:
 
 
 class Derivation:
-    """A domain without its derived predicates, and what replaces them.
+    """A domain without its derived predicates, and the expressions or facts that replace them.
 
     Attributes:
-        original: the domain as it is written.
-        domain: the domain with conditions in their place, as far as that can be.
-        unsupported: the recursive predicates that actions affect, with what of it actions change.
+        original: the domain as its author wrote it.
+        domain: the domain with derived predicates replaced by their conditions where possible.
+        unsupported: the recursive predicates that actions affect, each with the inputs that actions change.
     """
 
     def __init__(self, domain: PlanningDomain) -> None:
@@ -86,10 +86,10 @@ class Derivation:
         self.domain = domain
 
     def expand(self, e: Expression) -> Expression:
-        """The condition with those of derived predicates in their place; recursive ones stay."""
+        """Return the condition with derived predicates replaced by their conditions; recursive ones stay."""
         if not self._axioms:
             return e
-        # The same again for the same condition: what is known of a condition is known by its identity.
+        # The same object for the same condition: other caches use its identity as the key.
         return self._expanded.find(e, None) or self._expanded.keep(e, None, self._expand(e))
 
     def _expand(self, e: Expression) -> Expression:
@@ -107,24 +107,24 @@ class Derivation:
                 return e
 
     def world(self, world: World) -> World:
-        """The world with the facts of those recursive predicates that no action affects."""
+        """Return the world with the facts of those recursive predicates that no action affects."""
         return self._closed(world, [one for one in self._circles if self.unsupported.keys().isdisjoint(one)])
 
     def complete(self, world: World) -> World:
-        """The world with the facts of all recursive predicates, as they are now."""
+        """Return the world with the current facts of all recursive predicates."""
         return self._closed(world, self._circles)
 
     def _closed(self, world: World, circles: Collection[frozenset[str]]) -> World:
         if not circles:
             return world
         closed = Overlay(world)
-        for circle in circles:  # each comes after those that it follows from
+        for circle in circles:  # each comes after the strata of its inputs
             while facts := [fact for fact in self._consequences(circle, closed) if not _holds(fact, closed)]:
                 closed.apply(Delta(added=tuple(dict.fromkeys(facts))))
         return closed
 
     def at(self, world: World) -> Settled:
-        """The domain for the world as it is, and as long as nothing changes that recursive predicates follow from."""
+        """Return the domain for this world; it is valid until an input of a recursive predicate changes."""
         closed = self.world(world)
         supported = [name for circle in self._circles for name in sorted(circle) if name not in self.unsupported]
         facts = frozenset(
@@ -135,21 +135,21 @@ class Derivation:
         return Settled(self, facts, frozenset(supported))
 
     def may_change(self, e: Expression) -> bool:
-        """Whether some action may make the expanded condition true or false; `False` is certain."""
+        """Return whether some action may make the expanded condition true or false; `False` is certain."""
         changing = self._changing.union(self._schema.computed, self.unsupported)
         fixed = self._schema.predicates.keys() - changing
         return not all(name in fixed or self._schema.is_type(name, 1) for name in names_of(e))
 
     @property
     def recursive(self) -> bool:
-        """Whether a predicate follows from itself, so that what it stands for depends on the world."""
+        """Whether a derived predicate is recursive, so that its replacement depends on the world."""
         return bool(self._recursive)
 
     def require_supported(self, goal: Expression, actions: Iterable[PlanningAction]) -> None:
-        """Raise an error if the expanded goal or actions ask for a predicate that cannot be planned with.
+        """Raise an error if the expanded goal or actions contain a predicate without support.
 
         Raises:
-            UnsupportedGoalError, UnsupportedActionError: which, why, and where it is asked for.
+            UnsupportedGoalError, UnsupportedActionError: with the predicate, the reason and the place.
         """
         for atom in self._unsupported_in(goal):
             raise UnsupportedGoalError(f"the goal asks for {self.why(atom.predicate)}", place=atom.place)
@@ -161,7 +161,7 @@ class Derivation:
                     )
 
     def why(self, name: str) -> str:
-        """What is the matter with an unsupported predicate, and who could plan with it."""
+        """Return why a predicate has no support, and the planners that have it."""
         changing = ", ".join(f"'{one}'" for one in sorted(self.unsupported[name]))
         return (
             f"'{name}', a derived predicate that follows from itself (at {self._axioms[name][0].place}) and from what"
@@ -175,7 +175,7 @@ class Derivation:
             yield from self._unsupported_in(part)
 
     def _dependencies(self, axioms: Iterable[Axiom]) -> nx.DiGraph[str]:
-        """Predicate -> what it follows from, derived or not."""
+        """Return the graph from each predicate to its inputs, derived or not."""
         graph: nx.DiGraph[str] = nx.DiGraph()
         for axiom in axioms:
             graph.add_node(axiom.predicate)
@@ -191,7 +191,7 @@ class Derivation:
         return graph
 
     def _instance(self, axiom: Axiom, atom: Atom) -> Expression:
-        """The axiom's condition for the atom's arguments, and their types where the axiom asks for narrower ones."""
+        """Return the axiom's condition for the atom's arguments, with type tests where the axiom narrows a type."""
         declared = self._schema.predicates[axiom.predicate].parameters
         tests = tuple(
             type_test(own, term)
@@ -203,7 +203,7 @@ class Derivation:
         return And((*tests, condition)) if tests else condition
 
     def _consequences(self, circle: Iterable[str], world: World) -> Iterator[Fact]:
-        """What the axioms for these predicates say in `world`."""
+        """Yield the facts that the axioms of these predicates derive in `world`."""
         for name in sorted(circle):
             for axiom in self._axioms[name]:
                 tests = (type_test(p, Variable(p.name)) for p in axiom.parameters)
@@ -213,12 +213,12 @@ class Derivation:
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """A domain that the bare knowledge base can judge: nothing derived is left in it.
+    """A domain without derived predicates, which the knowledge base alone can evaluate.
 
     Attributes:
-        derivation: of the domain.
-        facts: of recursive predicates, which replace them.
-        predicates: these predicates.
+        derivation: the derivation of the domain.
+        facts: the facts that replace the recursive predicates.
+        predicates: the recursive predicates replaced.
     """
 
     derivation: Derivation = field(compare=False, repr=False)
@@ -235,7 +235,7 @@ class Settled:
         return replace(domain, actions=actions)
 
     def condition(self, e: Expression) -> Expression:
-        """The condition without derived predicates."""
+        """Return the condition without derived predicates."""
         expanded = self.derivation.expand(e)
         return self._replaced(expanded) if self.predicates else expanded
 
@@ -262,7 +262,7 @@ _known: IdentityCache[PlanningDomain, Derivation] = IdentityCache(size=64)
 
 
 def _strata(graph: nx.DiGraph[str]) -> Iterator[frozenset[str]]:
-    """Predicates that follow from each other, after those that they follow from."""
+    """Yield the strongly connected sets of predicates, each after its inputs."""
     components = nx.condensation(graph)
     for number in reversed(list(nx.topological_sort(components))):
         yield frozenset(components.nodes[number]["members"])
@@ -277,7 +277,7 @@ def _holds(fact: Fact, world: World) -> bool:
 
 
 def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
-    """The atoms that stand under an odd number of negations (`wanted`: seen from outside)."""
+    """Yield the atoms under an odd number of negations; with `wanted` false, under an even number."""
     match e:
         case Atom():
             yield from () if wanted else (e,)

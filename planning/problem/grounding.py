@@ -1,4 +1,4 @@
-"""From a planning action with parameters to ground ones: its ways with given arguments, its arguments as a join."""
+"""Grounding: a planning action as a join over facts, and its variants for given arguments."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ if TYPE_CHECKING:
     from planning.cancellable_work import WorkLimit
     from planning.domain import PlanningAction
 
-_MOST_CONDITIONS = 6  # of one ground action; each doubles the number of ways to take it
+_MOST_CONDITIONS = 6  # of one ground action; each doubles the number of variants
 _MOST_ALTERNATIVES = 64
 _AS_THEY_ARE = "planners that take ADL as it is, such as Fast Downward run by itself"
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One way to take a step: a conjunction and unconditional effects.
+    """One alternative of a ground action: a conjunction and unconditional effects.
 
     Attributes:
         step: the step; `None` for bookkeeping that no plan shows.
         condition: literals and bounds that must hold before.
         effects: literals that become true; none contradicts another.
-        assignments: how numbers change, one for each fluent.
+        assignments: numeric changes, one for each fluent.
     """
 
     step: PlanStep | None
@@ -53,10 +53,10 @@ class Variant:
 
 
 def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Grounder) -> Iterator[Variant]:
-    """The ways to take one step: one for each alternative of its precondition and conditional effects.
+    """Yield one variant for each alternative of the precondition and conditional effects.
 
     Raises:
-        UnsupportedActionError: there are too many, or a number changes in two ways at once.
+        UnsupportedActionError: there are too many variants, or two effects change a number differently.
     """
     precondition = grounder.precondition(action.precondition, bindings)
     if precondition is False:
@@ -70,7 +70,7 @@ def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Gr
     if len(conditions) > _MOST_CONDITIONS:
         raise UnsupportedActionError(
             f"planning action '{action.name}' has {len(conditions)} conditional effects for {step};"
-            f" at most {_MOST_CONDITIONS} can be compiled away; what can do it: {_AS_THEY_ARE}",
+            f" at most {_MOST_CONDITIONS} can be compiled away; supported by: {_AS_THEY_ARE}",
             place=action.place,
         )
     grounder.patience.spend()
@@ -83,9 +83,9 @@ def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Gr
 
 
 def _eased(effects: list[GroundEffect]) -> list[GroundEffect]:
-    """The same effects under fewer conditions: what is taken away if it is there can be taken away in any case.
+    """Return the same effects with weaker conditions: a delete needs no condition that its fact is true.
 
-    So can what is given if it is not there, unless something else takes it away at the same time.
+    An add needs no condition that its fact is false, unless another effect deletes the fact at the same time.
     """
     if all(one.condition is True for one in effects):
         return effects
@@ -108,7 +108,7 @@ def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ..
     if len(found) > _MOST_ALTERNATIVES:
         raise UnsupportedActionError(
             f"the precondition of planning action '{action.name}' has over {_MOST_ALTERNATIVES} alternatives"
-            f" ('or', 'imply' or 'exists' over what actions change); what can do it: {_AS_THEY_ARE}",
+            f" ('or', 'imply' or 'exists' over what actions change); supported by: {_AS_THEY_ARE}",
             place=action.place,
         )
     return found
@@ -116,7 +116,7 @@ def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ..
 
 def _literals(changes: Iterable[Literal | Assignment]) -> tuple[Literal, ...]:
     literals = dict.fromkeys(c for c in changes if isinstance(c, Literal))
-    # PDDL: a fact both deleted and added is true
+    # PDDL: a fact both deleted and added is true.
     return tuple([one for one in literals if one.positive or one.negated not in literals])
 
 
@@ -135,12 +135,12 @@ def _both(first: Assignment, second: Assignment, action: PlanningAction) -> Assi
     if first == second and first.fluent not in fluents(first.amount):
         return first
     raise UnsupportedActionError(
-        f"planning action '{action.name}' changes {first.fluent} in two ways at once", place=action.place
+        f"planning action '{action.name}' changes {first.fluent} in two ways", place=action.place
     )
 
 
 class ReachedFacts:
-    """Facts by predicate and by predicate, position and value."""
+    """Facts, indexed by predicate, and by predicate, position and value."""
 
     def __init__(self, facts: Iterable[Fact] = ()) -> None:
         self._index: dict[tuple[Value, ...], list[Fact]] = {}
@@ -148,12 +148,12 @@ class ReachedFacts:
             self.add(fact)
 
     def add(self, fact: Fact) -> None:
-        """Also this one, which was not there before."""
+        """Add a fact that is not in the index."""
         for key in ((fact.predicate,), *((fact.predicate, i, v) for i, v in enumerate(fact.args))):
             self._index.setdefault(key, []).append(fact)
 
     def candidates(self, atom: Atom, bindings: Mapping[str, Value]) -> Sequence[Fact]:
-        """A short list that contains every fact which fits `atom`."""
+        """Return a short list that contains every fact which fits `atom`."""
         found: Sequence[Fact] = self._index.get((atom.predicate,), ())
         for position, term in enumerate(atom.args):
             value = term.value if isinstance(term, Constant) else bindings.get(_name(term))
@@ -174,8 +174,8 @@ class JoinRule:
     Attributes:
         action: the planning action.
         atoms: the positive conjuncts of its precondition.
-        allowed: what each parameter may stand for.
-        patience: every fact tried takes some of it.
+        allowed: the objects that each parameter may take.
+        patience: the limit of the work; each fact tried counts.
     """
 
     action: PlanningAction
@@ -185,12 +185,12 @@ class JoinRule:
 
     @staticmethod
     def of(action: PlanningAction, grounder: Grounder) -> JoinRule:
-        """The rule for an action."""
+        """Return the rule for an action."""
         atoms = joined_atoms(action, grounder.world.schema)
         return JoinRule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters}, grounder.patience)
 
     def unify(self, atom: Atom, fact: Fact, bindings: Mapping[str, Value]) -> dict[str, Value] | None:
-        """The bindings extended so that the atom is the fact, if that is possible."""
+        """Return the bindings extended so that the atom is the fact, or `None`."""
         extended = dict(bindings)
         for term, value in zip(atom.args, fact.args, strict=True):
             if isinstance(term, Constant):
@@ -205,7 +205,7 @@ class JoinRule:
     def join(
         self, reached: ReachedFacts, atoms: tuple[Atom, ...], bindings: dict[str, Value]
     ) -> Iterator[dict[str, Value]]:
-        """All bindings under which the atoms are reached; the most selective atom first."""
+        """Yield all bindings under which the atoms are reached; the join starts with the most selective atom."""
         if not atoms:
             yield bindings
             return
@@ -219,7 +219,7 @@ class JoinRule:
 
 
 def joined_atoms(action: PlanningAction, schema: Vocabulary) -> tuple[Atom, ...]:
-    """The positive conjuncts of an action's precondition that facts can be joined with."""
+    """Return the positive conjuncts of an action's precondition that a join can bind."""
     return tuple(
         atom
         for atom in _conjuncts(action.precondition)

@@ -1,4 +1,4 @@
-"""Numbering of literals, bounds and fluents: compared and looked up faster than values; and the way back to facts."""
+"""Numbers for literals, bounds and fluents, which are compared faster than values; and problems made from them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 
 NOT = "not "
-"""Before a predicate: the fact that carries a negative literal (positive normal form). No declared name has a blank."""
+"""The prefix of a predicate for a negative literal (positive normal form). No declared name has a blank."""
 
 
 class _Images(dict[int, int]):
-    """Made when they are asked for."""
+    """A mapping that computes each entry on first access."""
 
     def __init__(self, rename: Callable[[int], int]) -> None:
         super().__init__()
@@ -35,7 +35,7 @@ class _Images(dict[int, int]):
 
 
 class Numbering:
-    """Grows; a number once given stays.
+    """A growing table of numbers for literals, bounds and fluents; a number never changes its meaning.
 
     Attributes:
         fluents: the numbers of numeric fluents.
@@ -54,55 +54,55 @@ class Numbering:
 
     @property
     def wants(self) -> Mapping[int, Mapping[int, None]]:
-        """Bound -> the fluents it asks about."""
+        """Bound -> the fluents in it."""
         return self._wants
 
     @property
     def supports(self) -> Mapping[int, Mapping[int, None]]:
-        """Fluent -> the bounds that ask about it."""
+        """Fluent -> the bounds with it."""
         return self._supports
 
     def of(self, leaf: Leaf) -> int:
-        """The number of a literal or bound."""
+        """Return the number of a literal or bound."""
         if isinstance(leaf, Literal):
             return self._number(leaf.fact) + (not leaf.positive)
         known = self._numbers.get(leaf)
         return self._bound(leaf) if known is None else known
 
     def fluent(self, fluent: Fact) -> int:
-        """The number of a numeric fluent."""
+        """Return the number of a numeric fluent."""
         number = self._number(fluent)
         self.fluents.add(number)
         return number
 
     def named(self, number: int) -> Fact | NumericBound:
-        """What has the number, or is denied by it."""
+        """Return the fact or bound of the number; a negative literal has the fact that it denies."""
         return self._named[number >> 1]
 
     def fact(self, number: int) -> Fact:
-        """The literal in positive normal form."""
+        """Return the literal in positive normal form."""
         known = self._facts.get(number)
         if known is None:
             fact = self._named[number >> 1]
             if not isinstance(fact, Fact):
-                raise TypeError(f"{fact} is no fact")
+                raise TypeError(f"{fact} is not a fact")
             known = self._facts[number] = as_fact(Literal(fact, not number & 1))
         return known
 
     def present(self, world: World) -> set[int]:
-        """The numbers of all literals and bounds that hold in `world`; fluents have no truth."""
+        """Return the numbers of all literals and bounds that hold in `world`; fluents have no truth value."""
         values = {one: worth(world, one) for one in map(self.fact, sorted(self.fluents))}
         held = {number for number, bound in self._bounds.items() if bound.holds(values)}
         for predicate, listed in self._by_predicate.items():
             if predicate in world.schema.computed:
                 held.update([number + (not is_so(Fact(predicate, args), world)) for number, args in listed])
-            else:  # all at once: most of what is asked about is named here
+            else:  # one query for all: most facts of the predicate have a number
                 known = set(world.match(predicate, (None,) * len(listed[0][1])))
                 held.update([number + (args not in known) for number, args in listed])
         return held
 
     def images(self, name: str, other: str) -> Mapping[int, int]:
-        """Literal -> the same literal about `other` in the place of `name`; for every literal."""
+        """Return a mapping from each literal to the same literal about `other` instead of `name`."""
         if (name, other) not in self._images:
             self._images[name, other] = _Images(lambda number: self._renamed(number, name, other))
         return self._images[name, other]
@@ -135,7 +135,7 @@ class Numbering:
 
 
 def as_fact(literal: Literal) -> Fact:
-    """The literal in positive normal form."""
+    """Return the literal in positive normal form."""
     return literal.fact if literal.positive else Fact(NOT + literal.fact.predicate, literal.fact.args)
 
 
@@ -143,7 +143,7 @@ _MOST_KEPT = 20_000  # ground actions; a problem of 50 items has 3,000
 
 
 class Assembly:
-    """Makes problems of tasks that share a numbering and whose ways have the same numbers."""
+    """Makes problems from tasks that share a numbering and ground operators."""
 
     def __init__(self, numbering: Numbering) -> None:
         self._numbering = numbering
@@ -152,14 +152,14 @@ class Assembly:
     def problem(
         self, domain: str, task: Task, things: Mapping[str, str], world: World | None, notes: tuple[str, ...]
     ) -> Problem:
-        """The problem that the task stands for.
+        """Return the `Problem` of the task.
 
         Args:
-            domain: its name.
-            task: what is left of the problem in numbers.
-            things: all things with their types.
-            world: where numeric fluents have their values; none is needed if there are no fluents.
-            notes: for people.
+            domain: the name of the domain.
+            task: the pruned task, in numbers.
+            things: all objects with their types.
+            world: the source of the values of numeric fluents; `None` if the task has no fluents.
+            notes: remarks for readers.
         """
         init, _ = self._split(task.init)
         goal, bounds = self._split(task.goal)
@@ -189,7 +189,7 @@ class Assembly:
         return GroundAction(way.step, needs, adds, deletes, cost, bounds, way.assignments)
 
     def _split(self, numbers: Iterable[int]) -> tuple[tuple[Fact, ...], tuple[NumericBound, ...]]:
-        """Facts in positive normal form, and bounds."""
+        """Return facts in positive normal form, and bounds."""
         facts: list[Fact] = []
         bounds: list[NumericBound] = []
         for number in numbers:
@@ -202,7 +202,7 @@ class Assembly:
 
 
 def _fluents(actions: Iterable[GroundAction], goal: Iterable[NumericBound]) -> dict[Fact, None]:
-    """All numeric fluents that matter."""
+    """Return the numeric fluents of bounds and assignments, as a set in order."""
     found = dict.fromkeys(fluent for bound in goal for fluent in bound.fluents())
     for action in actions:
         found.update((fluent, None) for bound in action.bounds for fluent in bound.fluents())

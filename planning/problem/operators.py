@@ -33,16 +33,16 @@ _MOST_KNOWN = 16
 
 
 class GroundOperator(NamedTuple):
-    """One way to take a step; a tuple, for thousands are made for each problem.
+    """One variant of a ground action in numbers; a tuple, since each problem makes thousands.
 
     Attributes:
         step: the step; `None` for bookkeeping.
         needs: literals and bounds that must hold before.
-        adds: literals that hold afterwards and fluents that it changes.
-        deletes: literals that hold no longer.
-        assignments: how it changes them.
-        cost: `None` if what it does to the metric is no cost.
-        number: the same for what is left of a way when parts that do not matter are left out.
+        adds: literals that hold afterwards, and fluents that it changes.
+        deletes: literals that no longer hold afterwards.
+        assignments: the changes of these fluents.
+        cost: `None` if its change of the metric is not a cost.
+        number: an identity that the operator keeps when pruning removes parts of it.
     """
 
     step: PlanStep | None
@@ -58,33 +58,33 @@ Key = tuple[str, tuple[str, ...]] | None
 
 
 def key(step: PlanStep | None) -> Key:
-    """The step by value; hashed much faster than itself."""
+    """Return the step by value, which is hashed much faster than the step."""
     return None if step is None else (step.action, step.args)
 
 
 class OperatorIndex:
-    """Ways in order, indexed when that is first asked for; referred to by position."""
+    """Ground operators in order, with indexes built on first use; positions refer to operators."""
 
     def __init__(self, ways: Sequence[GroundOperator]) -> None:
         self.all = ways
         self._known: dict[Hashable, Any] = {}
 
     def known(self, key: Hashable, work_out: Callable[[], _T]) -> _T:
-        """What follows from these ways and `key`; worked out unless that was done lately."""
+        """Return the cached result for `key`, or compute and cache it."""
         found: _T = self._known.pop(key) if key in self._known else work_out()
-        self._known[key] = found  # the last one is kept longest
+        self._known[key] = found  # the latest is evicted last
         if len(self._known) > _MOST_KNOWN:
             del self._known[next(iter(self._known))]
         return found
 
     @cached_property
     def counts(self) -> Sequence[int]:
-        """How much each way needs."""
+        """The number of needs of each operator."""
         return [len(way.needs) for way in self.all]
 
     @cached_property
     def users(self) -> Mapping[int, Sequence[int]]:
-        """Literal or bound -> the ways that need it."""
+        """Literal or bound -> the operators that need it."""
         users: dict[int, list[int]] = {}
         for i, way in enumerate(self.all):
             for one in way.needs:
@@ -93,7 +93,7 @@ class OperatorIndex:
 
     @cached_property
     def adders(self) -> Mapping[int, Sequence[int]]:
-        """Literal or fluent -> the ways that add or change it; none that need it, since they bring nothing."""
+        """Literal or fluent -> the operators that add or change it without needing it."""
         adders: dict[int, list[int]] = {}
         for i, way in enumerate(self.all):
             for one in way.adds:
@@ -103,7 +103,7 @@ class OperatorIndex:
 
     @cached_property
     def touching(self) -> Mapping[int, Sequence[int]]:
-        """Literal, bound or fluent -> the ways that have anything to do with it."""
+        """Literal, bound or fluent -> the operators that need, add, change or delete it."""
         touching: dict[int, list[int]] = {}
         for i, way in enumerate(self.all):
             for one in {*way.needs, *way.adds, *way.deletes}:
@@ -112,7 +112,7 @@ class OperatorIndex:
 
     @cached_property
     def naming(self) -> Mapping[str, Sequence[int]]:
-        """Object -> the ways whose steps name it."""
+        """Object -> the operators whose steps name it."""
         naming: dict[str, list[int]] = {}
         for i, way in enumerate(self.all):
             for name in set(way.step.args) if way.step else ():
@@ -121,7 +121,7 @@ class OperatorIndex:
 
     @cached_property
     def of_step(self) -> Mapping[Key, Sequence[int]]:
-        """Step, see `key` -> the ways to take it."""
+        """Step, see `key` -> its operators."""
         of_step: dict[Key, list[int]] = {}
         for i, way in enumerate(self.all):
             of_step.setdefault(key(way.step), []).append(i)
@@ -129,9 +129,9 @@ class OperatorIndex:
 
 
 class Consulted:
-    """A world that remembers what it was asked, so that one can say later whether the answers would be the same.
+    """A world that records the answers it gives, so that they can be compared with another world.
 
-    Its things are all that there ever were.
+    It has the objects of all worlds so far.
     """
 
     def __init__(self, world: World) -> None:
@@ -141,7 +141,7 @@ class Consulted:
         self.things = things_of(world)
 
     def agrees(self, world: World) -> bool:
-        """Whether `world` gives all the answers that were given so far."""
+        """Return whether `world` gives all recorded answers."""
         return (
             all(self.things.get(name, own) == own for name, own in things_of(world).items())
             and all(world.holds(f.predicate, f.args) is truth for f, truth in self._truths.items())
@@ -149,50 +149,50 @@ class Consulted:
         )
 
     def follow(self, world: World) -> bool:
-        """Ask `world` from now on; whether there are things in it that were never there before."""
+        """Read from `world` from now on; return whether it has new objects."""
         before, self._world = len(self.things), world
         self.things.update(things_of(world))
         return len(self.things) > before
 
     @property
     def schema(self) -> Vocabulary:
-        """What may be said about it."""
+        """The vocabulary of the world."""
         return self._world.schema
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
-        """Whether the fact is true."""
+        """Return whether the fact is true, and record the answer."""
         truth = self._truths[Fact(predicate, args)] = self._world.holds(predicate, args)
         return truth
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """What the function is worth."""
+        """Return the value of the function, and record it."""
         content = self._contents[Fact(function, args)] = self._world.value(function, args)
         return content
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
-        """The facts that agree with the pattern; not remembered: grounding asks for one fact after the other."""
+        """Return the facts that match the pattern, unrecorded: grounding checks each fact separately."""
         return self._world.match(predicate, pattern)
 
     def objects(self, type_name: str) -> Iterable[str]:
-        """The things of that type."""
+        """Return the objects of the type."""
         return [name for name, own in self.things.items() if self.schema.is_a(own, type_name)]
 
     def type_of(self, name: str) -> str | None:
-        """The thing's type."""
+        """Return the object's type."""
         return self.things.get(name)
 
 
 class OperatorCache:
-    """Ground actions over all facts that were reached so far.
+    """Ground operators over all facts reached so far.
 
     Attributes:
-        numbering: of all that they are about.
-        ways: all ways to take a step in one of the worlds so far; in an order that does not depend on them.
+        numbering: the numbers of their literals, bounds and fluents.
+        ways: all ground operators of the worlds so far; their order does not depend on the worlds.
 
     Args:
-        relevant: what of the domain matters.
-        metric: what plans shall have little of.
-        world: the first world it serves.
+        relevant: the relevant part of the domain.
+        metric: the term to minimize.
+        world: the first world it is valid for.
     """
 
     def __init__(self, relevant: Relevant, metric: Term | None, world: World) -> None:
@@ -212,20 +212,20 @@ class OperatorCache:
         self._found_so_far = 0
 
     def serves(self, world: World) -> bool:
-        """Whether everything that was worked out is right for this world, too."""
+        """Return whether the cached operators are also valid for this world."""
         same = not self._over_all or list(things_of(world)) == list(self._world.things)
         return same and self._world.agrees(world)
 
     def extend(self, world: World, patience: WorkLimit | None = None) -> None:
-        """Find the ways that are possible only in this world.
+        """Add the operators that only this world makes possible.
 
         Args:
-            world: the next world it serves.
-            patience: for how long; after an error nothing here is of use any more.
+            world: the next world it is valid for.
+            patience: the limit of the work; discard the cache after an error.
 
         Raises:
             UnsupportedActionError: see `planning.problem.grounding.variants`.
-            OutOfPatienceError: it takes too long.
+            WorkLimitError: the limit is reached.
         """
         patience = patience or WorkLimit()
         self._grounder = replace(self._grounder, patience=patience)
@@ -283,12 +283,12 @@ class OperatorCache:
         return numbered(variant, self.numbering, cost, self._found_so_far)
 
     def _key(self, way: GroundOperator) -> tuple[int, tuple[str, ...]]:
-        """Independent of which world the way was found for; ways of one step are found together."""
+        """Return a sort key that does not depend on the world; variants of a step are found together."""
         return (self._order[way.step.action], way.step.args) if way.step else (len(self._order), ())
 
 
 def numbered(variant: Variant, numbering: Numbering, cost: float | None, number: int = -1) -> GroundOperator:
-    """The variant in numbers."""
+    """Return the variant in numbers."""
     made = [numbering.of(effect) for effect in variant.effects]
     touched = [numbering.fluent(one.fluent) for one in variant.assignments]
     return GroundOperator(
@@ -303,12 +303,12 @@ def numbered(variant: Variant, numbering: Numbering, cost: float | None, number:
 
 
 def things_of(world: World) -> dict[str, str]:
-    """All things with their types."""
+    """Return all objects with their types."""
     return {name: world.type_of(name) or ROOT_TYPE for name in world.objects(ROOT_TYPE)}
 
 
 def _ranges_over_all(action: PlanningAction, schema: Vocabulary) -> bool:
-    """Whether which ways there are depends on all things of a type, not only on those that facts name."""
+    """Return whether the variants depend on all objects of a type, not only on those in facts."""
     bound = {term.name for atom in joined_atoms(action, schema) for term in atom.args if isinstance(term, Variable)}
     return (
         any(parameter.name not in bound for parameter in action.parameters)

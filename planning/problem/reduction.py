@@ -1,7 +1,6 @@
-"""What of a ground problem can matter (S1.5): what can ever happen, and what can contribute to the goal.
+"""Pruning of a ground problem (S1.5): keep the operators that are possible and can contribute to the goal.
 
-Everything here is exact: there is a plan for what is kept if and only if there is one for the whole, and it
-costs the same.
+Pruning is exact: the pruned problem has a plan if and only if the whole one has, at the same cost.
 """
 
 from __future__ import annotations
@@ -24,12 +23,12 @@ class Task:
     """A ground problem in numbers.
 
     Attributes:
-        numbering: what they stand for.
+        numbering: the facts, bounds and fluents of the numbers.
         init: literals and bounds that hold.
-        goal: literals and bounds that shall hold.
-        ways: what may be done.
-        left: position of a way -> what is left of it where not all matters; `None` if all of it and of all ways does.
-        settled: literals and bounds that hold whenever they are asked for, and are left out.
+        goal: literals and bounds to reach.
+        ways: the ground operators.
+        left: position of an operator -> its relevant part; `None` before pruning.
+        settled: literals and bounds that pruning removed, since they hold in every reachable state.
     """
 
     numbering: Numbering
@@ -41,16 +40,16 @@ class Task:
 
 
 def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
-    """The task with everything left out that cannot matter.
+    """Return the task without parts that cannot matter.
 
-    Left out are ways that can never be taken or cannot contribute to the goal, literals that no kept way or goal
-    asks for, and literals and bounds that hold now and can never cease to (they hold whenever asked for).
+    Pruning removes operators that are impossible or cannot contribute, and literals that no condition reads. It also
+    removes literals and bounds that hold now and that no operator can falsify.
 
     Args:
-        task: pruned before or not.
-        possible: by position, whether a way may be taken (1) or not (0).
+        task: a pruned or unpruned task.
+        possible: by position, whether an operator is reachable (1) or not (0).
     """
-    # From one problem to the next mostly other facts hold, but the same is possible, and the same can cease to hold.
+    # The next problem differs mostly in its facts; possible operators and deletable facts, the key, stay the same.
     key = (bytes(possible), task.goal, task.settled)
     kept = task.ways.known("slice" if task.left else "whole", lambda: Restriction(task.ways, task.numbering))
     contribution = task.ways.known(key, lambda: kept.contribution(task, bytes(possible)))
@@ -65,7 +64,7 @@ def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
 
 
 class Restriction:
-    """What contributes, and what is left of it without what nobody asks for; mostly the same for the next problem."""
+    """A cache of contributing operators and their relevant parts; the next problem mostly reuses it."""
 
     def __init__(self, ways: OperatorIndex, numbering: Numbering) -> None:
         self._ways, self._numbering = ways, numbering
@@ -75,13 +74,13 @@ class Restriction:
         self._last: _Contribution | None = None
 
     def contribution(self, task: Task, possible: bytes) -> _Contribution:
-        """What contributes to the task's goal if these ways are possible."""
+        """Return the contribution to the task's goal by these possible operators."""
         found = None if self._last is None else _still_contributing(self._last, task, possible)
         self._last = found or _contributing(task, possible)
         return self._last
 
     def of(self, positions: Iterable[int], asked: frozenset[int], settled: frozenset[int]) -> dict[int, GroundOperator]:
-        """Of the ways at these positions, those that add something asked for, by position."""
+        """Return by position the relevant parts of the operators that add a literal in `asked`."""
         if self._left:
             for one in (asked ^ self._asked) | (settled ^ self._settled):
                 for i in self._ways.touching.get(one, ()):
@@ -96,14 +95,14 @@ class Restriction:
 
 @dataclass(frozen=True, slots=True)
 class _Contribution:
-    """What contributes to a goal.
+    """The literals and operators that contribute to a goal.
 
     Attributes:
-        task, possible: what was asked about.
-        wanted: what the goal and the ways ask for, each with the position of the way (-1: the goal) because of which it
-            was first found to be wanted; that way adds something that stands before it.
-        positions: the ways that add something of it, or change a number that it depends on.
-        lasting: what of it can never cease to hold, if it does: no way deletes it or changes its numbers.
+        task, possible: the arguments it was computed for.
+        wanted: the literals and bounds of the goal and of operators' needs. Each has the position of the operator that
+            needs it (-1: the goal); that operator adds an earlier entry.
+        positions: the operators that add a wanted literal, or change a number of a wanted bound.
+        lasting: the wanted literals that stay true once they hold: no operator deletes them or changes their numbers.
     """
 
     task: Task
@@ -147,9 +146,9 @@ def _contribution(task: Task, possible: bytes, wanted: Mapping[int, int], found:
 
 
 def _still_contributing(before: _Contribution, task: Task, possible: bytes) -> _Contribution | None:
-    """The same where only some ways are not possible any more; `None` if it is not seen at a glance what is left then.
+    """Return the contribution after some operators became impossible; `None` if a quick test cannot decide.
 
-    What was wanted because of such a way has to be wanted because of another one.
+    Each literal wanted by an impossible operator needs another operator that wants it.
     """
     if task.numbering.fluents or task.goal != before.task.goal or task.ways is not before.task.ways:
         return None
@@ -163,14 +162,14 @@ def _still_contributing(before: _Contribution, task: Task, possible: bytes) -> _
 
 
 def _settled_alike(before: frozenset[int], task: Task, wanted: Container[int], possible: bytes) -> bool:
-    """Whether what is settled now, and was not, was not wanted, and nobody can need what is not settled any more."""
+    """Return whether newly settled literals were not wanted, and no possible operator needs a no longer settled one."""
     if any(one in wanted for one in task.settled - before):
         return False
     return not any(possible[i] for one in before - task.settled for i in task.ways.users.get(one, ()))
 
 
 class _Left:
-    """What is left of what contributed where some ways are not possible any more."""
+    """The rest of a contribution after some of its operators became impossible."""
 
     def __init__(self, before: _Contribution, task: Task, possible: bytes) -> None:
         self._before, self._task = before, task
@@ -185,11 +184,11 @@ class _Left:
 
     @property
     def positions(self) -> list[int]:
-        """The ways that still contribute."""
+        """The operators that still contribute."""
         return [i for i in self._before.positions if self._useful[i]]
 
     def _dropped(self, lost: list[int]) -> set[int]:
-        """What nobody wants any more, as the ways that wanted it are lost, or add nothing that is wanted."""
+        """Return the literals no longer wanted: their operators are lost, or add nothing wanted."""
         ways, goal, dropped, agenda = self._task.ways, set(self._task.goal), set[int](), list(lost)
         while agenda:
             for need in ways.all[agenda.pop()].needs:
@@ -203,7 +202,7 @@ class _Left:
         return dropped
 
     def wanted(self) -> dict[int, int] | None:
-        """What is wanted, each with a way that is left; `None` if there is not one for each at a glance."""
+        """Return each wanted literal with a remaining operator; `None` if a quick test finds none for one."""
         before, useful, unwanted = self._before.wanted, self._useful, self._unwanted
         orphans = [one for one, i in before.items() if i >= 0 and not useful[i] and one not in unwanted]
         place = {one: n for n, one in enumerate(before)} if orphans else {}
@@ -216,7 +215,7 @@ class _Left:
         return {one: others.get(one, i) for one, i in before.items() if one not in unwanted}
 
     def _parent(self, one: int, place: Mapping[int, int]) -> int | None:
-        """A way that needs it and adds something that was found to be wanted before it."""
+        """Return an operator that needs the literal and adds one that was wanted before it."""
         here = place[one]
         for i in self._task.ways.users.get(one, ()):
             if self._useful[i]:
@@ -237,7 +236,7 @@ class _Left:
 
 
 def _inputs(ways: Iterable[GroundOperator], numbering: Numbering) -> Mapping[int, Iterable[int]]:
-    """Fluent -> the fluents that amounts assigned to it depend on."""
+    """Return a mapping from each fluent to the fluents in amounts assigned to it."""
     found: dict[int, set[int]] = {}
     for way in ways if numbering.fluents else ():
         for one in way.assignments:

@@ -1,9 +1,9 @@
-"""What is possible when nothing ever becomes false (the delete relaxation), found again with little after a change.
+"""Relaxed reachability: the facts and operators possible without deletes, updated incrementally after a change.
 
-From one problem to the next some facts hold no longer and others do, but as a rule the same can be reached. To see
-that, each fact is kept with the way by which it was first reached: all that this way needs was reached before it. What
-held and holds no longer is reached again by itself, or by nothing; then those facts have to be reached in another way
-which were reached by what has become impossible with it. Where that is not seen at a glance all is worked out anew.
+The next problem starts from other facts, but mostly reaches the same ones. Each fact is kept with the operator that
+reached it first; all needs of that operator come before the fact. A fact that no longer holds initially is proven
+again, or is gone. Each fact that only an impossible operator reached then needs another operator. The search starts
+from scratch if a bounded number of tests cannot decide.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
     from planning.problem.operators import GroundOperator
     from planning.problem.reduction import Task
 
-_GIVEN = -1  # instead of a way: it holds from the beginning
+_GIVEN = -1  # instead of an operator: the fact holds initially
 _DEEPEST = 50
-_MOST_LOOKS = 3000  # at ways; so many take about as long as working everything out anew
+_MOST_LOOKS = 3000  # at operators; more tests take longer than a search from scratch
 
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """What is possible.
+    """The relaxed reachable facts and operators.
 
     Attributes:
-        facts: the literals, bounds and fluents reached, each after those by which it is reached, with the position of
-            the way that reaches it.
-        taken: by position, whether a way is possible (1) or not (0).
+        facts: the literals, bounds and fluents reached, each after the needs of its operator, with the operator's
+            position.
+        taken: by position, whether an operator is possible (1) or not (0).
     """
 
     facts: Mapping[int, int]
@@ -40,7 +40,7 @@ class Reach:
 
 
 def reachable(task: Task) -> Reach:
-    """What can hold and happen; a bound counts as possible as soon as a number can change to its good."""
+    """Return the relaxed reachable set; a bound is possible once a number can change towards it."""
     last: list[Reach] = task.ways.known("reach", list)
     found = _Again(last[0], task).reach() if last and not task.numbering.supports else None
     last[:] = [found or _worked_out(task)]
@@ -75,7 +75,7 @@ def _worked_out(task: Task) -> Reach:
 
 
 def _helped(bounds: Iterable[int], way: GroundOperator, numbering: Numbering) -> list[int]:
-    """Those bounds that the way may make true."""
+    """Return the bounds that the operator may make true."""
     named = [(number, numbering.named(number)) for number in bounds]
     return [
         number
@@ -86,14 +86,14 @@ def _helped(bounds: Iterable[int], way: GroundOperator, numbering: Numbering) ->
 
 @dataclass(slots=True)
 class _Again:
-    """What was reached, looked at from another beginning.
+    """The incremental update of an earlier relaxed reachable set.
 
     Attributes:
-        before: what was reached.
-        task: what has become of it.
-        proven: what is reached from the new beginning alone, with the ways that do it.
-        gone: what is not reached any more.
-        looks: how many more ways may be looked at.
+        before: the earlier result.
+        task: the task with other initial facts.
+        proven: facts proven from the new initial facts alone, with their operators.
+        gone: facts that are no longer reachable.
+        looks: the number of operators that may still be tested.
     """
 
     before: Reach
@@ -103,7 +103,7 @@ class _Again:
     looks: int = _MOST_LOOKS
 
     def reach(self) -> Reach | None:
-        """The same as anew; `None` if that is not seen at a glance."""
+        """Return the same result as a search from scratch; `None` if a bounded number of tests cannot decide."""
         task, before, users = self.task, self.before.facts, self.task.ways.users
         given = set(task.init)
         fresh = [one for one in given if one not in before]
@@ -122,14 +122,14 @@ class _Again:
         return Reach({**dict.fromkeys(task.init, _GIVEN), **proven, **kept}, taken)
 
     def _regained(self, lost: int, given: set[int]) -> bool:
-        """Whether it is known what becomes of a fact that held before."""
+        """Return whether a fact that is no longer initial is proven or certainly gone."""
         if lost not in self.task.ways.adders:
             self.gone.add(lost)
             return True
         return self._proves(lost, given, ())
 
     def _proves(self, fact: int, given: set[int], path: tuple[int, ...]) -> bool:
-        """Whether the fact is seen to be reached from what is given and proven; not seen, it may be all the same."""
+        """Return whether initial and proven facts prove this one; with `False` it may still be reachable."""
         if fact in given or fact in self.proven:
             return True
         if fact in path or len(path) == _DEEPEST:
@@ -151,7 +151,7 @@ class _Again:
         return False
 
     def _left(self, given: set[int]) -> bytearray:
-        """The ways that are possible without what is gone; more is gone if no way is left that would reach it."""
+        """Return the operators possible without the facts in `gone`; extend `gone` by facts without operators."""
         ways, taken, agenda = self.task.ways, bytearray(self.before.taken), list(self.gone)
         while agenda:
             for i in ways.users.get(agenda.pop(), ()):
@@ -165,7 +165,7 @@ class _Again:
         return taken
 
     def _instead(self, taken: bytearray, given: set[int]) -> dict[int, int] | None:
-        """For each fact that was reached in a way that is gone, another one; `None` if there is one without."""
+        """Return another operator for each fact whose operator became impossible; `None` if one is not found."""
         before, old = self.before.facts, self.before.taken
         instead: dict[int, int] = {}
         hit = [

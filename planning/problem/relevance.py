@@ -1,4 +1,4 @@
-"""Relevance for a goal (S1.5): the actions, predicates and functions that matter; exact, like `reduction`."""
+"""Relevance for a goal (S1.5): the relevant actions, predicates and functions; exact, like `reduction`."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Relevant:
-    """What of a domain matters for a goal.
+    """The relevant part of a domain for a goal.
 
     Attributes:
-        actions: the planning actions that change something asked about.
-        changing: the predicates that these actions change, and those functions that are asked about, too.
+        actions: the planning actions that change a predicate or function that a goal or relevant condition reads.
+        changing: the predicates that these actions change, and those changed functions that a condition or cost reads.
     """
 
     actions: tuple[PlanningAction, ...]
@@ -28,7 +28,7 @@ class Relevant:
 
 
 def relevant(goal: Expression, metric: Term | None, actions: Iterable[PlanningAction]) -> Relevant:
-    """The actions that change what the goal, or another relevant action, asks about; `metric` adds none."""
+    """Return the actions that change what the goal or another relevant action reads; `metric` adds none."""
     actions, needed = tuple(actions), frozenset(names_of(goal))
     while True:
         found = tuple(action for action in actions if needed & changed(action.effect))
@@ -45,7 +45,7 @@ def relevant(goal: Expression, metric: Term | None, actions: Iterable[PlanningAc
 
 
 def _asked(action: PlanningAction, needed: Collection[str]) -> Iterator[str]:
-    """What the action asks about; what it assigns to a number that is not needed does not count."""
+    """Yield the names that the action reads, without amounts of functions that are not needed."""
     yield from names_of(action.precondition)
     for condition in effect_conditions(action.effect):
         yield from names_of(condition)
@@ -53,20 +53,20 @@ def _asked(action: PlanningAction, needed: Collection[str]) -> Iterator[str]:
 
 
 def _amounts(leaves: Iterable[Add | Delete | NumericEffect], of: Collection[str]) -> Iterator[str]:
-    """What the amounts of assignments to these functions depend on."""
+    """Yield the names in amounts assigned to these functions."""
     for leaf in leaves:
         if isinstance(leaf, NumericEffect) and name_of(leaf) in of:
             yield from names_of(leaf.value)
 
 
 def _counted(metric: Term | None, leaves: Collection[Add | Delete | NumericEffect]) -> frozenset[str]:
-    """The functions that the metric depends on, and those that say by how much these change."""
+    """Return the functions in the metric, and those in the amounts by which these change."""
     own = frozenset() if metric is None else frozenset(names_of(metric))
     return own.union(_amounts(leaves, own))
 
 
 def names_of(e: Expression | Term) -> Iterator[str]:
-    """The predicates, types and functions an expression asks about."""
+    """Yield the predicates, types and functions in an expression."""
     agenda = [e]
     while agenda:
         one = agenda.pop()
@@ -80,10 +80,10 @@ def names_of(e: Expression | Term) -> Iterator[str]:
 
 
 def name_of(leaf: Add | Delete | NumericEffect) -> str:
-    """The predicate or function that a change is about."""
+    """Return the predicate or function of a change."""
     return leaf.call.function if isinstance(leaf, NumericEffect) else leaf.atom.predicate
 
 
 def changed(effect: Effect) -> frozenset[str]:
-    """The predicates and functions an effect changes."""
+    """Return the predicates and functions that an effect changes."""
     return frozenset(map(name_of, effect_leaves(effect)))

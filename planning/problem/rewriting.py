@@ -1,4 +1,4 @@
-"""Actions with other conditions, and conditions with terms, in the place of what was there."""
+"""Substitution: conditions of actions by other conditions, and variables of conditions by terms."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def rewritten(action: PlanningAction, rewrite: Callable[[Expression], Expression]) -> PlanningAction:
-    """The action with each of its conditions rewritten."""
+    """Return the action with each of its conditions rewritten."""
     timed = action.timed and replace(
         action.timed,
         start=rewrite(action.timed.start),
@@ -58,13 +58,13 @@ def _rewritten(effect: Effect, rewrite: Callable[[Expression], Expression]) -> E
 
 
 def type_test(parameter: TypedVariable, term: Term) -> Expression:
-    """Whether a term is of the parameter's type; a value is checked where it is written."""
+    """Return the test that a term is of the parameter's type; values are checked where they are written."""
     types = [one for one in parameter.types or (ROOT_TYPE,) if one not in VALUE_TYPES]
     return Or(tuple(Atom(one, (term,)) for one in types)) if types else And(())
 
 
 def instantiated(e: Expression, terms: Mapping[str, Term]) -> Expression:
-    """The condition with terms in the place of free variables; its own variables are renamed where they would clash."""
+    """Return the condition with terms for its free variables; bound variables are renamed where they would clash."""
     match e:
         case Atom(_, args):
             return replace(e, args=_all(args, terms))

@@ -1,11 +1,12 @@
-"""Leaving out objects that another one can stand in for (S1.5), such as surfaces nothing lies on.
+"""Removal of objects that another object can replace (S1.5), such as surfaces with nothing on them.
 
-An object *o* is left out when it occurs in no initial fact, no goal and no number, and some object *s* that is
-kept can take its place everywhere: for each ground action that mentions *o*, the action with *s* in the place
-of *o* exists as well, needs no more, adds no less, deletes no more and costs no more (or changes nothing). Then
-replacing *o* by *s* in a plan gives a plan without *o*, except where a fact about *o* and the same fact about *s*
-must hold at the same time and one of them is deleted. There is no cheap proof that this cannot be, so a slice
-without a plan says nothing, and the problem is tried as a whole.
+Object *o* is removed if no initial fact, goal or number mentions it and a kept object *s* can replace it. For each
+ground action with *o*, the action with *s* must exist. It needs no more, adds no less, deletes no more and costs no
+more; or the action changes nothing.
+
+Replacing *o* by *s* then turns a plan into one without *o*, with one exception. A fact about *o* and the same fact
+about *s* may both be required while an action deletes one of them. No cheap proof excludes this case. A slice without a
+plan therefore proves nothing, and the engine solves the whole problem.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def spared(task: Task) -> list[int]:
-    """The positions of the ways that are of no use, because each mentions an object that another can stand in for."""
+    """Return the positions of the operators that are redundant, since each mentions a replaceable object."""
     left = task.left or {}
     settled = frozenset(map(str, _settled(task, left)))
     mentions = _mentions(task, left, settled)
@@ -35,7 +36,8 @@ def spared(task: Task) -> list[int]:
     before: dict[str, _Exchange] = task.ways.known("exchanges", dict)
     gone: set[int] = set()
     for name, listed in mentions.items():
-        known = [before[name]] if name in before and before[name].other in stand_ins else []  # as a rule once more
+        # The same object mostly replaces it again.
+        known = [before[name]] if name in before and before[name].other in stand_ins else []
         exchanges = chain(known, (_Exchange(name, other, task) for other in stand_ins))
         exchange = next((one for one in exchanges if one.covers(listed, left)), None)
         if exchange is not None:
@@ -45,7 +47,7 @@ def spared(task: Task) -> list[int]:
 
 
 def _mentions(task: Task, left: Mapping[int, GroundOperator], settled: frozenset[str]) -> Mapping[str, Sequence[int]]:
-    """Object that need not stay -> positions of the ways that mention it, in their step or in literals."""
+    """Return a mapping from each removable object to the operators with it in their step or literals."""
     found: dict[str, dict[int, None]] = {}
     for name, positions in task.ways.naming.items():
         if name not in settled and (here := [i for i in positions if i in left]):
@@ -67,7 +69,7 @@ def _touches(way: GroundOperator, one: int) -> bool:
 
 
 def _about(task: Task) -> Mapping[str, Sequence[int]]:
-    """Object -> what of all that the ways need, add or delete is about it."""
+    """Return a mapping from each object to the literals and bounds about it."""
     about: dict[str, list[int]] = {}
     for one in task.ways.touching:
         for thing in {str(thing) for thing in _things(task.numbering.named(one))}:
@@ -76,7 +78,7 @@ def _about(task: Task) -> Mapping[str, Sequence[int]]:
 
 
 def _settled(task: Task, left: Mapping[int, GroundOperator]) -> Iterator[Value]:
-    """The objects that must stay."""
+    """Yield the objects that must stay."""
     for number in (*task.init, *task.goal):
         yield from _things(task.numbering.named(number))
     for way in left.values() if task.numbering.fluents else ():
@@ -94,7 +96,7 @@ def _things(one: Fact | NumericBound) -> Iterator[Value]:
 
 
 class _Exchange:
-    """`other` in the place of `name`; remembers what covered each way, which as a rule does so again."""
+    """The replacement of `name` by `other`, with the operator that covered each one, for the next problem."""
 
     def __init__(self, name: str, other: str, task: Task) -> None:
         self.other = other
@@ -104,7 +106,7 @@ class _Exchange:
         self._proofs: dict[int, tuple[GroundOperator, int, GroundOperator]] = {}
 
     def covers(self, positions: Iterable[int], left: Mapping[int, GroundOperator]) -> bool:
-        """Whether for each of the ways, all that mention `name`, there is one about `other` that is as good."""
+        """Return whether an operator about `other` is as good as each of these operators, which mention `name`."""
         proofs = self._proofs
         for i in positions:
             proof = proofs.get(i)
@@ -128,7 +130,7 @@ class _Exchange:
             ):
                 self._proofs[i] = (way, j, real)
                 return True
-        if set(adds) <= set(needs):  # it is of no use
+        if set(adds) <= set(needs):  # the operator adds nothing
             self._proofs[i] = (way, i, way)
             return True
         return False

@@ -1,8 +1,8 @@
-"""Posing a problem with durations: ground actions with conditions and effects at their start, their end and between.
+"""Construction of a temporal problem: ground actions with conditions and effects at start, over all and at end.
 
-Which ground actions there are is found by relaxed reachability, as everywhere, but over the two ends of an action: the
-end can happen if the start can and all that the action needs later can hold. So what is out of reach here is out of
-reach whatever is done at the same time, which cannot be said where one action is done after the other.
+Relaxed reachability runs over the two ends of an action. An end is possible if the start is, and if the conditions over
+all and at end can hold. A goal that is unreachable here stays unreachable with concurrent actions; the sequential
+relaxation cannot prove that.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ if TYPE_CHECKING:
     from planning.problem.relevance import Relevant
 
 LONGEST = 1e6
-"""Seconds that an action may take whose domain sets no limit."""
+"""Upper bound in seconds of an action whose domain sets none."""
 
 _MOST_ALTERNATIVES = 64  # of one step
-_ENDS, _BEGUN = " ends", "begun "  # with blanks, which no declared name has
+_ENDS, _BEGUN = " ends", "begun "  # with blanks, which no declared name contains
 
 
 class _NotOfFactsError(Exception):
-    """Numbers that actions change matter, or the goal is a disjunction: no engine here takes that with durations."""
+    """The temporal problem needs numeric conditions or a disjunctive goal, which no temporal engine here supports."""
 
 
 def durative(domain: PlanningDomain, goal: Expression) -> bool:
-    """Whether actions with a duration matter for the goal, in which derived predicates have been replaced."""
+    """Return whether durative actions matter for the goal, in which derived predicates have been replaced."""
     if all(action.timed is None for action in domain.actions.values()):
         return False
     return any(action.timed is not None for action in _relevant(domain, goal).actions)
@@ -57,20 +57,21 @@ def durative(domain: PlanningDomain, goal: Expression) -> bool:
 def build_temporal_problem(
     domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit
 ) -> Problem | None:
-    """The problem of reaching `goal` with durations; `None` if it has more than facts, or its goal is a disjunction.
+    """Return the problem with durations; `None` if it has numeric conditions or a disjunctive goal.
 
     Args:
         domain: without derived predicates, as `planning.problem.derived.derivation` has it.
         world: the present, with derived facts.
-        goal: what shall hold, in the same way.
-        patience: for how long.
+        goal: the condition to reach, without derived predicates.
+        patience: the limit of the work.
 
     Raises:
-        OutOfPatienceError: it takes too long.
+        WorkLimitError: the limit is reached.
     """
     matters = _relevant(domain, goal)
     actions = {action.name: domain.actions[action.name] for action in matters.actions}
-    changing = matters.changing.union(*(changed(action.effect) for action in matters.actions))  # also by durations
+    # Durations read functions too.
+    changing = matters.changing.union(*(changed(action.effect) for action in matters.actions))
     try:
         wanted = _literals(Grounder(world, matters.changing, keep_false=True, patience=patience).residual(goal, {}))
         steps, missing = _possible(actions.values(), matters, wanted, world, patience)
@@ -84,7 +85,7 @@ def build_temporal_problem(
 
 
 def _relevant(domain: PlanningDomain, goal: Expression) -> Relevant:
-    """What matters for the goal; an action with all its conditions and effects, whenever they are."""
+    """Return the relevant part of the domain; an action has its conditions and effects of all times."""
     return relevant(goal, None, map(_whole, domain.actions.values()))
 
 
@@ -105,7 +106,7 @@ def _literals(wanted: Residual) -> tuple[Literal, ...]:
 
 
 def _start(action: PlanningAction) -> PlanningAction:
-    """What happens when it begins, as an ordinary action; an action without duration is that already."""
+    """Return the start of an action as an instantaneous action; one without duration is unchanged."""
     timed = action.timed
     return action if timed is None else replace(action, precondition=timed.start, effect=timed.start_effect)
 
@@ -123,7 +124,7 @@ def _possible(
     world: World,
     patience: WorkLimit,
 ) -> tuple[list[PlanStep], tuple[str, ...]]:
-    """The steps that can be taken if nothing ever becomes false, and what of the goal cannot be reached even then."""
+    """Return the relaxed reachable steps, and the goal literals that are unreachable."""
     actions = tuple(actions)
     later = [one for action in actions if action.timed for one in _end(action, action.timed.over_all, action.timed.end)]
     ends = replace(matters, actions=(*map(_start, actions), *later))
@@ -158,7 +159,7 @@ class _Grounding:
     world: World
 
     def of(self, step: PlanStep) -> Iterator[GroundAction]:
-        """One action for each alternative of the conditions; of those over all, the same one must hold all the time."""
+        """Yield one action for each alternative; one alternative over all holds for the whole duration."""
         action = self.actions[step.action]
         bindings = {p.name: arg for p, arg in zip(action.parameters, step.args, strict=True)}
         starts = list(variants(_start(action), bindings, self.grounder))
@@ -190,7 +191,7 @@ class _Grounding:
 
 
 def _parts(variant: Variant) -> tuple[tuple[Fact, ...], tuple[Fact, ...], tuple[Fact, ...]]:
-    """What it needs, adds and deletes."""
+    """Return the facts that the variant needs, adds and deletes."""
     if variant.assignments:
         raise _NotOfFactsError
     effects = variant.effects
@@ -206,7 +207,7 @@ def _facts(leaves: Iterable[Leaf]) -> tuple[Fact, ...]:
 
 
 def _restricted(name: str, actions: list[GroundAction], goal: tuple[Fact, ...], world: World) -> Problem:
-    """The problem without facts that nobody asks for, or that hold and cannot cease to."""
+    """Return the problem without facts that no condition reads, or that hold and that no action deletes."""
     asked = dict.fromkeys([*goal, *(fact for action in actions for fact in _needed(action))])
     gone = {fact for action in actions for fact in (*action.deletes, *(action.span.deletes if action.span else ()))}
     present = [fact for fact in asked if _holds(fact, world)]
