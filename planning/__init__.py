@@ -1,4 +1,4 @@
-"""From a goal to a plan to an action plot, and back again when the world disagrees."""
+"""Planning: from a goal to a plan, from a plan to an action plot, and to a new plan when the world changes."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""Plans without the steps that they reach their goal without: action elimination (Nakhost & Müller 2010).
+"""Action elimination (Nakhost & Müller 2010): remove redundant steps from a plan.
 
-Engines that give the first plan they find often go somewhere and back again. Each action is left out on trial, and with
-it what cannot be taken any more without it; if the goal is reached all the same, they stay out. A robot would have
-taken every one of them.
+Engines that return their first plan often include detours. Each trial removes one action and the actions that are then
+inapplicable. If the plan still reaches the goal, the removal is kept. A robot would execute each redundant step.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Act:
-    """A ground action; sets of facts are bits of numbers, which makes a trial cost a microsecond."""
+    """A ground action with sets of facts as bits, so that a trial takes about a microsecond."""
 
     index: int
     action: GroundAction
@@ -34,7 +33,7 @@ class _State:
     numbers: Numbers
 
     def after(self, act: _Act) -> _State | None:
-        """The state after it; `None` if it cannot be taken."""
+        """Return the next state; `None` if the action is not applicable."""
         if act.needs & ~self.facts:
             return None
         action, numbers = act.action, self.numbers
@@ -49,7 +48,9 @@ class _State:
 
 
 def indispensable(problem: Problem, chosen: Sequence[int]) -> list[int]:
-    """The actions of a plan, by index, that are left when none can be left out with what depends on it.
+    """Return the actions of a plan, by index, without redundant ones.
+
+    No action of the result can be removed together with the actions that depend on it.
 
     Args:
         problem: without durations.
@@ -57,14 +58,14 @@ def indispensable(problem: Problem, chosen: Sequence[int]) -> list[int]:
     """
     acts, start, goal = _encoded(problem, chosen)
     before = None
-    while before != len(acts):  # what an earlier action is for may have gone only now
+    while before != len(acts):  # a removal may make an earlier action redundant
         before = len(acts)
         acts = _once(problem, acts, start, goal)
     return [act.index for act in acts]
 
 
 def _once(problem: Problem, acts: list[_Act], state: _State, goal: int) -> list[_Act]:
-    """Each act is left out on trial, from the first to the last."""
+    """Try to remove each action, from the first to the last."""
     position = 0
     while position < len(acts):
         fewer, end = _without(state, acts[position + 1 :])
@@ -77,7 +78,7 @@ def _once(problem: Problem, acts: list[_Act], state: _State, goal: int) -> list[
 
 
 def _without(state: _State, acts: Sequence[_Act]) -> tuple[list[_Act], _State]:
-    """Those acts that can still be taken, and where they lead."""
+    """Return the actions that are still applicable, and the state after them."""
     taken = []
     for act in acts:
         ahead = state.after(act)

@@ -1,8 +1,8 @@
-"""Bundles: components, the plots that use them, and a part of a planning domain, handed on as one (S0.9).
+"""Bundles: components, the plots that use them, and part of a planning domain, distributed together (S0.9).
 
-A component builder bundles components with the primitive plots that know how to use them; a task expert bundles
-abstract plots, which use plots alone; an integrator puts bundles together. The repository ("robot app store") is that
-of Python packages: an installed one names its bundles under the entry point group `dsc.bundles`.
+A component builder bundles components with primitive plots that use them. A task expert bundles abstract plots, which
+use only plots. An integrator combines bundles. Python packages are the repository ("robot app store"): a package
+declares its bundles in the entry point group `dsc.bundles`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from planning.domain import PlanningDomain
 from planning.fragments import shipped_by
 
 GROUP = "dsc.bundles"
-"""Of the entry points; each leads to a `Bundle`, or to a function that makes one."""
+"""The entry point group; each entry point names a `Bundle`, or a function that makes one."""
 
 
 def _none() -> Iterable[Component]:
@@ -34,15 +34,15 @@ def _none() -> Iterable[Component]:
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """What belongs together.
+    """Components, plots and domain fragment, distributed together.
 
     Attributes:
-        name: by which others say that they need it.
-        plots: primitive ones, which use components, and abstract ones, which use plots alone.
-        components: makes them, new ones for each program.
-        domain: the planning actions, predicates and types it adds; components may bring more.
+        name: the name in other bundles' `needs`.
+        plots: primitive plots, which use components, and abstract plots, which use only plots.
+        components: makes new components for each program.
+        domain: its planning actions, predicates and types; components may bring more.
         needs: names of bundles whose plots or components its own plots use.
-        about: one line for people.
+        about: one line for readers.
     """
 
     name: str
@@ -62,17 +62,17 @@ class Bundle:
         needs: Iterable[str] = (),
         about: str = "",
     ) -> Bundle:
-        """The bundle of what a folder has: `plots/*.yaml` and `domain.pddl`, either of which may be missing.
+        """Return the bundle of a folder's `plots/*.yaml` and `domain.pddl`, either of which may be missing.
 
         Args:
             folder: e.g. `Path(__file__).parent`.
-            name: of the bundle; that of the folder if left out.
+            name: the bundle's name; by default the folder's.
             components: as the attribute.
             needs: as the attribute.
             about: as the attribute.
 
         Raises:
-            InputError: there is neither, or a file contains a mistake; it says where.
+            InputError: the folder has neither, or a file contains a mistake; with the place.
         """
         folder = Path(folder)
         plots, domain = folder / "plots", folder / "domain.pddl"
@@ -94,11 +94,11 @@ class Bundle:
 
     @property
     def abstract(self) -> tuple[str, ...]:
-        """Names of the plots that use plots alone."""
+        """Names of the plots that use only plots."""
         return tuple(plot.name for plot in self.plots if not addressed_by(plot))
 
     def to_json(self) -> dict[str, Any]:
-        """What it has, as plain data."""
+        """Return the bundle's content as plain data."""
         components = tuple(self.components())
         own = [] if self.domain is None else [self.domain]
         fragments: list[PlanningDomain | DomainText] = [*own, *shipped_by(components)]
@@ -114,10 +114,10 @@ class Bundle:
 
 
 def installed() -> dict[str, Bundle]:
-    """The bundles of all installed packages, by name.
+    """Return the bundles of all installed packages, by name.
 
     Raises:
-        InputError: an entry point leads to no bundle, or two bundles have one name; it says whose.
+        InputError: an entry point does not name a bundle, or two bundles have one name; with the packages.
     """
     found: dict[str, Bundle] = {}
     whose: dict[str, str] = {}
@@ -130,15 +130,15 @@ def installed() -> dict[str, Bundle]:
 
 
 def gathered(wanted: Iterable[Bundle | str], among: Mapping[str, Bundle] | None = None) -> tuple[Bundle, ...]:
-    """The bundles with all that they need, each once, what is needed first.
+    """Return the bundles and their transitive needs, each once, after its own needs.
 
     Args:
         wanted: bundles, or names of installed ones.
-        among: the bundles there are besides, by name; the installed ones if left out, which are loaded when needed.
+        among: other available bundles, by name; by default the installed ones, loaded on first use.
 
     Raises:
-        UnknownNameError: one is not there; it says who needs it.
-        InputError: two different ones have one name.
+        UnknownNameError: a bundle is missing; with the bundle that needs it.
+        InputError: two different bundles have one name.
     """
     wanted = tuple(wanted)
     given = {one.name: one for one in wanted if isinstance(one, Bundle)}
@@ -171,7 +171,11 @@ def gathered(wanted: Iterable[Bundle | str], among: Mapping[str, Bundle] | None 
 
 
 def plots_of(bundles: Collection[Bundle]) -> list[ActionPlot]:
-    """All their plots; raises `InputError` if two bundles have different ones of one name."""
+    """Return all plots of the bundles.
+
+    Raises:
+        InputError: two bundles have different plots of one name.
+    """
     found: dict[str, tuple[ActionPlot, str]] = {}
     for bundle in bundles:
         for plot in bundle.plots:
@@ -182,7 +186,11 @@ def plots_of(bundles: Collection[Bundle]) -> list[ActionPlot]:
 
 
 def components_of(bundles: Collection[Bundle]) -> list[Component]:
-    """New ones of all of them; raises `InputError` if two bundles have components of one name."""
+    """Return new components of all bundles.
+
+    Raises:
+        InputError: two bundles have components of one name.
+    """
     found: dict[str, tuple[Component, str]] = {}
     for bundle in bundles:
         for component in bundle.components():
@@ -194,7 +202,11 @@ def components_of(bundles: Collection[Bundle]) -> list[Component]:
 
 
 def domain_of(bundles: Collection[Bundle]) -> PlanningDomain:
-    """What they say together; raises `InputError` if two contradict each other."""
+    """Return the merged domain of the bundles.
+
+    Raises:
+        InputError: two fragments contradict each other.
+    """
     parts = [one.domain for one in bundles if one.domain is not None]
     return PlanningDomain.from_fragments(parts or ["(define (domain bundles))"])
 
@@ -207,7 +219,7 @@ def _loaded(point: EntryPoint) -> Bundle:
     except Exception as error:
         raise InputError(f"the bundle '{point.name}' of {_of(point)} cannot be loaded: {described(error)}") from error
     if not isinstance(bundle, Bundle):
-        raise InputError(f"the entry point '{point.name}' of {_of(point)} leads to {shown(bundle)}, which is no Bundle")
+        raise InputError(f"the entry point '{point.name}' of {_of(point)} leads to {shown(bundle)}, not to a Bundle")
     return bundle
 
 

@@ -1,7 +1,7 @@
-"""Work on a problem that ends when its time is up, or as soon as nobody waits for it any more.
+"""Blocking work with a time limit, which ends early when its caller is cancelled.
 
-The event loop may run in simulated time and must never wait for a thread at its end. So blocking work is done in a
-daemon thread of its own, a timer watches real time, and the work itself asks its `WorkLimit` now and then.
+The event loop may run in simulated time and must not wait for a thread when it closes. A daemon thread therefore does
+blocking work, and a timer watches real time. The work itself checks its `WorkLimit` periodically.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_SPARINGLY = 256  # a look at the clock costs more than a binding
+_SPARINGLY = 256  # reading the clock costs more than one binding
 
 
 class WorkLimitError(Exception):
-    """The time for a piece of work is up, or nobody waits for it.
+    """The time for a piece of work is up, or its caller is cancelled.
 
     Attributes:
-        doing: what was done then, e.g. `grounding action 'a'`.
+        doing: the work in progress at that time, e.g. `grounding action 'a'`.
     """
 
     def __init__(self, doing: str) -> None:
@@ -36,17 +36,17 @@ class WorkLimitError(Exception):
 
 
 class WorkLimit:
-    """How long a piece of work may take.
+    """A limit in real time for a piece of work.
 
     Attributes:
-        doing: what is being done, for whoever asks why it took too long.
+        doing: the work in progress, for error messages.
 
     Args:
-        seconds: of real time from now on; without a limit if left out.
+        seconds: real time from now on; unlimited if omitted.
     """
 
     def __init__(self, seconds: float = math.inf) -> None:
-        self.doing = "posing the problem"
+        self.doing = "constructing the problem"
         self._deadline = time.monotonic() + seconds
         self._cancelled = False
         self._spent = 0
@@ -57,14 +57,14 @@ class WorkLimit:
         return max(0.0, self._deadline - time.monotonic())
 
     def cancel(self) -> None:
-        """Nobody waits any more; may be called from any thread."""
+        """Stop the work at its next `spend`; may be called from any thread."""
         self._cancelled = True
 
     def spend(self) -> None:
-        """To be called once for each small piece of work.
+        """Count one small piece of work; the work calls it for each.
 
         Raises:
-            WorkLimitError: that was the last.
+            WorkLimitError: the time is up, or the limit is cancelled.
         """
         self._spent += 1
         if self._cancelled or (self._spent % _SPARINGLY == 0 and not self.left):
@@ -72,27 +72,27 @@ class WorkLimit:
 
 
 async def aside(work: Callable[[], T], patience: WorkLimit | None = None) -> T:
-    """What the work returns or raises; done in a thread, which nobody waits for after the end of the patience.
+    """Run the work in a thread and return its result; the thread is abandoned when the limit expires.
 
     Args:
-        work: may block. To end early it has to ask the patience itself; if it does not, it is left alone.
-        patience: cancelled in the end, also if the caller is; a new one for what comes next.
+        work: may block. To end early it must call `spend` of the same limit; otherwise its thread runs on.
+        patience: the limit, cancelled at the end, also if the caller is cancelled; by default a new one.
 
     Raises:
-        WorkLimitError: the time was up.
+        WorkLimitError: the time is up.
     """
     patience = patience or WorkLimit()
     loop = asyncio.get_running_loop()
     result: asyncio.Future[T] = loop.create_future()
 
     def settle(value: Callable[[], None]) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
+        with contextlib.suppress(RuntimeError):  # the loop is closed, so that no task waits
             loop.call_soon_threadsafe(lambda: None if result.done() else value())
 
     def run() -> None:
         try:
             done = work()
-        except BaseException as error:  # noqa: BLE001  carried over to the one who waits
+        except BaseException as error:  # noqa: BLE001  passed to the waiting task
             failure = error if isinstance(error, Exception) else RuntimeError(described(error))
             settle(lambda: result.set_exception(failure))
         else:

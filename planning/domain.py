@@ -46,12 +46,12 @@ __all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain"]
 
 @dataclass(frozen=True, slots=True)
 class GroundStep:
-    """What a step needs and does, its arguments in the place of the parameters.
+    """The precondition and effect of a step, with arguments for parameters.
 
     Attributes:
         condition: the precondition, without the types of the arguments.
         typed: the types and the precondition, as one conjunction.
-        effect: what it changes.
+        effect: the effect.
     """
 
     condition: Expression
@@ -63,11 +63,10 @@ class GroundStep:
 class PlanningDomain:
     """Planning actions over a schema.
 
-    `axioms` says what derived predicates follow from; `notes`, with their places, what deserves a look in the
-    files though it changes nothing.
+    `axioms` define derived predicates. `notes` list harmless oddities of the files, with their places.
 
-    The verbs take a step and the world it would be taken in. They raise `UnknownNameError` for a step whose
-    action the domain does not have, and `InputError` for a wrong number of arguments.
+    Methods that take a step and a world raise `UnknownNameError` if the domain lacks the step's action. They raise
+    `InputError` for a wrong number of arguments.
     """
 
     name: str
@@ -79,15 +78,15 @@ class PlanningDomain:
 
     @classmethod
     def from_pddl(cls, path: str | Path, *more: str | Path, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
-        """The domain of a PDDL file, or of several that each have a part of it.
+        """Return the domain of a PDDL file, or of several files with a part each.
 
         Args:
             path: the file.
-            *more: others.
-            computed: predicates that its conditions use and that Python computes.
+            *more: further files.
+            computed: predicates in its conditions that Python computes.
 
         Raises:
-            InputError: a file cannot be read or contains a mistake; it says where.
+            InputError: a file cannot be read or contains a mistake; with the place.
         """
         return cls.from_fragments([Path(one) for one in (path, *more)], computed)
 
@@ -95,17 +94,16 @@ class PlanningDomain:
     def from_fragments(
         cls, fragments: Iterable[PlanningDomain | DomainText | Path | str], computed: Iterable[Computed[Any]] = ()
     ) -> PlanningDomain:
-        """The domain that fragments make together, with the name of the first.
+        """Return the domain that fragments form together, with the name of the first.
 
-        A fragment may use what another declares, wherever it stands. The same declared twice is fine.
+        A fragment may use names that another declares, in any order. Equal declarations may repeat.
 
         Args:
             fragments: PDDL files (a `Path`, or a name), PDDL texts, or domains; at least one.
-            computed: predicates that their conditions use and that Python computes; a domain brings its own.
+            computed: predicates in their conditions that Python computes; a domain brings its own.
 
         Raises:
-            InputError: a fragment cannot be read or contains a mistake, or two contradict each other; it says
-                where.
+            InputError: a fragment cannot be read or contains a mistake, or two contradict each other; with the place.
         """
         pieces = list(fragments)
         if not pieces:
@@ -118,19 +116,19 @@ class PlanningDomain:
 
     @classmethod
     def parse(cls, text: str, source: str | None = None, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
-        """The domain given as text; `source` names it in messages.
+        """Return the domain of a PDDL text; `source` names the text in messages.
 
         Raises:
-            InputError: it contains a mistake; it says where.
+            InputError: the text contains a mistake; with the place.
         """
         return cls.from_text(parse_domain(text, source), computed)
 
     @classmethod
     def from_text(cls, read: DomainText, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
-        """The domain that a file, or several together, declare.
+        """Return the domain that a file, or several merged, declare.
 
         Raises:
-            InputError: it contains a mistake; it says where.
+            InputError: the text contains a mistake; with the place.
         """
         schema = Schema.from_text(read).with_computed(*computed)
         actions = {a.name: checked(a, schema) for a in read.actions}
@@ -139,7 +137,7 @@ class PlanningDomain:
         return cls(read.name, schema, actions, axioms, tuple(dict.fromkeys(read.remarks())))
 
     def to_text(self) -> DomainText:
-        """All of it as one file would declare it, the inverse of `from_text`."""
+        """Return the domain as one file would declare it, the inverse of `from_text`."""
         schema = self.schema
         return DomainText(
             name=self.name,
@@ -159,10 +157,10 @@ class PlanningDomain:
         )
 
     def to_pddl(self) -> str:
-        """All of it as one PDDL file, whatever it was made from; reading that gives the same domain.
+        """Return the domain as one PDDL file, which reads back as the same domain.
 
         Raises:
-            InputError: a name that PDDL cannot spell, or a predicate that Python computes.
+            InputError: PDDL cannot spell a name, or Python computes a predicate.
         """
         if self.schema.computed:
             computed = next(iter(self.schema.computed))
@@ -170,7 +168,7 @@ class PlanningDomain:
         return domain_to_text(self.to_text())
 
     def statements(self) -> dict[str, str]:
-        """What plans rely on, in PDDL on one line each: the actions and derived predicates, by what they are called."""
+        """Return the actions and derived predicates by their names in messages, each as PDDL on one line."""
         text = self.to_text()
         found = {f"planning action '{one.name}'": action_to_text(one) for one in text.actions}
         for axiom in text.axioms:
@@ -179,7 +177,7 @@ class PlanningDomain:
         return {name: " ".join(one.split()) for name, one in found.items()}
 
     def applicable(self, step: PlanStep, world: World) -> bool:
-        """Whether the arguments are of the parameters' types and the precondition holds."""
+        """Return whether the arguments fit the parameters' types and the precondition holds."""
         action, bindings = self.action(step), self.bindings(step)
         fitting, type_of = world.schema.fitting, world.type_of
         for parameter in action.parameters:
@@ -188,15 +186,15 @@ class PlanningDomain:
         return holds(action.precondition, world, bindings)
 
     def effects(self, step: PlanStep, world: World) -> Delta:
-        """What the step changes, whether it is applicable or not."""
+        """Return the changes of the step, applicable or not."""
         return apply_effect(self.action(step).effect, world, self.bindings(step))
 
     def precondition(self, step: PlanStep) -> Expression:
-        """The step's precondition as one conjunction with its arguments in it, their types first."""
+        """Return the step's precondition with its arguments as one conjunction, types first."""
         return self.ground(step).typed
 
     def ground(self, step: PlanStep) -> GroundStep:
-        """The step with its arguments in it; kept, since one plan has most steps of the one before."""
+        """Return the step with its arguments; cached, since a new plan shares most steps with the last."""
         known = self._ground.get(step)
         if known is None:
             if len(self._ground) >= _MOST_GROUND:
@@ -212,11 +210,11 @@ class PlanningDomain:
         return GroundStep(condition, typed, substitute_effect(action.effect, bindings))
 
     def why_not(self, step: PlanStep, world: World) -> Explanation:
-        """The precondition with truth values; its deciding leaf says what the step is waiting for."""
+        """Return the precondition with truth values; its deciding leaf names the missing fact."""
         return explain(self.precondition(step), world)
 
     def action(self, step: PlanStep) -> PlanningAction:
-        """The action that the step is one case of."""
+        """Return the planning action of the step."""
         found = self.actions.get(step.action)
         if found is None:
             raise UnknownNameError(
@@ -225,7 +223,7 @@ class PlanningDomain:
         return found
 
     def bindings(self, step: PlanStep) -> dict[str, str]:
-        """The action's parameters with the step's arguments."""
+        """Return the action's parameters with the step's arguments."""
         parameters = self.action(step).parameters
         if len(parameters) != len(step.args):
             raise InputError(f"'{step.action}' takes {len(parameters)} arguments, {step} has {len(step.args)}")

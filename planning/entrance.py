@@ -1,4 +1,4 @@
-"""What an executive is made of, judged where types are not checked: with one line of error."""
+"""Checks of an executive's parts at run time, for callers without a type checker; each error is one line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from knowledge_base.store import KnowledgeBase
 
 
 def require_parts(knowledge: object, planner: object, foresight: object, store: object) -> None:
-    """Raise `InputError` unless each is what it is declared to be, or `None`."""
+    """Raise `InputError` unless each part has its declared type, or is `None`."""
     if knowledge is not None:
         require(knowledge, KnowledgeBase, "the knowledge is a KnowledgeBase")
     if store is not None:

@@ -1,4 +1,4 @@
-"""Everything wired together: a domain, plots, skills, knowledge and a planner, ready to run."""
+"""The executive: a domain, plots, components, knowledge and a planner, wired and ready to run."""
 
 from __future__ import annotations
 
@@ -46,35 +46,35 @@ from planning.problem.construction import check_goal
 from planning.soundness import require_sound
 
 Prepare = Callable[[Sequencer], None]
-"""Called before a run starts, e.g. to post events or to keep the sequencer at hand."""
+"""A callback before a run starts, e.g. to post events or to keep a reference to the sequencer."""
 _BUDGET = Budget()
 
 
 class Executive:
-    """A robot program that can be run.
+    """A robot program, ready to run.
 
     Args:
-        domain: the planning domain, or the PDDL file it is in, which the components may add to; the knowledge
-            base's schema declares all that these do.
-        plots: the plots; those with `implements` carry out the domain's planning actions. A `Library` is taken as it
-            is, so that executives can share what was worked out for it; `achieve` is added if it has none.
-        components: the skills.
-        knowledge: the world model; an empty one of the domain's schema if left out. Plots may ask for all that its
-            schema declares.
-        planner: finds plans; if left out, pyperplan in simulated time, so that a run can be repeated, and in real
-            time the engines that suit a problem, in a race.
-        parallel: whether steps of a plan that need not wait for each other are carried out side by side.
-        foresight: tries out plans in a simulation before they are carried out.
-        store: a file in which knowledge and runs are kept, so that a run can be resumed after a crash; it is made
-            when it is not there. The knowledge is the file's then.
-        durability: with a store, what it outlives: "process" the death of the process, "power" a power cut too.
+        domain: the planning domain, or its PDDL file. Components may add fragments; the knowledge base's schema
+            declares the merged domain.
+        plots: the plots; those with `implements` execute planning actions. Executives may share a `Library` and its
+            caches. The plot `achieve` is added if the library has none.
+        components: the components with the skills.
+        knowledge: the world model, whose schema plots may query; by default an empty one of the domain's schema.
+        planner: finds plans. The default is pyperplan in simulated time, so that a run is repeatable. In real time it
+            is a race of the engines that suit a problem.
+        parallel: execute independent steps of a plan concurrently.
+        foresight: simulates plans before they are executed.
+        store: a file for knowledge and runs, so that a run can be resumed after a crash. It is created if missing, and
+            provides the knowledge.
+        durability: with a store, "process" survives the death of the process, "power" also a power cut.
 
     Raises:
         PlotError: a plot does not pass the validator; the error has all findings.
-        InputError: a domain file is wrong, two fragments contradict each other, two plots have one name, a component's
-            parameter has no value, a relation between them does not hold, or both knowledge and a store are given.
-        SchemaMismatchError: the given world model does not know what the domain is about.
-        StoreError: the store cannot be opened, or somebody else is writing it.
+        InputError: a domain file is wrong, two fragments contradict each other, or two plots have one name. A
+            component's parameter has no value, or a relation between parameters does not hold. Both knowledge
+            and a store are given.
+        SchemaMismatchError: the schema of `knowledge` lacks declarations of the domain.
+        StoreError: the store cannot be opened, or another process writes it.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class Executive:
         if any(component.name == PlanningComponent.name for component in self.components):
             raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)
         if knowledge is not None and store is not None:
-            raise InputError("with a store the knowledge is the store's; none can be given beside it")
+            raise InputError("with a store the knowledge is the store's; none can be given with it")
         if knowledge is not None:
             require_extension(self.domain.schema, knowledge.schema)
         self._store = None if store is None else located(store)
@@ -118,7 +118,7 @@ class Executive:
         require_sound(self.library, self.domain, schema, skills, declared)
         if knowledge is not None:
             self.knowledge = knowledge
-        else:  # at last, since what is opened has to be closed
+        else:  # last, since an opened knowledge base must be closed
             kept = None if store is None else durability
             self.knowledge = KnowledgeBase.open(self.domain.schema, self._store, kept)
 
@@ -130,23 +130,23 @@ class Executive:
         components: Iterable[Component] = (),
         **how: Any,
     ) -> Self:
-        """A robot program put together of bundles, with all that these need, and plots and components of its own.
+        """Return a robot program made of bundles, the bundles that these need, and further plots and components.
 
         Args:
             bundles: each a `Bundle`, or the name of an installed one.
-            plots: what the bundles lack.
-            components: what the bundles lack.
+            plots: plots that the bundles lack.
+            components: components that the bundles lack.
             how: the other arguments of an `Executive`, by name (`knowledge`, `planner`, `store`, ...).
 
         Raises:
-            UnknownNameError: a bundle is not there.
+            UnknownNameError: a bundle is missing.
             InputError: two bundles contradict each other; and as for an `Executive`.
         """
         found = gathered(bundles)
         return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
 
     def listen(self, listener: Listener) -> None:
-        """Tell `listener` every record of every run from now on."""
+        """Call `listener` with every record of every run from now on."""
         self._listeners.append(listener)
 
     def run(
@@ -162,13 +162,13 @@ class Executive:
         """Run a plot to its end.
 
         Args:
-            plot: its name.
+            plot: the plot's name.
             arguments: values for its parameters.
-            simulated: whether time jumps from event to event; if not, it passes as on the clock on the wall.
-            open_ended: whether events may still come from outside (an operator, a user interface) when nothing
-                is going on; if not, such a run ends and says so.
+            simulated: time jumps from event to event; otherwise it is real time.
+            open_ended: events may still come from outside (an operator, a user interface) when the run is idle.
+                Otherwise an idle run ends and reports that.
             prepare: see `Prepare`.
-            header: what is to be found with the run in the store, plain data.
+            header: plain data to keep with the run in the store.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
@@ -186,9 +186,9 @@ class Executive:
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
     ) -> RunEnd:
-        """As `run`, inside an asyncio loop that is there already, e.g. with components that are elsewhere.
+        """Run a plot inside an existing asyncio loop, e.g. with remote components.
 
-        Time is that of the loop: real, or simulated by `run_simulated`.
+        The loop determines the time: real, or simulated by `run_simulated`. For the arguments see `run`.
         """
         clock = LoopClock()
         store = self._run_store({**(header or {}), "simulated": clock.simulated, "open_ended": open_ended})
@@ -198,30 +198,30 @@ class Executive:
         return await _to_its_end(sequencer.run(plot, arguments), planning, clock)
 
     def resume(self, *, prepare: Prepare | None = None) -> RunEnd:
-        """Go on with the store's unfinished run where it was broken off, and run it to its end.
+        """Resume the store's unfinished run where it was interrupted, and run it to its end.
 
-        Those who listen hear its records from the beginning. `prepare` is called again; what was handed in to
-        come later, and has not come, is kept and need not be handed in again.
+        Listeners get its records from the beginning. `prepare` is called again. Scheduled input that is still pending
+        is kept and need not be posted again.
 
         Raises:
-            StoreError: there is no store, no unfinished run in it, or it cannot be read or written.
-            ChangedError: plots or domain are not those with which it was begun; the error says what is different.
+            StoreError: there is no store or no unfinished run in it, or it cannot be read or written.
+            ChangedError: plots or domain differ from those at the run's start; the error lists the differences.
         """
         store, kept = self._taken_up()
         going_on = self._go_on(store, kept, prepare)
         return run_simulated(going_on, kept.time) if kept.run.header["simulated"] else run_real(going_on)
 
     async def go_on(self, *, prepare: Prepare | None = None) -> RunEnd:
-        """As `resume`, inside an asyncio loop that is there already, of the same kind of time as when it was begun.
+        """Resume the unfinished run inside an existing asyncio loop with the run's kind of time; see `resume`.
 
         Raises:
-            InputError: the run was begun in real time and this loop's is simulated, or the other way round.
+            InputError: the run began in real time and this loop's is simulated, or the other way round.
         """
         store, kept = self._taken_up()
         simulated = LoopClock().simulated
         if simulated != kept.run.header["simulated"]:
             was, now = ("real", "simulated") if simulated else ("simulated", "real")
-            raise InputError(f"the run was begun in {was} time and cannot go on in {now} time")
+            raise InputError(f"the run was begun in {was} time and cannot be resumed in {now} time")
         return await self._go_on(store, kept, prepare)
 
     def achieve(
@@ -234,22 +234,22 @@ class Executive:
         open_ended: bool = False,
         prepare: Prepare | None = None,
     ) -> RunEnd:
-        """Plan for a goal, carry the plan out, and plan again when the world disagrees.
+        """Plan for a goal, execute the plan, and plan again when the world changes against it.
 
-        The end is `finished` when the attempt has come to its end, and says whether the goal was `reached`; if not,
-        it `emitted` why: `no_plan` or `gave_up`, with the reason.
+        The end is `finished` when the attempt ends, and states whether the goal was `reached`. If not, it `emitted`
+        `no_plan` or `gave_up`, with the reason.
 
         Args:
             goal: a condition.
             seconds: real time for each search.
-            replans: how often to plan again after the first plan.
+            replans: number of plans after the first one.
             simulated: as for `run`.
             open_ended: as for `run`.
             prepare: as for `run`.
 
         Raises:
-            InputError: the goal is no condition, or names something that is not declared or not known; or a bound is
-                no number that makes sense.
+            InputError: the goal is not a condition, or names something undeclared or unknown; or a limit is out of
+                range.
         """
         check_goal(parse_condition(goal), self.knowledge)
         budget = _budget(seconds, replans)
@@ -299,7 +299,7 @@ class Executive:
         return RunStore(self.knowledge, self._store, header, self.domain.statements())
 
     def close(self) -> None:
-        """End the planners' processes, if there are any of its own, and give back the store."""
+        """Close the store, and end the processes of the default planners."""
         if self._store is not None:
             self.knowledge.close()
         for planner in self._own_planners.values():
@@ -314,11 +314,11 @@ class Executive:
         return self._own_planners[clock.simulated]
 
     def __enter__(self) -> Self:
-        """Itself; `close` at the end."""
+        """Return the executive; `close` runs at the end of the block."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """`close`."""
+        """Call `close`."""
         self.close()
 
 
@@ -332,7 +332,7 @@ async def _to_its_end(running: Coroutine[Any, Any, RunEnd], planning: PlanningCo
 
 @cache
 def achieve_plot() -> ActionPlot:
-    """The plot that stands in where no designed candidate fits; read once, since plots never change."""
+    """Return the plot for goals without a designed candidate, cached, since plots are immutable."""
     resource = files("planning") / "plots" / "achieve.yaml"
     return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
 

@@ -1,7 +1,7 @@
-"""Domains from fragments (S4.6): every module ships its piece of PDDL, and the pieces make one domain.
+"""Domains from fragments (S4.6): each module ships a fragment of PDDL, and merged fragments form a domain.
 
-Pieces are put together as they are written, before any name is resolved: one may use what another declares,
-in whatever order they come. The same said twice is said once; what contradicts is refused with both places.
+Fragments are merged as text forms, before name resolution: one may use names that another declares, in any order. Equal
+declarations are merged; contradictory ones raise an error with both places.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 
 
 def shipped_by(components: Iterable[Component]) -> list[DomainText]:
-    """The fragments that components bring with them, those of one class once.
+    """Return the fragments that components ship, once for each class.
 
     Raises:
-        InputError: a file cannot be read, or is no domain.
+        InputError: a file cannot be read, or does not contain a domain.
     """
     kinds = dict.fromkeys(type(component) for component in components)
     return [_read(kind.domain, kind.__name__) for kind in kinds if kind.domain is not None]
 
 
 def merged_text(texts: Sequence[DomainText]) -> DomainText:
-    """All that the fragments say, under the name of the first.
+    """Return the union of the fragments, under the name of the first.
 
     Raises:
-        SchemaError: two types, constants or actions of one name differ. (Of other declarations, the schema made from
-            it finds that.)
+        SchemaError: two types, constants or actions of one name differ. (The schema made from the result detects
+            this for other declarations.)
     """
     first = texts[0]
     return DomainText(
@@ -54,7 +54,7 @@ def merged_text(texts: Sequence[DomainText]) -> DomainText:
 
 @contextmanager
 def searched(texts: Sequence[DomainText]) -> Iterator[None]:
-    """Names that are found in none of several fragments: say which those are."""
+    """Add the names of the fragments to an error about a name that none of them declares."""
     sources = dict.fromkeys(text.source or text.name for text in texts)
     try:
         yield

@@ -1,4 +1,4 @@
-"""The garbage collector while robots run: it must not stop them to look at what is going to stay."""
+"""Garbage collection during a run: long-lived objects are frozen, so that the collector never pauses to scan them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _YOUNG = 10_000
-"""After so many new things they are looked through, if not after more; the interpreter's own 700 suit programs that
-make few. One new plan makes twice as many as this, most of them for a moment."""
+"""Allocations between collections of the youngest generation, as a minimum.
+
+The interpreter's default of 700 suits programs with few allocations. One new plan makes twice this number of objects,
+most of them short-lived.
+"""
 
 _lock = threading.Lock()
 _running = 0
@@ -21,9 +24,9 @@ _before = gc.get_threshold()
 
 @contextmanager
 def settled() -> Iterator[None]:
-    """Until the end of this run, and of others at the same time, the collector leaves alone what is there now.
+    """Freeze the existing objects until the end of this run, and of others at the same time.
 
-    A look at all of it takes a tenth of a second. New things are looked through less often.
+    A collection of all objects takes a tenth of a second. New objects are collected less often too.
     """
     global _running, _before  # noqa: PLW0603  there is one collector in a process
     with _lock:

@@ -1,4 +1,4 @@
-"""Plans and what may come of asking for one: values, since "no plan" is an answer and not an error."""
+"""Plans and planning outcomes: values, since "no plan" is an answer and not an error."""
 
 from __future__ import annotations
 
@@ -16,40 +16,40 @@ class PlanStep:
     args: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """In PDDL: `(pick-up cup1 table)`."""
+        """PDDL: `(pick-up cup1 table)`."""
         return "(" + " ".join((self.action, *self.args)) + ")"
 
     def to_json(self) -> list[str]:
-        """The name of the action, then its arguments."""
+        """Return the name of the action, then its arguments."""
         return [self.action, *self.args]
 
     @classmethod
     def from_json(cls, form: Sequence[str]) -> PlanStep:
-        """The inverse of `to_json`."""
+        """Return the step of a form; the inverse of `to_json`."""
         action, *args = form
         return cls(action, tuple(args))
 
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """When a step begins, in seconds from the beginning of the plan, and how long it takes."""
+    """Start of a step, in seconds from the plan's beginning, and its duration in seconds."""
 
     start: float
     duration: float = 0.0
 
     @property
     def end(self) -> float:
-        """When it is over."""
+        """The end, in seconds from the plan's beginning."""
         return self.start + self.duration
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Steps to be taken in order; no steps when the goal already holds.
+    """Steps in order; empty if the goal already holds.
 
     Attributes:
         steps: the steps; with a schedule in the order of their starts.
-        schedule: when an engine that plans with durations has each of them begin; empty if nobody says.
+        schedule: the times of the steps, from an engine that plans with durations; otherwise empty.
     """
 
     steps: tuple[PlanStep, ...] = ()
@@ -62,7 +62,7 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """When all of it is done, by the schedule; 0 without one."""
+        """The makespan of the schedule in seconds; 0 without one."""
         return max((timing.end for timing in self.schedule), default=0.0)
 
     def __str__(self) -> str:
@@ -72,19 +72,18 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class PlanFound:
-    """A plan that solves the posed problem.
+    """A plan that solves the problem.
 
     Attributes:
         plan: its steps.
-        engine: who found it.
-        seconds: how long that took in real time; differs from run to run.
-        simulated_seconds: how long it takes in simulated time; depends on the problem only.
-        reproducible: whether no limit of real time had a part in it, so that the same problem gives it again.
-        cost: what its actions cost together; their number, if nobody says what each costs; with a schedule, the
-            seconds until all of it is done.
-        from_cache: whether it was found for the same problem before.
-        failures: what happened to other engines that were asked as well.
-        translated: how much of the `seconds`, in processor time, its process took to put the problem into its words.
+        engine: the engine that found it.
+        seconds: real time of the search; differs from run to run.
+        simulated_seconds: simulated time of the search; depends on the problem only.
+        reproducible: whether no limit in real time influenced it, so that the same problem gives the same plan.
+        cost: the total cost of its actions, by default their number; with a schedule, its makespan in seconds.
+        from_cache: whether a cache answered.
+        failures: the failures of other engines asked as well.
+        translated: the part of `seconds`, in processor time, for the translation into the engine's input.
     """
 
     plan: Plan
@@ -100,7 +99,7 @@ class PlanFound:
 
 @dataclass(frozen=True, slots=True)
 class ProvenUnsolvable:
-    """There is no plan; `reason` says what is known about why. For `failures` see `PlanFound`."""
+    """Proof that there is no plan, with its known `reason`. For `failures` see `PlanFound`."""
 
     engine: str
     reason: str
@@ -109,7 +108,7 @@ class ProvenUnsolvable:
 
 @dataclass(frozen=True, slots=True)
 class NoneFound:
-    """There is no plan of a narrower kind than was asked for (`reason` says of which); `failures` as in `PlanFound`."""
+    """Proof that there is no plan of a narrower kind, which `reason` names. For `failures` see `PlanFound`."""
 
     engine: str
     reason: str
@@ -127,7 +126,7 @@ class TimedOut:
 
 @dataclass(frozen=True, slots=True)
 class EngineFailed:
-    """The engine crashed, answered rubbish or gave a plan that does not solve the problem."""
+    """The engine crashed, gave unreadable output, or gave a plan that does not solve the problem."""
 
     engine: str
     message: str
@@ -135,12 +134,12 @@ class EngineFailed:
 
 @dataclass(frozen=True, slots=True)
 class NobodyCan:
-    """No engine was asked, since none that may be can do what the problem needs.
+    """No engine was asked, since no permitted engine supports the problem's features.
 
     Attributes:
-        engine: who alone may be asked; empty if all that are installed may.
+        engine: the only engine permitted; empty if all installed ones are.
         needs: the features of the problem, see `planning.strips.FEATURES`.
-        could: engines that can do that, each with what to do before it can be used; nothing if it only has to be named.
+        could: engines that support them, each with the step that makes it usable; empty if its name suffices.
     """
 
     engine: str
@@ -149,10 +148,10 @@ class NobodyCan:
 
     @property
     def who(self) -> str:
-        """Who could, in words."""
+        """The missing support and the engines that have it, in words."""
         nobody = f"{self.engine} cannot do that" if self.engine else "no installed engine can do that"
         others = ", ".join(f"{name} could ({how or 'name it as the planner'})" for name, how in self.could)
-        return f"{nobody}, {others or 'nor does anybody known here'}"
+        return f"{nobody}, {others or 'nor can any engine known here'}"
 
     @property
     def message(self) -> str:
@@ -161,4 +160,4 @@ class NobodyCan:
 
 
 PlanningOutcome = PlanFound | ProvenUnsolvable | NoneFound | TimedOut | EngineFailed | NobodyCan
-"""What comes of asking for a plan."""
+"""The outcome of a planning request."""

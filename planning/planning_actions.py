@@ -1,4 +1,4 @@
-"""Planning actions and axioms, checked against the schema that they are written in."""
+"""Planning actions and axioms, checked against their schema."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PlanningAction:
-    """What the planner may do, in general; with arguments it becomes a `PlanStep`.
+    """A PDDL action; with arguments it becomes a `PlanStep`.
 
     Attributes:
         name, parameters: as declared.
-        precondition: what must hold before; of a durative action, what it needs when it is done alone.
-        effect: what has changed afterwards; of a durative action, when it was done alone.
-        place: where it is defined.
-        duration: how long it takes, in seconds; `None` for an action without duration.
-        timed: what a durative action needs and does at its start, all the time, and at its end.
+        precondition: the condition before; of a durative action, the condition if it is executed alone.
+        effect: the changes afterwards; of a durative action, the changes if it is executed alone.
+        place: its place in the source file.
+        duration: its duration in seconds; `None` for an instantaneous action.
+        timed: a durative action's conditions and effects at start, over all and at end.
     """
 
     name: str
@@ -43,7 +43,7 @@ class PlanningAction:
 
 @dataclass(frozen=True, slots=True)
 class Axiom:
-    """A derived predicate (PDDL 2.2): it holds of these parameters wherever the condition does.
+    """A derived predicate (PDDL 2.2): it holds for the parameters for which the condition holds.
 
     Several axioms for one predicate are alternatives.
     """
@@ -55,16 +55,16 @@ class Axiom:
 
 
 def checked(action: ActionText, schema: Schema) -> PlanningAction:
-    """The action, if the schema knows all that it is about.
+    """Return the action, checked against the schema.
 
     Raises:
-        InputError: it does not.
+        InputError: the action uses a name that is not declared.
     """
     for parameter in action.parameters:
         for one in parameter.types:
-            schema.require_type(one, parameter.place)  # a parameter is a thing: a plan names it
+            schema.require_type(one, parameter.place)  # a parameter is an object, which a plan names
     variables = check_parameters(action.parameters, schema)
-    # A name that is no constant is a mistake here: the problem's objects are not known to the domain.
+    # An unknown constant is a mistake here: a domain has no objects of a problem.
     timed = action.timed or DurativeParts(start=action.precondition, end_effect=action.effect)
     for condition in (timed.start, timed.over_all, timed.end):
         check(condition, schema, variables, objects=schema.constants)
@@ -79,7 +79,7 @@ def checked(action: ActionText, schema: Schema) -> PlanningAction:
 
 
 def checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
-    """As `checked`, for an axiom; types that it leaves out are those of its predicate."""
+    """Return the checked axiom; types missing in it are taken from its predicate."""
     head = axiom.head
     signature = schema.predicate(head.name, head.place)
     check_arity(signature, len(head.parameters), head.place)
@@ -92,7 +92,7 @@ def checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
 
 
 def refuse_changed(actions: Iterable[PlanningAction], axioms: tuple[Axiom, ...]) -> None:
-    """A derived predicate follows from others; no action may say otherwise."""
+    """Raise `SchemaError` if an action changes a derived predicate."""
     derived = {axiom.predicate: axiom for axiom in axioms}
     for action in actions:
         for leaf in effect_leaves(action.effect):

@@ -1,4 +1,4 @@
-"""Ground numeric expressions (PDDL 2.1, level 2): what is left of a term when what cannot change was computed."""
+"""Ground numeric expressions (PDDL 2.1, level 2): the residual of a term after partial evaluation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Operation:
 
 
 Quantity = float | Fact | Operation
-"""A number, the value of a ground numeric fluent (written as a `Fact`), or something computed from these."""
+"""A number, the value of a ground numeric fluent (written as a `Fact`), or an operation on these."""
 
 Numbers = Mapping[Fact, float]
 
@@ -39,7 +39,7 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
 }
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
-"""The comparison that holds exactly when the other one does not."""
+"""The comparison that holds exactly if the other one does not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class NumericBound:
     right: Quantity
 
     def holds(self, numbers: Numbers) -> bool:
-        """Whether it is true; what cannot be computed (a division by zero) is not.
+        """Return whether it is true; a comparison with a division by zero is false.
 
-        A fluent that `numbers` does not have is 0.
+        A fluent without an entry in `numbers` is 0.
         """
         try:
             return _COMPARE[self.operator](value(self.left, numbers), value(self.right, numbers))
@@ -61,37 +61,37 @@ class NumericBound:
             return False
 
     def fluents(self) -> Iterator[Fact]:
-        """The numeric fluents it asks about."""
+        """Yield the numeric fluents in it."""
         yield from fluents(self.left)
         yield from fluents(self.right)
 
     def __str__(self) -> str:
-        """In PDDL: `(> (fuel truck1) 3)`."""
+        """PDDL: `(> (fuel truck1) 3)`."""
         return f"({self.operator} {text(self.left)} {text(self.right)})"
 
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """A ground numeric effect: the fluent becomes `amount`, or (`increase`) more by it."""
+    """A ground numeric effect: sets the fluent to `amount`, or with `increase` adds `amount` to it."""
 
     fluent: Fact
     amount: Quantity
     increase: bool
 
     def result(self, numbers: Numbers) -> float:
-        """The fluent's value afterwards.
+        """Return the fluent's value afterwards.
 
         Raises:
-            ArithmeticError: it cannot be computed.
+            ArithmeticError: the value cannot be computed.
         """
         amount = value(self.amount, numbers)
         return numbers.get(self.fluent, 0.0) + amount if self.increase else amount
 
 
 def helps(change: Assignment, bound: NumericBound) -> bool:
-    """Whether a change may make a bound true that is not; `False` is certain.
+    """Return whether a change may make a false bound true; `False` is certain.
 
-    Who only ever uses up fuel does not bring about that there is enough of it.
+    An action that only consumes fuel, for example, cannot make `(>= (fuel) 3)` true.
     """
     if not change.increase or isinstance(change.amount, Fact | Operation) or bound.operator == "=":
         return True
@@ -103,7 +103,7 @@ def helps(change: Assignment, bound: NumericBound) -> bool:
 
 
 def value(quantity: Quantity, numbers: Numbers) -> float:
-    """What the quantity is worth.
+    """Return the value of the quantity.
 
     Raises:
         ArithmeticError: a division by zero, or a result out of range.
@@ -123,7 +123,7 @@ def value(quantity: Quantity, numbers: Numbers) -> float:
 
 
 def combined(name: str, args: tuple[Quantity, ...]) -> Quantity:
-    """The operation on quantities, computed at once if all of them are numbers.
+    """Return the operation on quantities, computed if all of them are numbers.
 
     Raises:
         ArithmeticError: a division by zero.
@@ -133,7 +133,7 @@ def combined(name: str, args: tuple[Quantity, ...]) -> Quantity:
 
 
 def fluents(quantity: Quantity) -> Iterator[Fact]:
-    """The numeric fluents that a quantity depends on."""
+    """Yield the numeric fluents in a quantity."""
     match quantity:
         case Fact():
             yield quantity
@@ -143,7 +143,7 @@ def fluents(quantity: Quantity) -> Iterator[Fact]:
 
 
 def linear(quantity: Quantity) -> dict[Fact, float] | None:
-    """The coefficients of a sum of fluents (constants dropped); `None` if it is no such sum."""
+    """Return the coefficients of a linear sum of fluents, without constants; `None` if it is not linear."""
     match quantity:
         case Fact():
             return {quantity: 1.0}
@@ -185,7 +185,7 @@ def _scaled(part: dict[Fact, float] | None, factor: float) -> dict[Fact, float] 
 
 
 def text(quantity: Quantity) -> str:
-    """In PDDL: `(+ (fuel truck1) 3)`."""
+    """Return the quantity in PDDL: `(+ (fuel truck1) 3)`."""
     match quantity:
         case Fact():
             return str(quantity)
@@ -196,7 +196,7 @@ def text(quantity: Quantity) -> str:
 
 
 def to_json(quantity: Quantity) -> Any:
-    """As JSON data: a number, `{"fluent": [NAME, ARG, ...]}` or `[OPERATOR, ARG, ...]`."""
+    """Return JSON data: a number, `{"fluent": [NAME, ARG, ...]}` or `[OPERATOR, ARG, ...]`."""
     match quantity:
         case Fact(name, args):
             return {"fluent": [name, *args]}
@@ -207,7 +207,7 @@ def to_json(quantity: Quantity) -> Any:
 
 
 def from_json(data: Any) -> Quantity:
-    """The quantity that `to_json` wrote."""
+    """Return the quantity of a form by `to_json`."""
     match data:
         case {"fluent": [str() as name, *args]}:
             return Fact(name, tuple(args))
@@ -218,12 +218,12 @@ def from_json(data: Any) -> Quantity:
 
 
 def worth(world: World, fluent: Fact) -> float:
-    """What a numeric fluent is worth in the world.
+    """Return the value of a numeric fluent in the world.
 
     Raises:
-        SchemaError: its function is worth something else.
+        SchemaError: the value is not a number.
     """
     content = world.value(fluent.predicate, fluent.args)
     if not isinstance(content, int | float):
-        raise SchemaError(f"{fluent} is no number")
+        raise SchemaError(f"{fluent} is not a number")
     return content

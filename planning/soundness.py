@@ -1,4 +1,4 @@
-"""Soundness of a robot program: plots, skills and planning domain fit together, before anything runs."""
+"""Soundness of a robot program: plots, skills and planning domain match, checked before a run."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from planning.domain import PlanningDomain
 
 
 def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[Finding]:
-    """Findings: an unknown action, a parameter the action does not have, an action without any plot.
+    """Yield findings: an unknown action, a parameter that the action lacks, an action without a plot.
 
-    Also plots of one action of which some are `observed` and some `assumed`: a generated plot does not know
-    which of them will be chosen, and would wait for effects that nobody reports.
+    Plots of one action must agree on `observed` or `assumed` effects. A generated plot cannot know which of them will
+    be chosen, and might wait for effects that no skill reports.
 
-    A domain none of whose actions is implemented is fine: it is then used without a planner.
+    A domain without any implemented action is valid: programs then use it without a planner.
     """
     implemented = set()
     for plot in library:
@@ -63,7 +63,7 @@ def _mixed_effects(action: str, library: Library) -> Iterator[Finding]:
 
 
 _sound: dict[tuple[int, ...], tuple[object, ...]] = {}
-"""What was found to be sound together, by identity, and kept alive so that no identity is ever another's."""
+"""Sound combinations, keyed by identity; references keep the parts alive, so that no identity is reused."""
 _MOST_SOUND = 16
 
 
@@ -74,7 +74,7 @@ def require_sound(
     skills: Collection[SkillSignature],
     declared: Mapping[str, Mapping[str, Parameter]],
 ) -> None:
-    """Raise `PlotError` for what the validator finds; what is the same as before is not looked through again."""
+    """Raise `PlotError` with the validator's findings; an unchanged combination is not checked again."""
     parts = (domain, schema, *library, *skills, *declared, *declared.values())
     key = tuple(map(id, parts))
     if key in _sound:

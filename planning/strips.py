@@ -1,7 +1,7 @@
-"""A planning problem as a value: ground STRIPS with numbers (PDDL 2.1 after grounding), the form every engine takes.
+"""A planning problem as a value: ground STRIPS with numbers (PDDL 2.1 after grounding), the input of every engine.
 
-Facts are positive: where a condition needs `(not (p a))`, the fact `(not-p a)` is carried along instead
-(positive normal form); its predicate is written `not p`, with a blank, so that no declared name can clash.
+Facts are positive. For each condition `(not (p a))` the problem maintains the complementary fact (positive normal
+form). Its predicate is written `not p`, with a blank, so that no declared name clashes.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 
 
 FEATURES = ("numeric", "costs", "durations", "derived")
-"""What a problem may need of an engine beyond STRIPS; everything else is compiled away when posing."""
+"""Features beyond STRIPS that a problem may need; problem construction compiles all others away."""
 
 _NONE: Numbers = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
 class ActionSpan:
-    """What makes a ground action durative; its own conditions and effects are then those at its start.
+    """The durative part of a ground action, whose own conditions and effects are those at its start.
 
     Attributes:
-        least, most: how long it may take, in seconds.
-        over_all: facts that must hold all the time between its start and its end.
+        least, most: bounds of its duration, in seconds.
+        over_all: facts that must hold from its start to its end.
         end: facts that must hold just before its end.
         adds: facts that hold after its end.
-        deletes: facts that hold no longer then, none of them in `adds`.
+        deletes: facts that no longer hold then, none of them in `adds`.
     """
 
     least: float
@@ -49,19 +49,19 @@ class ActionSpan:
 
 @dataclass(frozen=True, slots=True)
 class GroundAction:
-    """One way to take one plan step.
+    """One alternative of a plan step.
 
-    A step whose precondition is a disjunction, or that has conditional effects, has several of these.
+    A step with a disjunctive precondition or conditional effects has several of these.
 
     Attributes:
-        step: what it is in the plan; `None` for bookkeeping of a disjunctive goal, which no plan shows.
+        step: the plan step; `None` for bookkeeping of a disjunctive goal, which no plan shows.
         precondition: facts that must hold before.
         adds: facts that hold afterwards.
-        deletes: facts that hold no longer, none of them in `adds`.
-        cost: what taking it once adds to the plan's cost; never negative, 1 if nobody says otherwise.
-        bounds: what must hold of numbers before.
-        assignments: how numbers change, one for each fluent, all computed from the numbers before.
-        span: of a durative action, what it needs and does after its start; such an action has no numbers.
+        deletes: facts that no longer hold afterwards, none of them in `adds`.
+        cost: its share of the plan's cost; never negative, by default 1.
+        bounds: numeric conditions before.
+        assignments: numeric changes, one for each fluent, all computed from the numbers before.
+        span: conditions and effects of a durative action after its start; such an action has no numbers.
     """
 
     step: PlanStep | None
@@ -74,35 +74,35 @@ class GroundAction:
     span: ActionSpan | None = None
 
     def applicable(self, state: Collection[Fact], numbers: Numbers = _NONE) -> bool:
-        """Whether the precondition holds in `state` and with these numbers."""
+        """Return whether the precondition holds in `state` and with these numbers."""
         return self.lacks(state, numbers) is None
 
     def lacks(self, state: Collection[Fact], numbers: Numbers = _NONE) -> Fact | NumericBound | None:
-        """The first part of the precondition that does not hold."""
+        """Return the first part of the precondition that does not hold, or `None`."""
         missing = next((needed for needed in self.precondition if needed not in state), None)
         return missing or next((bound for bound in self.bounds if not bound.holds(numbers)), None)
 
     def apply(self, state: Iterable[Fact]) -> frozenset[Fact]:
-        """The state after it."""
+        """Return the state afterwards."""
         return (frozenset(state) - frozenset(self.deletes)) | frozenset(self.adds)
 
     def count(self, numbers: Numbers) -> Numbers:
-        """The numbers after it.
+        """Return the numbers afterwards.
 
         Raises:
-            ArithmeticError: one of them cannot be computed.
+            ArithmeticError: a number cannot be computed.
         """
         if not self.assignments:
             return numbers
         return {**numbers, **{one.fluent: one.result(numbers) for one in self.assignments}}
 
     def facts(self) -> tuple[Fact, ...]:
-        """Every fact it mentions."""
+        """Return every fact in it."""
         later = () if self.span is None else (*self.span.over_all, *self.span.end, *self.span.adds, *self.span.deletes)
         return (*self.precondition, *self.adds, *self.deletes, *later)
 
     def act(self, timing: Timing) -> Act[frozenset[Fact]]:
-        """The action at its time, in a state of facts."""
+        """Return the action at its time, in a state of facts."""
         start, span = _event(self.precondition, self.adds, self.deletes), self.span
         if span is None:
             return Act(timing, start)
@@ -111,22 +111,22 @@ class GroundAction:
 
 @dataclass(frozen=True)
 class Problem:
-    """What an engine is asked; made by `planning.problem.construction.pose`.
+    """The input of an engine; made by `planning.problem.construction.build_problem`.
 
     Attributes:
         domain: the planning domain's name.
-        objects: the objects it is about, name -> type.
-        init: the facts that hold now, as far as they matter.
-        goal: the facts that shall hold; none left means the goal already holds.
+        objects: the objects in it, name -> type.
+        init: the relevant facts that hold now.
+        goal: the facts to reach; empty if the goal already holds.
         actions: the ground actions that can contribute.
-        unreachable: goal facts, as text, that no sequence of actions can make true even if nothing ever
-            became false; if there are any, the problem is proven unsolvable without asking an engine.
-        unsliced: makes `whole`; `None` if nothing was sliced off.
-        numbers: the numeric fluents' values now, as far as they matter.
-        bounds: what shall hold of numbers.
-        notes: what was asked for and cannot be had, e.g. a metric that no engine is told about; for people.
-        one_at_a_time: whether durative actions are seen as ordinary ones, so that its having no plan proves nothing.
-        timed: then the same problem with durations, for an engine that can do them.
+        unreachable: goal facts, as text, that are unreachable even without deletes. If there are any, the problem is
+            proven unsolvable without an engine.
+        unsliced: makes `whole`; `None` if no object was removed.
+        numbers: the relevant numeric fluents' values now.
+        bounds: numeric conditions to reach.
+        notes: requests without support, e.g. a metric that no engine receives; for readers.
+        one_at_a_time: whether durative actions are seen as instantaneous, so that a missing plan proves nothing.
+        timed: then the same problem with durations, for a temporal engine.
     """
 
     domain: str
@@ -144,17 +144,17 @@ class Problem:
 
     @property
     def whole(self) -> Problem | None:
-        """The problem without the slice of interchangeable objects, for when the slice has no plan.
+        """The problem with all interchangeable objects, for use when the slice has no plan.
 
-        Made when it is asked for, `None` if nothing was sliced off.
+        It is made on access; `None` if no object was removed.
         """
         return None if self.unsliced is None else self.unsliced()
 
     @cached_property
     def features(self) -> frozenset[str]:
-        """What an engine must be able to do beyond STRIPS: a subset of `FEATURES`.
+        """The features that an engine must support beyond STRIPS: a subset of `FEATURES`.
 
-        `costs` is a wish rather than a need: an engine that cannot do them still gives a plan, not a cheap one.
+        An engine without `costs` still solves the problem, but its plan may be expensive.
         """
         costs = {action.cost for action in self.actions if action.step is not None}
         numeric = bool(self.bounds) or any(action.bounds or action.assignments for action in self.actions)
@@ -163,20 +163,20 @@ class Problem:
         return frozenset(feature for feature, needed in needs.items() if needed)
 
     def cost(self, chosen: Iterable[int]) -> float:
-        """What the actions with these indices cost together."""
+        """Return the total cost of the actions with these indices."""
         return sum(self.actions[index].cost for index in chosen)
 
     @property
     def simulated_seconds(self) -> float:
         """A planning duration for simulated time, from the problem's size alone (never from a clock).
 
-        0.1 s to pose it, 1 ms for each ground action and 20 ms for each goal fact: the order of magnitude
-        that the embedded engine needs.
+        It is 0.1 s for construction, 1 ms for each ground action and 20 ms for each goal fact. The embedded engine
+        needs time of this order of magnitude.
         """
         return round(0.1 + 0.001 * len(self.actions) + 0.02 * len(self.goal), 3)
 
     def plan(self, chosen: Sequence[int]) -> Plan | str:
-        """The plan that executes the actions with these indices, or why that is no solution."""
+        """Return the plan of the actions with these indices, or the reason why it is not a solution."""
         state, numbers = frozenset(self.init), self.numbers
         for index in chosen:
             if not 0 <= index < len(self.actions):
@@ -196,12 +196,12 @@ class Problem:
         return self.taking(chosen)
 
     def taking(self, chosen: Iterable[int]) -> Plan:
-        """The steps of the actions with these indices, without bookkeeping."""
+        """Return the steps of the actions with these indices, without bookkeeping."""
         steps = (self.actions[index].step for index in chosen)
         return Plan(tuple(step for step in steps if step is not None))
 
     def scheduled(self, chosen: Sequence[tuple[int, float, float]]) -> Plan | str:
-        """The plan that has actions (index, start and duration in seconds) begin at their times, or why it is none."""
+        """Return the plan of actions (index, start and duration in seconds) at their times, or why it is invalid."""
         chosen = sorted(chosen, key=itemgetter(1))
         acts = []
         for index, start, seconds in chosen:

@@ -1,6 +1,6 @@
-"""For tests of programs that plan: a planner that fails, hangs, dies and lies, from a seed.
+"""Tests of programs that plan: a planner with seeded faults that fails, hangs, crashes or lies.
 
-Nothing else of the project imports it.
+No other module imports it.
 """
 
 from __future__ import annotations
@@ -25,15 +25,19 @@ async def _nothing(_: str) -> None:
 
 
 class FaultyPlanner:
-    """A `Planner` with faults: of a problem it always makes the same, so that a resumed run meets them again.
+    """A `Planner` with faults; each problem always gets the same fault, so that a resumed run meets it again.
 
-    It fails, and says so; it hangs, in simulated time if the run is, until whoever asks it gives it up; it dies with
-    an error; or it lies: the last step of its plan is missing.
+    The faults:
+
+    - It reports a failure.
+    - It hangs until its caller cancels it, in simulated time if the run is simulated.
+    - It raises an error.
+    - It lies: its plan lacks the last step.
 
     Args:
         planner: finds the plans.
-        faults: which problems are hit.
-        reached: is told `while planning`, see `Crashes.reached`.
+        faults: selects the problems with a fault.
+        reached: called with `while planning`, see `Crashes.reached`.
     """
 
     def __init__(self, planner: Planner, faults: Faults, reached: Callable[[str], Awaitable[None]] = _nothing) -> None:
@@ -42,7 +46,7 @@ class FaultyPlanner:
         self._reached = reached
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """As the planner's, if nothing hits the problem."""
+        """Return the planner's outcome, or that of the fault drawn for the problem."""
         await self._reached("while planning")
         fault = self._faults.draw(_subject(problem), _FAULTS)
         if fault is Fault.PLANNER_FAILS:

@@ -1,7 +1,7 @@
-"""Acts along a time line: what they need and do at their two ends and in between (PDDL 2.1, Fox & Long 2003).
+"""Acts on a time line, with conditions and effects at start, over all and at end (PDDL 2.1, Fox & Long 2003).
 
-Whatever happens at one moment needs the state before it, and nothing of it may disturb another part of it: each could
-as well have come first. What an act needs all the time holds after each moment from its start until before its end.
+Events at one moment need the state before it and must not interfere: each order of them must have the same effect. A
+condition over all holds after each moment from the act's start until before its end.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from planning.plan import Timing
 
 State = TypeVar("State")
 Changes = Mapping[Fact, Content]
-"""What becomes of facts (true and false) and of numbers."""
+"""New truth values of facts and new values of numbers."""
 Lacks = Callable[[State], str | None]
-"""The first thing that does not hold, as text."""
+"""Returns the first condition that does not hold, as text."""
 
 FINEST = 1e-6
-"""Seconds; what is nearer to each other happens at one moment."""
+"""Resolution in seconds; events closer than this happen at one moment."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimelineEvent(Generic[State]):
-    """What happens at one end of an act.
+    """One end of an act.
 
     Attributes:
-        lacks: judges its conditions.
+        lacks: evaluates its condition.
         changes: its effect.
     """
 
@@ -39,13 +39,13 @@ class TimelineEvent(Generic[State]):
 
 @dataclass(frozen=True, slots=True)
 class Act(Generic[State]):
-    """Something that is done at a time.
+    """An act with a start time and a duration.
 
     Attributes:
-        timing: when.
-        start: its beginning.
-        lasting: judges what must hold all the time between its two ends.
-        end: `None` if it has no duration.
+        timing: start and duration.
+        start: the event at its start.
+        lasting: evaluates the condition over all.
+        end: the event at its end; `None` without a duration.
     """
 
     timing: Timing
@@ -56,19 +56,19 @@ class Act(Generic[State]):
 
 @dataclass(frozen=True, slots=True)
 class Flaw:
-    """Why acts cannot be carried out as timed: `act` is the position of the one that `why` is about."""
+    """The first violated condition of a schedule: position of the act, and `why`."""
 
     act: int
     why: str
 
 
 def carried_out(acts: Sequence[Act[State]], state: State, after: Callable[[State, Changes], State]) -> State | Flaw:
-    """The state when all acts are over, or the first flaw.
+    """Return the state after all acts, or the first flaw.
 
     Args:
-        acts: what is done.
+        acts: the acts, in any order.
         state: the present.
-        after: makes a state with changes of another, which stays as it is.
+        after: returns the state after changes, without changing its argument.
     """
     moments: dict[int, list[tuple[int, TimelineEvent[State]]]] = {}
     for number, act in enumerate(acts):
@@ -90,7 +90,7 @@ def carried_out(acts: Sequence[Act[State]], state: State, after: Callable[[State
 
 
 def moment(seconds: float) -> int:
-    """Which moment that is: times that are nearer to each other than `FINEST` are one."""
+    """Return the number of the moment; times closer than `FINEST` are one moment."""
     return round(seconds / FINEST)
 
 
@@ -113,7 +113,7 @@ def _flaw(
 
 
 def _differ(value: Content, other: Content) -> bool:
-    """Two facts are the same or not; two changes of one number are never one change."""
+    """Return whether two changes differ; two changes of one number always do."""
     return value != other if isinstance(value, bool) else True
 
 

@@ -1,7 +1,7 @@
-"""unified-planning's problems as ours, and ours as theirs, for all that else is written for that library.
+"""Conversion between unified-planning's problems and those of this project.
 
-Both ways lead through PDDL text: the reader and writer of each side are held to the standard by their own tests.
-The import of unified-planning takes a second, so nothing imports this module before somebody asks for it.
+Both directions go through PDDL text: each side tests its reader and writer against the standard. The import of
+unified-planning takes a second, so other modules import this one only on use.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 
 def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:
-    """A problem of unified-planning as a domain, and its first state and goal.
+    """Return a problem of unified-planning as a domain, and its initial state and goal.
 
-    Names are those that its PDDL writer gives: in lower case, and others where PDDL has a word already.
+    Names come from its PDDL writer: in lower case, and changed where PDDL reserves a word.
 
     Raises:
-        InputError: it has something that PDDL cannot say.
-        UnsupportedConstructError: or something that nothing here can plan with.
+        InputError: PDDL cannot express a part of it.
+        UnsupportedConstructError: no engine here supports a part of it.
     """
     if not isinstance(problem, UpProblem):
         raise InputError(f"a problem of unified-planning that PDDL can say is a Problem, not {type(problem).__name__}")
@@ -45,17 +45,17 @@ def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:
 
 
 def to_unified(domain: PlanningDomain, world: View, goal: str | Expression, metric: Metric | None = None) -> UpProblem:
-    """What is known and wanted as a problem of unified-planning, with types, things and actions as they are.
+    """Return world, goal and domain as a problem of unified-planning, with types, objects and actions.
 
     Args:
-        domain: what may be done.
-        world: what is known; it says what `domain` lets one say.
-        goal: what is wanted.
-        metric: what the best plan is; by default the least `(total-cost)`, if the domain declares it.
+        domain: the planning actions.
+        world: the present; its schema extends the domain's.
+        goal: the condition to reach.
+        metric: the plan metric; by default the least `(total-cost)`, if the domain declares it.
 
     Raises:
-        InputError: the goal is none, or unified-planning cannot read something of it, such as derived or computed
-            predicates and functions that are no numbers.
+        InputError: the goal is not a condition, or unified-planning cannot read a part, such as derived or computed
+            predicates and functions that are not numeric.
     """
     declared = domain.schema.functions.get(TOTAL_COST.function)
     if metric is None and declared is not None and not declared.arity:

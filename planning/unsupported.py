@@ -1,4 +1,4 @@
-"""What cannot be planned for, told apart from what is written wrongly."""
+"""Errors for valid PDDL that planning does not support."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from knowledge_base.errors import InputError
 
 
 class UnsupportedGoalError(InputError):
-    """The goal uses a construct that the planning engines cannot be asked about; the message names it."""
+    """The goal has a construct without support by any engine; the message names it."""
 
 
 class UnsupportedActionError(InputError):
-    """A planning action needed for the goal uses a construct that the engines cannot be asked about."""
+    """A relevant planning action has a construct without support by any engine."""

@@ -1,4 +1,4 @@
-"""Whether a plan leads to its goal, found by carrying it out in thought."""
+"""Plan validation: simulate a plan and check that it reaches its goal."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """Whether a plan leads to the goal.
+    """The result of a plan validation.
 
     Attributes:
-        valid: every step is applicable when its turn comes, and the goal holds at the end.
-        failing_step: index of the first step that is not; `None` if it is only the goal that fails.
-        why: what does not hold, in PDDL; empty if valid.
+        valid: every step is applicable at its time, and the goal holds at the end.
+        failing_step: index of the first inapplicable step; `None` if only the goal fails.
+        why: the violated condition, in PDDL; empty if valid.
     """
 
     valid: bool
@@ -43,11 +43,11 @@ class Validation:
 
 
 def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> Validation:
-    """Execute `plan` in thought from `world`, which stays as it is.
+    """Simulate `plan` from `world`, which it does not change.
 
-    A plan with a schedule is carried out along its time line, see `planning.timeline`; another one step by step, a
-    durative action as an ordinary one. Steps that name no action of the domain, or no known object, make the plan
-    invalid like any other; so does a goal about an object that is not there any more.
+    A plan with a schedule runs along its time line, see `planning.timeline`. Another plan runs step by step, with
+    durative actions as instantaneous ones. A step with an unknown action or object makes the plan invalid; so does a
+    goal about an object that no longer exists.
     """
     derived = derivation(domain)
     ahead = (_as_scheduled if plan.schedule else _in_turn)(plan, derived, derived.world(world))
@@ -62,7 +62,7 @@ def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression)
 
 
 def _in_turn(plan: Plan, derived: Derivation, world: World) -> Overlay | Validation:
-    """The world after the steps one after the other, or at which one that ends."""
+    """Return the world after the steps in order, or the validation with the failing step."""
     ahead = Overlay(world)
     for index, step in enumerate(plan.steps):
         seen = derived.complete(ahead) if derived.unsupported else ahead
@@ -73,7 +73,7 @@ def _in_turn(plan: Plan, derived: Derivation, world: World) -> Overlay | Validat
 
 
 def _as_scheduled(plan: Plan, derived: Derivation, world: World) -> Overlay | Validation:
-    """The world after the steps at their times, or at which one that ends."""
+    """Return the world after the steps at their times, or the validation with the failing step."""
     acts = []
     for index, (step, timing) in enumerate(zip(plan.steps, plan.schedule, strict=True)):
         try:
@@ -92,10 +92,10 @@ def _as_scheduled(plan: Plan, derived: Derivation, world: World) -> Overlay | Va
 
 
 def _act(step: PlanStep, timing: Timing, domain: PlanningDomain, world: World) -> Act[Overlay]:
-    """The step at its time.
+    """Return the step at its time.
 
     Raises:
-        InputError: it names something that is not there, or takes longer or shorter than its action.
+        InputError: the step names a missing object, or its duration is out of the action's bounds.
     """
     action, bindings = domain.action(step), domain.bindings(step)
     for parameter in action.parameters:
@@ -144,7 +144,7 @@ def _delta(changes: Changes, schema: Vocabulary) -> Delta:
 
 
 def _obstacle(step: PlanStep, domain: PlanningDomain, seen: World, ahead: Overlay) -> str | None:
-    """Take the step, or say why that cannot be; `seen` is what is ahead with all that follows from it."""
+    """Take the step, or return why it is not applicable; `seen` is `ahead` with all derived facts."""
     try:
         if not domain.applicable(step, seen):
             return str(domain.why_not(step, seen).deciding)

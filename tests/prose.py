@@ -104,7 +104,6 @@ PENDING = {
     "knowledge_base/world",
     "dsc", "dsc/components", "dsc/sequencer",
     "planning", "planning/cli", "planning/engines", "planning/execution", "planning/generation", "planning/ordering",
-
     "domains", "domains/clean_up_table",
     "benchmarks", "benchmarks/knowledge", "benchmarks/peers",
 }  # fmt: skip

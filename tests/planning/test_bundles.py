@@ -125,7 +125,7 @@ def test_a_folder_is_read_with_its_mistakes_named(tmp_path):
             ImportError("no module named robots"),
             "the bundle 'odd' of 'robots:odd' cannot be loaded: ImportError: no module",
         ),
-        (5, "the entry point 'odd' of 'robots:odd' leads to 5, which is no Bundle"),
+        (5, "the entry point 'odd' of 'robots:odd' leads to 5, not to a Bundle"),
     ],
 )
 def test_an_installed_one_that_is_wrong_is_named(monkeypatch, found, said):

@@ -178,7 +178,7 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
         assert told(tmp_path / "in" / "run.kb")[1] == {"finished": True, "problem": None}
     for copy in (seen[-2], copies[-2]):
         with executive(planner, copy) as robot:
-            with pytest.raises(InputError, match="begun in simulated time and cannot go on in real time"):
+            with pytest.raises(InputError, match="begun in simulated time and cannot be resumed in real time"):
                 run_real(robot.go_on())
             assert run_simulated(robot.go_on()).reached
 

@@ -210,7 +210,7 @@ def test_a_worker_cannot_make_us_kill_others(scripted, group):
         READY + f"sys.stdin.readline(); print(json.dumps({{'searching': {words}}}), flush=True); time.sleep(600)"
     )
     process.start(60)
-    with pytest.raises(EngineStoppedError, match="no process group of its own"):
+    with pytest.raises(EngineStoppedError, match="no separate process group"):
         process.ask(written(PROBLEM), Deadline(60), print)
     assert not process.alive
 
