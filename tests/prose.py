@@ -102,8 +102,6 @@ PENDING = {
     "knowledge_base", "knowledge_base/cli", "knowledge_base/conditions", "knowledge_base/drawing",
     "knowledge_base/exchange", "knowledge_base/journal", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
-    "dsc", "dsc/components", "dsc/sequencer",
-    "planning", "planning/cli", "planning/engines", "planning/execution", "planning/generation", "planning/ordering",
     "domains", "domains/clean_up_table",
     "benchmarks", "benchmarks/knowledge", "benchmarks/peers",
 }  # fmt: skip

@@ -1,1 +1,1 @@
-"""Planning engines and the process they run in; the only place that meets unified-planning."""
+"""Planning engines and their worker processes; the only package that runs unified-planning's engines."""

@@ -1,4 +1,4 @@
-"""Plans that were found before, for the same problem again."""
+"""A cache of planning outcomes by problem."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from planning.strips import Problem
 
 LARGEST = 64
-"""Problems that are remembered; one of 50 items has about 3,000 ground actions."""
+"""Number of cached problems; one of 50 items has about 3,000 ground actions."""
 
 
 class CachingPlanner:
-    """A planner that answers at once when it is asked the same problem again.
+    """A planner that answers immediately if the same problem comes again.
 
-    The same is what has the same facts, goal, numbers and ground actions by value, so that a remembered plan is as
-    valid as on the first day; that it leads to the goal in the world as it is then is validated by whoever
-    executes it, as for a new one. Plans and proofs are remembered, failures and running out of time are not.
+    Two problems are the same if their facts, goal, numbers and ground actions are equal by value. A cached plan is
+    therefore as valid as a new one; its caller validates each plan against the present world. Plans and proofs are
+    cached, failures and timeouts are not.
 
     Args:
-        planner: asked for what is not known.
-        largest: number of problems; the one that was not asked for longest is forgotten first.
+        planner: solves problems that are not cached.
+        largest: number of problems; the least recently used is evicted first.
     """
 
     def __init__(self, planner: PlannerProcess | PlannerRace, largest: int = LARGEST) -> None:
@@ -39,12 +39,12 @@ class CachingPlanner:
         self._known: OrderedDict[Hashable, PlanFound | ProvenUnsolvable] = OrderedDict()
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """The plan, `from_cache` if it was known, and then after no time."""
+        """Return the outcome; a cached plan has `from_cache` and takes no time."""
         async with aclosing(self.plans(problem, seconds)) as plans:
             return await anext(plans)
 
     async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """As the planner's, the best that was found remembered; what is known is the only one."""
+        """Yield the planner's outcomes and cache the best; a cached outcome is the only one."""
         started, key = time.monotonic(), _key(problem)
         known = self._known.get(key)
         if known is not None:
@@ -61,7 +61,7 @@ class CachingPlanner:
         self.kill()
 
     def kill(self) -> None:
-        """As `close`, without a loop."""
+        """End the planner's processes; needs no event loop."""
         self._planner.kill()
 
     def _remember(self, key: Hashable, outcome: PlanningOutcome) -> None:
@@ -78,7 +78,7 @@ def _recalled(known: PlanFound | ProvenUnsolvable, seconds: float) -> PlanFound 
 
 
 def _key(problem: Problem) -> Hashable:
-    """What determines the answer: the order in which facts were told does not."""
+    """Return the key of a problem; the order of facts does not matter."""
     numbers = frozenset(problem.numbers.items())
     goal = (frozenset(problem.goal), frozenset(problem.bounds))
     timed = None if problem.timed is None else _key(problem.timed)

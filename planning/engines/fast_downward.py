@@ -1,9 +1,8 @@
-"""Fast Downward without its translator: what it searches is written straight from the ground problem.
+"""Driver of Fast Downward that bypasses its translator and writes the search input from the ground problem.
 
-The translator (a Python program that grounds PDDL, started anew for each problem) takes most of the time that
-Fast Downward needs, and our problem is ground already. The text is SAS+ as in Helmert 2006, *The Fast Downward
-Planning System*, format version 3 (https://www.fast-downward.org/latest/documentation/translator-output-format/),
-with one variable of two values for each fact.
+The translator, a Python program that grounds PDDL, starts for each problem and takes most of the time. The problem here
+is ground already. The text is SAS+ as in Helmert 2006, *The Fast Downward Planning System*, format version 3
+(https://www.fast-downward.org/latest/documentation/translator-output-format/), with one binary variable for each fact.
 """
 
 from __future__ import annotations
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
     from planning.engines.registry import Engine
     from planning.engines.worker import Answers, Request, Search
 
-# Lazy greedy search with h_FF alone: on the clean-up table preferred operators and landmarks are no faster up to 50
-# items and make up to twice as many trips. What follows only ever looks for a better plan.
+# The first search is lazy greedy with h_FF alone. On the clean-up table, preferred operators and landmarks are not
+# faster up to 50 items, and plans have up to twice as many trips. Later searches only look for a better plan.
 _FIRST = "lazy_greedy([h],cost_type=one)"
 _BETTER = ["lazy_greedy([h],reopen_closed=false)"] + [f"lazy_wastar([h],preferred=[h],w={w})" for w in (5, 3, 2, 1)]
 
@@ -32,14 +31,14 @@ _SEARCHES = {
 }
 
 _PROVEN = (11, 12)
-"""Exit codes of a search that was exhausted; with safe heuristics, as these are, that is a proof."""
+"""Exit codes of an exhausted search; with safe heuristics, as here, that is a proof."""
 
 _OUT_OF_MEMORY = (22, 24)
-_FINEST_COST = 1000  # costs are whole numbers there: ours are kept as fractions of at most so many parts
+_FINEST_COST = 1000  # parts of a unit: SAS+ costs are integers, so fractions are rounded to these
 
 
 def searching(engine: Engine) -> Search:
-    """The search that the engine is made by, for `planning.engines.worker`.
+    """Return the search with the engine's configuration, for `planning.engines.worker`.
 
     Raises:
         ModuleNotFoundError: Fast Downward is not installed.
@@ -60,7 +59,7 @@ def _program() -> Path:
 
 
 def _plans(program: str, options: str, text: str) -> Answers:
-    """Plans as they are found; each is in a file of its own before the program says so."""
+    """Yield plans as the program finds them; it writes each to a separate file before it reports the cost."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as task:
         task.write(text)
         task.seek(0)
@@ -94,13 +93,13 @@ def _failure(status: int) -> Exception:
 
 
 def _read(file: Path) -> list[int]:
-    """The numbers of the actions: a line is `(a17 )`, and `;` begins a comment."""
+    """Return the numbers of the actions: a line is `(a17 )`, and `;` begins a comment."""
     lines = file.read_text(encoding="utf-8").splitlines()
     return [int(line.strip("() ").removeprefix("a")) for line in lines if line.startswith("(")]
 
 
 def sas(request: Request) -> str:
-    """The problem in the translator's output format; actions are called `a0`, `a1`, ... as they are numbered."""
+    """Return the problem in the translator's output format; actions are called `a0`, `a1`, ... by number."""
     number, init, goal, actions = len(request["facts"]), set(request["init"]), request["goal"], request["actions"]
     prices = {cost: Fraction(cost).limit_denominator(_FINEST_COST) for cost in {action[4] for action in actions}}
     unit = lcm(*(price.denominator for price in prices.values()))
@@ -117,13 +116,13 @@ def sas(request: Request) -> str:
 
 
 class _Words:
-    """What is said of facts again and again."""
+    """The text of conditions and effects by fact number, made once for all operators."""
 
     def __init__(self, number: int) -> None:
         self._holds = [f"{n} 1" for n in range(number)]
         self._added = [f"0 {n} -1 1" for n in range(number)]
         self._deleted = [f"0 {n} -1 0" for n in range(number)]
-        self._moved = [(f"0 {n} 1 0", f"0 {n} 1 1") for n in range(number)]  # of what is needed
+        self._moved = [(f"0 {n} 1 0", f"0 {n} 1 1") for n in range(number)]  # of facts in the precondition
 
     def operator(self, name: str, needs: list[int], adds: list[int], deletes: list[int], cost: int) -> str:
         moved = self._moved

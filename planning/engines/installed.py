@@ -1,4 +1,4 @@
-"""What is installed and what that can do, for `dsc doctor`; imports no engine."""
+"""Installed engines and their features, for `dsc doctor`; imports no engine."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _JAVA_SECONDS = 10.0
 
 
 def findings() -> dict[str, Any]:
-    """Plain data: `python`, `java` (its version or null), `packages` (name -> version or null), `engines`."""
+    """Return plain data: `python`, `java` (its version or null), `packages` (name -> version or null), `engines`."""
     return {
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}",
@@ -45,7 +45,7 @@ def _engine(one: Engine) -> dict[str, Any]:
 
 
 def _dependencies() -> list[str]:
-    """What every installation of this project needs."""
+    """Return the distributions that every installation of this project requires."""
     try:
         needed = requires(DISTRIBUTION) or []
     except PackageNotFoundError:  # run from a checkout that is not installed
@@ -65,7 +65,7 @@ def _java() -> str | None:
     if program is None:
         return None
     try:
-        said = subprocess.run(  # noqa: S603  what is first on the path, as the engine would start it
+        said = subprocess.run(  # noqa: S603  the first on the path, as the engine starts it
             [program, "-version"], capture_output=True, text=True, timeout=_JAVA_SECONDS, check=False
         )
     except (OSError, subprocess.TimeoutExpired):

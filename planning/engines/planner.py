@@ -1,4 +1,4 @@
-"""Planner asks one engine for a plan and never waits longer than allowed."""
+"""The planner interface, and a planner with one engine that never waits longer than its limit."""
 
 from __future__ import annotations
 
@@ -27,35 +27,35 @@ if TYPE_CHECKING:
 
 @runtime_checkable
 class Improving(Protocol):
-    """What a `Planner` can offer besides `solve`; asked for in real time only, since no two such runs are the same."""
+    """The interface of a `Planner` that improves plans; used in real time only, since no two such runs are equal."""
 
     def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """First what `solve` says, then each better plan that is found within the `seconds` of real time.
+        """Yield the outcome of `solve`, then each better plan found within `seconds` of real time.
 
-        It is closed when no better plan is of use any more, which ends the search.
+        Closing the generator ends the search.
         """
         ...
 
 
 ENGINE = "pyperplan"
-"""The embedded engine: always there, and always the same plan for the same problem."""
+"""The embedded engine: always installed, with the same plan for the same problem."""
 
 START_UP_SECONDS = 60.0
 
 
 class Planner(Protocol):
-    """Anything that plans; replaceable in tests and deployments."""
+    """The interface of a planner, replaceable in tests and deployments."""
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """What came of it, after at most `seconds` of real time."""
+        """Return the outcome after at most `seconds` of real time."""
         ...
 
 
 class PlannerProcess:
-    """One engine, warm in a process of its own.
+    """One engine, warm in a separate process.
 
-    One problem at a time: a second one waits for the first. Whoever stops listening ends the search, with
-    everything that it started; the process stays warm.
+    It solves one problem at a time; a second one waits for the first. Closing the generator of `plans` ends the search
+    and all processes started by it; the worker process stays warm.
     """
 
     def __init__(
@@ -67,14 +67,14 @@ class PlannerProcess:
         start_up_seconds: float = START_UP_SECONDS,
         megabytes: int | None = None,
     ) -> None:
-        """Nothing is started yet.
+        """Configure the planner without starting its process.
 
         Args:
             engine: its name in `planning.engines.registry`.
             clock_hold: entered while the engine works, e.g. to hold a simulated clock.
-            command: how to start the worker process, if not as is usual for the engine.
-            start_up_seconds: bound on starting it, which does not count as planning time.
-            megabytes: how much memory each process of a search may take; the worker's own default if left out.
+            command: the command of the worker process; by default the engine's own.
+            start_up_seconds: limit of the start, which does not count as planning time.
+            megabytes: memory limit of each process of a search; by default the worker's.
         """
         self.engine = engine
         self._clock_hold = clock_hold
@@ -87,16 +87,16 @@ class PlannerProcess:
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
         """Plan within `seconds` of real time, counted while the engine works.
 
-        A problem that was sliced is tried as a whole if the slice has no plan, or none in half the time. So is one
-        with durations, by an engine that can do these, before it is tried with one action at a time.
+        A sliced problem is tried as a whole if the slice has no plan, or none in half the time. An engine with
+        durations first tries the temporal problem, then the one with one action at a time.
         """
         async with aclosing(self.plans(problem, seconds)) as plans:
             return await anext(plans)
 
     async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """As `solve`, and then each cheaper plan that an anytime engine finds in the rest of the time.
+        """Yield the outcome of `solve`, then each cheaper plan that an anytime engine finds in the remaining time.
 
-        Closing it ends the search: `async with contextlib.aclosing(...)`.
+        Closing the generator ends the search: `async with contextlib.aclosing(...)`.
         """
         known = self._without_search(problem)
         if known is not None:
@@ -109,23 +109,23 @@ class PlannerProcess:
                         yield outcome
 
     async def warm_up(self) -> None:
-        """Start the process now, so that the first problem does not wait; what goes wrong shows then."""
+        """Start the process now, so that the first problem does not wait; the first problem reports a failed start."""
         async with self._turn():
             with self._clock_hold(), contextlib.suppress(OSError, EngineStoppedError, OutOfTimeError):
                 await self._ready()
 
     async def close(self) -> None:
-        """End the process; a later `solve` would start a new one."""
+        """End the process; a later `solve` starts a new one."""
         self.kill()
 
     def kill(self) -> None:
-        """As `close`, without a loop."""
+        """End the process; needs no event loop."""
         if self._process is not None:
             self._process.kill()
             self._process = None
 
     def _turn(self) -> asyncio.Lock:
-        """The running loop's lock: a planner may outlive the run, and with it the loop, that it served before."""
+        """Return the running loop's lock: a planner may outlive a run and its loop."""
         loop = asyncio.get_running_loop()
         if loop is not self._loop:
             self._loop, self._lock = loop, asyncio.Lock()
@@ -146,17 +146,17 @@ class PlannerProcess:
         return NoneFound(self.engine, f"no plan with one action at a time ({reason}); {in_concert()}")
 
     def _timed(self, problem: Problem) -> bool:
-        """Whether this engine can be asked for a plan with durations."""
+        """Return whether the engine can try the temporal problem."""
         return problem.timed is not None and can_time(self.engine)
 
     def _forms(self, problem: Problem) -> list[Callable[[], Problem]]:
-        """The forms of a problem in which it is tried, one after the other, each made when its turn comes."""
+        """Return makers of the forms of a problem, in the order in which they are tried."""
         forms = [problem.timed] if self._timed(problem) else []
         made = [_made(one) for one in (*forms, problem) if one is not None and not one.unreachable]
         return made if problem.unsliced is None else [*made, problem.unsliced]
 
     async def _tried(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """The plans of the first form that has one; each but the last gets half of the time that is left."""
+        """Yield the plans of the first form with a plan; each form but the last gets half of the remaining time."""
         *first, last = self._forms(problem)
         cut_short = False
         for form in first:
@@ -169,13 +169,13 @@ class PlannerProcess:
                     yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
                 else:
                     return
-            seconds -= min(time.monotonic() - started, seconds / 2)  # a new start is not planning time
+            seconds -= min(time.monotonic() - started, seconds / 2)  # a restart is not planning time
         async with aclosing(self._attempt(last(), seconds)) as outcomes:
             async for outcome in outcomes:
                 yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
 
     async def _attempt(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """The first outcome and each cheaper plan; anything but a plan is the last."""
+        """Yield the first outcome and each cheaper plan; any other outcome is the last."""
         best: PlanFound | None = None
         try:
             process = await self._ready()
@@ -201,12 +201,12 @@ class PlannerProcess:
                 yield TimedOut(self.engine, seconds) if out_of_time else EngineFailed(self.engine, str(error))
 
     async def _ready(self) -> EngineProcess:
-        """The process, when it can be asked; who stops waiting for that does not stop its start."""
+        """Return the ready process; a cancelled caller does not cancel the start."""
         known = self._process
         if known is not None:
             with contextlib.suppress(OutOfTimeError, EngineStoppedError):
                 await self._started(known)
-            if known.alive:  # only now: the search before this one may just have been its end
+            if known.alive:  # checked late: the previous search may just have ended the process
                 return known
             self.kill()
         self._process = process = EngineProcess(self._command)
@@ -218,7 +218,7 @@ class PlannerProcess:
             await aside(lambda: process.start(self._start_up_seconds))
 
     def _judged(self, answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:
-        """What the engine's answer is worth: a plan counts only if it solves the problem."""
+        """Return the outcome of the engine's answer: a plan counts only if it solves the problem."""
         if "failed" in answer:
             return EngineFailed(self.engine, str(answer["failed"]))
         durations = "durations" in problem.features
@@ -261,7 +261,7 @@ def _times(timed: Any) -> list[tuple[int, float, float]]:
 
 
 async def _answers(process: EngineProcess, request: bytes, seconds: float) -> AsyncGenerator[dict[str, Any], None]:
-    """What the process answers, as it comes; closing this ends the search.
+    """Yield the process's answers as they arrive; closing the generator ends the search.
 
     Raises:
         OutOfTimeError, EngineStoppedError: as `EngineProcess.ask`.
@@ -275,7 +275,7 @@ async def _answers(process: EngineProcess, request: bytes, seconds: float) -> As
     def ask() -> None:
         try:
             process.ask(request, deadline, tell)
-        except Exception as error:  # noqa: BLE001  carried over to the one who waits
+        except Exception as error:  # noqa: BLE001  passed to the waiting task
             tell(error)
         else:
             tell(None)
@@ -292,6 +292,6 @@ async def _answers(process: EngineProcess, request: bytes, seconds: float) -> As
 
 
 def _call(loop: asyncio.AbstractEventLoop, what: Callable[[], object]) -> None:
-    """In the loop; if it is closed, nobody waits any more."""
+    """Call `what` in the loop; a closed loop has no waiting task."""
     with contextlib.suppress(RuntimeError):
         loop.call_soon_threadsafe(what)

@@ -1,4 +1,4 @@
-"""A worker process as an object: ask, wait in real time, kill; for a thread that may block."""
+"""A worker process as an object: ask, wait in real time, kill. A blocking thread uses it."""
 
 from __future__ import annotations
 
@@ -19,50 +19,49 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-_LONGEST_ANSWER = 1 << 26  # bytes; a worker that babbles must not fill our memory
-_GRACE = 1.0  # seconds for a worker to say that its search, which was killed, has ended
-_MOST_PROCESSES = 1 << 31  # what a process's number is smaller than
+_LONGEST_ANSWER = 1 << 26  # bytes; endless output must not fill the memory
+_GRACE = 1.0  # seconds for a worker to report the end of a killed search
+_MOST_PROCESSES = 1 << 31  # upper bound of process ids
 _LONGEST_WAIT = 3600.0  # seconds; a selector takes no infinity
 
 
 def worker(engine: str, megabytes: int | None = None) -> tuple[str, ...]:
-    """How to start the worker for an engine, with a bound on the memory of each search if it is given."""
+    """Return the command of an engine's worker, with the memory limit of a search if given."""
     limit = () if megabytes is None else (str(megabytes),)
     return (sys.executable, "-P", "-m", "planning.engines.worker", engine, *limit)
 
 
 class OutOfTimeError(Exception):
-    """The search was ended because its time was up."""
+    """The time of the search is up."""
 
 
 class EngineStoppedError(Exception):
-    """The search or its process ended, or said something that is no answer."""
+    """The search or its process ended, or its output is not an answer."""
 
 
 class Deadline:
-    """Until when something may take, in real time; can be moved nearer from any thread."""
+    """A deadline in real time, which any thread may shorten."""
 
     def __init__(self, seconds: float) -> None:
-        """So many seconds from now."""
+        """Set the deadline `seconds` from now."""
         self._at = time.monotonic() + seconds
 
     @property
     def left(self) -> float:
-        """Seconds; not above zero when it is over."""
+        """Seconds until the deadline; not positive after it."""
         return self._at - time.monotonic()
 
     def shorten(self, seconds: float) -> None:
-        """At most so many seconds from now."""
+        """Move the deadline to at most `seconds` from now."""
         self._at = min(self._at, time.monotonic() + seconds)
 
 
 class EngineProcess:
-    """One running worker (see `planning.engines.worker` for what is said); dies with its owner.
+    """One running worker, which dies with its owner; see `planning.engines.worker` for the protocol.
 
-    It leads a session of its own, each search a process group of its own, so that nothing that an engine starts
-    is left behind, and has a folder of its own for temporary files, which goes with it. When the object is forgotten,
-    or the interpreter exits, all of them are killed; should the owner itself be killed, the worker sees the end of its
-    input.
+    The worker leads a separate session, and each search a separate process group, so that all processes of an engine
+    are ended. A temporary folder for their files is removed with them. Garbage collection of the object and the exit of
+    the interpreter kill all of them. If the owner is killed, the worker sees the end of its input.
     """
 
     def __init__(self, command: Sequence[str]) -> None:
@@ -77,7 +76,7 @@ class EngineProcess:
         weakref.finalize(self, _close, (self._to, self._from, self._woken, self._wake))
         folder = tempfile.mkdtemp(prefix="engine-")
         try:
-            popen = subprocess.Popen(  # noqa: S603  the command is ours or a test's
+            popen = subprocess.Popen(  # noqa: S603  the command is fixed, or a test's
                 command,
                 stdin=its_input,
                 stdout=its_output,
@@ -102,30 +101,30 @@ class EngineProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether it can still be asked."""
+        """Whether the process still runs."""
         return self._end.alive and _runs(self._pid)
 
     @property
     def idle(self) -> bool:
-        """Whether it is ready, and nobody asks it anything at the moment."""
+        """Whether the process is ready and answers no request at the moment."""
         return self._ready and not self._turn.locked()
 
     def kill(self) -> None:
-        """End it and all that it started, now; calling it again does nothing."""
+        """Kill the process and all processes that it started; further calls do nothing."""
         self._end()
         self.wake()
 
     def wake(self) -> None:
-        """Let the thread that waits for an answer look at its deadline again."""
-        with contextlib.suppress(BlockingIOError):  # it is full: then it wakes anyway
+        """Let the thread that waits for an answer check its deadline again."""
+        with contextlib.suppress(BlockingIOError):  # the pipe is full, so that the thread wakes anyway
             os.write(self._wake, b"!")
 
     def start(self, seconds: float) -> None:
-        """Wait until it is ready to be asked.
+        """Wait until the process is ready.
 
         Raises:
-            OutOfTimeError: it is not within `seconds`; the process is gone.
-            EngineStoppedError: it ended by itself, was killed, or said rubbish; the process is gone.
+            OutOfTimeError: it is not ready within `seconds`; the process is gone.
+            EngineStoppedError: it ended, was killed, or sent unreadable output; the process is gone.
         """
         with self._turn:
             if not self._ready and "ready" not in self._in_time(Deadline(seconds)):
@@ -134,16 +133,16 @@ class EngineProcess:
             self._ready = True
 
     def ask(self, request: bytes, deadline: Deadline, hear: Callable[[dict[str, Any]], object]) -> None:
-        """Let it search; returns when the search has ended.
+        """Run a search; return when it has ended.
 
         Args:
             request: the problem, as a line of JSON.
-            deadline: until when.
-            hear: is called with each answer, in this thread.
+            deadline: the end of the search.
+            hear: called with each answer, in this thread.
 
         Raises:
-            OutOfTimeError: the deadline has come; the search is gone, and the process, unless it takes that well.
-            EngineStoppedError: it ended or was killed before it gave an answer, or answered rubbish.
+            OutOfTimeError: the deadline has passed; the search is gone. So is the process, unless it is ready again.
+            EngineStoppedError: the search ended or was killed before an answer, or its answer is unreadable.
         """
         with self._turn:
             self._unsent = memoryview(request)
@@ -159,15 +158,15 @@ class EngineProcess:
                 raise EngineStoppedError(f"the search {_ending(said['ended'])} without an answer")
 
     def _follow(self, group: object) -> None:
-        """Remember which processes are the search's; only those of the worker's session can be."""
-        with contextlib.suppress(ProcessLookupError):  # it has ended, and all of them with it
+        """Add the search's process group, which must belong to the worker's session."""
+        with contextlib.suppress(ProcessLookupError):  # the search has ended with all its processes
             if not isinstance(group, int) or not 0 < group < _MOST_PROCESSES or os.getsid(group) != self._pid:
                 self.kill()
-                raise EngineStoppedError(f"no process group of its own: {str(group)[:80]}")
+                raise EngineStoppedError(f"no separate process group: {str(group)[:80]}")
             self._searches.add(group)
 
     def _in_time(self, deadline: Deadline) -> dict[str, Any]:
-        """The next thing it says; when that is too late or no answer, what is necessary is ended."""
+        """Return the next message; after the deadline or an unreadable message, kill the search or the process."""
         try:
             return self._next(deadline)
         except OutOfTimeError:
@@ -178,7 +177,7 @@ class EngineProcess:
             raise EngineStoppedError(str(error)) from error
 
     def _abandon(self) -> None:
-        """End the search; the process as well unless it says soon that it is ready for the next."""
+        """Kill the search, and the process too unless it soon reports the end of the search."""
         if not self._searches:
             self.kill()
             return
@@ -202,7 +201,7 @@ class EngineProcess:
         return said
 
     def _exchange(self, deadline: Deadline) -> None:
-        """Send and receive what can be at the moment."""
+        """Send and receive the bytes that the pipes allow now."""
         with selectors.DefaultSelector() as selector:
             selector.register(self._woken, selectors.EVENT_READ)
             selector.register(self._from, selectors.EVENT_READ)
@@ -214,7 +213,7 @@ class EngineProcess:
         if self._woken in able:
             os.read(self._woken, 4096)
         if self._to in able:
-            with contextlib.suppress(BrokenPipeError):  # its output says how it ended
+            with contextlib.suppress(BrokenPipeError):  # the process's output reports its end
                 self._unsent = self._unsent[os.write(self._to, self._unsent[:65536]) :]
         if self._from in able:
             self._receive()
@@ -228,7 +227,7 @@ class EngineProcess:
             raise ValueError(f"no answer: over {_LONGEST_ANSWER} bytes without an end")
 
     def _status(self) -> int | None:
-        """How the process ended; one that only closed its output is ended by that."""
+        """Return the exit status; end a process that only closed its output."""
         return self._end()
 
 
@@ -239,13 +238,13 @@ def _ending(status: object) -> str:
 
 
 def _environment(folder: str) -> dict[str, str]:
-    """Our modules, wherever they were imported from, fixed string hashes so that plans repeat, a place for files."""
+    """The environment: this interpreter's module path, fixed string hashes so that plans repeat, a temporary folder."""
     modules = os.pathsep.join(filter(None, sys.path))
     return {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": modules, "TMPDIR": folder}
 
 
 def _runs(pid: int) -> bool:
-    """Whether a child of ours has not ended yet; it stays on the process table, and its number taken."""
+    """Return whether a child process still runs; it stays on the process table, and its number reserved."""
     try:
         return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
     except ChildProcessError:
@@ -255,13 +254,13 @@ def _runs(pid: int) -> bool:
 def _end(popen: subprocess.Popen[bytes], searches: set[int], folder: str) -> int:
     _kill_groups([*searches, popen.pid])
     status = popen.wait()
-    shutil.rmtree(folder, ignore_errors=True)  # engines that are killed leave files
+    shutil.rmtree(folder, ignore_errors=True)  # killed engines leave files
     return status
 
 
 def _kill_groups(groups: Iterable[int]) -> None:
     for group in groups:
-        with contextlib.suppress(OSError):  # nobody is left in it
+        with contextlib.suppress(OSError):  # the group is empty
             os.killpg(group, signal.SIGKILL)
 
 

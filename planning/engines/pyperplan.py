@@ -1,7 +1,7 @@
-"""pyperplan on its own terms: its ground task is written straight from our ground problem.
+"""Driver of pyperplan: makes its ground task directly from the ground problem.
 
-Through unified-planning the problem would be made twice more on the way, as that library's and then as one with
-parameters for pyperplan to ground, which takes several times as long as the search on all but the hardest problems.
+Conversion through unified-planning would build the problem twice more: as that library's, and as a lifted one that
+pyperplan grounds. On all but the hardest problems this takes several times as long as the search.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def searching(engine: Engine) -> Search:  # noqa: ARG001
-    """Greedy best-first search with h_FF, for `planning.engines.worker`."""
+    """Return a greedy best-first search with h_FF, for `planning.engines.worker`."""
 
     def search(request: Request) -> Answers:
         return _plans(task(request))
@@ -29,10 +29,10 @@ def searching(engine: Engine) -> Search:  # noqa: ARG001
 
 
 def task(request: Request) -> Task:
-    """The problem as pyperplan's; actions are called by their numbers.
+    """Return the problem as pyperplan's; action numbers are the operators' names.
 
-    pyperplan breaks ties by the order of its sets, that is by the hashes of names: with fixed ones (PYTHONHASHSEED)
-    the same problem gets the same plan.
+    pyperplan breaks ties by the order of its sets, which depends on the hashes of names. With fixed hashes
+    (PYTHONHASHSEED) the same problem gets the same plan.
     """
     names = [f"f{number}" for number in range(len(request["facts"]))]
 
@@ -48,7 +48,7 @@ def task(request: Request) -> Task:
 
 
 def _plans(posed: Task) -> Answers:
-    # Every state is visited, except those that h_FF finds hopeless even without deletions: an exhausted search is a
+    # The search prunes only states that h_FF proves hopeless even without deletes. An exhausted search is therefore a
     # proof.
     found = greedy_best_first_search(posed, hFFHeuristic(posed))
     yield None if found is None else [operator.name for operator in found]

@@ -1,7 +1,7 @@
-"""Several engines at once, for real time: the first valid plan wins, and a cheaper one may follow.
+"""A race of several engines in real time: the first valid plan wins, and a cheaper one may follow.
 
-In simulated time one named engine plans (`planning.engines.planner.PlannerProcess`), so that a run can be repeated;
-who wins a race depends on the machine.
+In simulated time one named engine plans (`planning.engines.planner.PlannerProcess`), so that a run is repeatable. The
+winner of a race depends on the machine.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ if TYPE_CHECKING:
 _PLAIN = Problem("", {}, (), (), ())
 
 _Answer = tuple[str, PlanningOutcome | None]
-"""Who says it, and what; nothing when it has said everything."""
+"""An engine's name and outcome; `None` after its last outcome."""
 
 _Failing = PlanFound | ProvenUnsolvable | NoneFound | TimedOut
-"""What can name others that failed."""
+"""The outcomes that can list failures of other engines."""
 
 
 class PlannerRace:
-    """A planner that lets the engines race that suit a problem: at most two, by its features and size.
+    """A planner that races the engines that suit a problem: at most two, by its features and size.
 
-    Each engine is kept warm in a process of its own. A new problem ends the search for a better plan for the one
-    before; where no plan was found yet, it waits.
+    Each engine stays warm in a separate process. A new problem ends the search for a better plan of the last one. It
+    waits while the last one has no plan yet.
 
     Args:
-        choose: the engines for a problem, the preferred one first.
-        make: the planner for an engine.
+        choose: returns the engines for a problem, the preferred one first.
+        make: returns the planner of an engine.
     """
 
     def __init__(
@@ -55,21 +55,21 @@ class PlannerRace:
         self._improving: set[asyncio.Task[None]] = set()
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """The first valid plan within `seconds` of real time, or what all engines together have to say.
+        """Return the first valid plan within `seconds` of real time, or the combined outcome of all engines.
 
-        `failures` of the outcome has those that failed, whoever won. If all failed, so does the race; its
-        `engine` and `message` name each.
+        `failures` of the outcome lists the engines that failed. If all failed, the outcome is `EngineFailed`, with each
+        in its `engine` and `message`.
         """
         async with aclosing(self.plans(problem, seconds)) as plans:
             return await anext(plans)
 
     async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """As `solve`, and then each cheaper plan that one of the engines finds in the rest of the time.
+        """Yield the outcome of `solve`, then each cheaper plan that an engine finds in the remaining time.
 
-        A problem with durations, too, is first given to engines that can do these; if they find no plan in half the
-        time, it is tried with one action at a time.
+        A problem with durations first goes to temporal engines. If they find no plan in half the time, it is tried with
+        one action at a time.
 
-        Closing it ends all searches: `async with contextlib.aclosing(...)`.
+        Closing the generator ends all searches: `async with contextlib.aclosing(...)`.
         """
         failures: tuple[EngineFailed, ...] = ()
         engines = [] if problem.timed is None else self._choose(problem.timed)
@@ -92,7 +92,7 @@ class PlannerRace:
     async def _raced(
         self, engines: Sequence[Engine], problem: Problem, seconds: float
     ) -> AsyncGenerator[PlanningOutcome, None]:
-        """What these engines say to one form of a problem."""
+        """Yield the outcomes of these engines for one form of a problem."""
         if not engines:
             yield nobody(problem)
             return
@@ -112,16 +112,16 @@ class PlannerRace:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def warm_up(self, problem: Problem | None = None) -> None:
-        """Start the engines for a problem (one of plain STRIPS if none is given), so that the first does not wait."""
+        """Start the engines for a problem (by default one of plain STRIPS), so that the first problem does not wait."""
         engines = self._choose(problem or _PLAIN)
         await asyncio.gather(*(self._planner(one.name).warm_up() for one in engines))
 
     async def close(self) -> None:
-        """End all processes; a later `solve` would start new ones."""
+        """End all processes; a later `solve` starts new ones."""
         self.kill()
 
     def kill(self) -> None:
-        """As `close`, without a loop."""
+        """End all processes; needs no event loop."""
         for planner in self._planners.values():
             planner.kill()
 
@@ -146,7 +146,7 @@ async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answer
         async with aclosing(planner.plans(problem, seconds)) as plans:
             async for outcome in plans:
                 answers.put_nowait((planner.engine, outcome))
-    except Exception as error:  # noqa: BLE001  whatever one engine's planner does, the other goes on
+    except Exception as error:  # noqa: BLE001  a failed planner must not stop the other
         answers.put_nowait((planner.engine, EngineFailed(planner.engine, described(error))))
     finally:
         answers.put_nowait((planner.engine, None))
@@ -155,7 +155,7 @@ async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answer
 async def _better_and_better(
     answers: asyncio.Queue[_Answer], running: int, seconds: float
 ) -> AsyncGenerator[PlanningOutcome, None]:
-    """The first plan or proof, then each cheaper plan; if there is neither, what became of everybody."""
+    """Yield the first plan or proof, then each cheaper plan; without either, one outcome with all failures."""
     best: PlanFound | None = None
     failures: list[EngineFailed] = []
     late: list[str] = []

@@ -1,7 +1,7 @@
-"""The planning engines there are, what each can do, and which of them suit a problem.
+"""The registry of planning engines: their features, and the choice of engines for a problem.
 
-Nothing here imports an engine or unified-planning: whether one is installed is looked up in the metadata of
-the packages, so that asking costs next to nothing.
+This module imports neither an engine nor unified-planning. Package metadata shows whether an engine is installed, so
+that a query costs almost nothing.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ if TYPE_CHECKING:
 DISTRIBUTION = "dynamic-state-charts"
 
 WISHES = frozenset({"costs"})
-"""Features that an engine may ignore: its plan is valid all the same, only not the cheapest."""
+"""Features that an engine may ignore: its plan is still valid, but not the cheapest."""
 
 AT_ONCE = 2
-"""How many engines race at most (CONTRACTS.md, Planning): there are robots with two cores."""
+"""Maximum number of engines in a race (CONTRACTS.md, Planning); some robots have two cores."""
 
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """A planning engine as it is used here.
+    """A planning engine and its driver.
 
     Attributes:
-        name: what it is called on the command line and in outcomes.
+        name: its name on the command line and in outcomes.
         driver: the module of `planning.engines` that runs it, inside the worker process.
-        made_by: what the driver makes it of: `module:class` of a unified-planning engine, or a configuration.
-        package: the distribution it comes in.
-        at_least: the oldest version of that.
-        licence: the engine's own, which may be another than its package's.
-        features: what it can do beyond STRIPS, out of `planning.strips.FEATURES`.
-        program: what has to be on the path besides.
-        optimal: whether its plans are the cheapest there are.
-        anytime: whether it goes on to look for better plans.
+        made_by: the driver's argument: `module:class` of a unified-planning engine, or a configuration.
+        package: the distribution with the engine.
+        at_least: the lower bound of the package's version.
+        licence: the engine's own, which may differ from its package's.
+        features: features beyond STRIPS, out of `planning.strips.FEATURES`.
+        program: a program that must be on the path too.
+        optimal: whether its plans have the lowest cost.
+        anytime: whether it continues to search for better plans.
         proves: whether it ends when there is no plan.
         deterministic: whether the same problem gets the same plan on every run.
-        races: whether it is chosen by itself, or only by name.
-        most_actions: with more ground actions than this it is no use beside an engine that has no such bound.
+        races: whether a race may choose it, or only the user by name.
+        most_actions: largest number of ground actions for which it is useful in a race; `None` without a bound.
     """
 
     name: str
@@ -67,11 +67,11 @@ class Engine:
 
     @property
     def version(self) -> str | None:
-        """The installed version of its package; `None` if there is none."""
+        """The installed version of its package; `None` if it is not installed."""
         return _version(self.package)
 
     def lacks(self) -> str:
-        """What to do before it can be used; empty if it can be used now."""
+        """Return the steps to make it usable; empty if it is usable."""
         steps = []
         if self.version is None:
             steps.append(f"pip install '{self.package}>={self.at_least}'")
@@ -80,21 +80,21 @@ class Engine:
         return ", ".join(steps)
 
     def can_do(self, features: Collection[str]) -> bool:
-        """Whether it can plan with these features; `WISHES` are not asked for."""
+        """Return whether it can plan with these features; `WISHES` are optional."""
         return self.features.issuperset(frozenset(features) - WISHES)
 
 
 @cache
 def _version(package: str) -> str | None:
-    """Looked up once: it takes a millisecond, and is asked for each engine whenever a race begins."""
+    """Return the installed version, cached, since a lookup takes a millisecond and each race needs all of them."""
     try:
         return version(package)
     except PackageNotFoundError:
         return None
 
 
-# In the order of preference. Fast Downward gets its input ready made (see the driver), so that it is ahead of
-# pyperplan on the smallest problem, too; pyperplan greedily takes seconds from about 1,000 ground actions on.
+# The tuple is in the order of preference. Fast Downward bypasses its translator (see the driver), so that it is faster
+# than pyperplan even on the smallest problem. Greedy pyperplan takes seconds from about 1,000 ground actions on.
 ENGINES = (
     Engine(
         "fast-downward", "fast_downward", "first, then better", "up-fast-downward", "1.0", "GPL-3.0",
@@ -123,10 +123,10 @@ ENGINES = (
 
 
 def engine(name: str) -> Engine:
-    """The engine of that name.
+    """Return the engine of that name.
 
     Raises:
-        UnknownNameError: there is none.
+        UnknownNameError: there is no such engine.
     """
     for one in ENGINES:
         if one.name == name:
@@ -135,53 +135,53 @@ def engine(name: str) -> Engine:
 
 
 def able(features: Collection[str], engines: Iterable[Engine] = ENGINES) -> list[Engine]:
-    """The engines that can plan with these features, those that also grant the wishes first."""
+    """Return the engines that can plan with these features; those that also grant the wishes come first."""
     wishes = WISHES.intersection(features)
     suited = [one for one in engines if one.can_do(features)]
-    return sorted(suited, key=lambda one: not wishes <= one.features)  # stable: else as preferred
+    return sorted(suited, key=lambda one: not wishes <= one.features)  # stable: otherwise in the order of preference
 
 
 def installed(one: Engine) -> bool:
-    """Whether it can be used now."""
+    """Return whether the engine is usable now."""
     return not one.lacks()
 
 
 def can_time(name: str) -> bool:
-    """Whether the engine of that name, if there is one, plans with durations."""
+    """Return whether there is an engine of that name, and it plans with durations."""
     return any(one.name == name and "durations" in one.features for one in ENGINES)
 
 
 def timing() -> list[Engine]:
-    """The installed engines that plan with durations and are chosen by themselves."""
+    """Return the installed engines that plan with durations and take part in races."""
     return [one for one in able({"durations"}) if one.races and installed(one)]
 
 
 def in_concert() -> str:
-    """Who could find a plan with several actions at a time, and how to get him, as text."""
+    """Return the engines that could plan with concurrent actions, and the steps to make them usable, as text."""
     return "engines that could do several: " + ", ".join(map(described, able({"durations"})))
 
 
 def nobody(problem: Problem, engine: str = "") -> NobodyCan:
-    """The outcome where no engine, or not the only one that may be asked, can do what the problem needs."""
+    """Return the outcome for a problem that no permitted engine supports."""
     could = tuple((one.name, one.lacks()) for one in able(problem.features) if one.races)
     return NobodyCan(engine, tuple(sorted(problem.features - WISHES)), could)
 
 
 def cannot(name: str, problem: Problem) -> bool:
-    """Whether the engine of that name is known not to do what the problem needs."""
+    """Return whether the engine of that name is known to lack a feature of the problem."""
     return any(one.name == name and not one.can_do(problem.features) for one in ENGINES)
 
 
 def described(one: Engine) -> str:
-    """The engine, and what to do before it can be used."""
+    """Return the engine's name with the steps to make it usable."""
     lacks = one.lacks()
     return f"{one.name} ({lacks})" if lacks else one.name
 
 
 def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:
-    """The engines that shall race for a plan, at most `AT_ONCE`; none if none that can is installed.
+    """Return at most `AT_ONCE` engines for a race; empty if no usable engine supports the problem.
 
-    Nor is one chosen for a problem with durations that is too large for it: one action at a time is quicker then.
+    A temporal problem that is too large for every engine gets none either: the one with one action at a time is faster.
     """
     racing = [one for one in able(problem.features) if one.races and usable(one)]
     size = len(problem.actions)

@@ -1,12 +1,16 @@
-"""A problem as a worker reads it: a line of JSON, in which facts are listed once and referred to by number.
+"""The request to a worker: a problem as a line of JSON, with facts listed once and referred to by number.
 
-It is written in one go, since a robot may be waiting for it: of each ground action, most of which come again in the
-next problem, the text is kept with gaps for the numbers.
+Serialization is fast, since a robot may wait. Most ground actions come again in the next problem, so the text of each
+is cached with gaps for the numbers.
 
-It has `facts` (predicate and arguments of each), `init` and `goal` (their numbers), `actions` (of each the step or
-null; the numbers of what it needs, adds and deletes; its cost, bounds, assignments and, if it is durative, its span),
-`whole` (whether there is more of it, which is sent when its turn comes) and other attributes of
-`planning.strips.Problem`.
+Keys of the object:
+
+- `facts`: predicate and arguments of each fact.
+- `init` and `goal`: fact numbers.
+- `actions`: for each the step or null; the numbers of its precondition, adds and deletes; cost, bounds, assignments
+  and, if it is durative, its span.
+- `whole`: whether an unsliced form exists, which is sent later if needed.
+- Other attributes of `planning.strips.Problem`.
 """
 
 from __future__ import annotations
@@ -23,16 +27,16 @@ from planning.quantities import Assignment, NumericBound, from_json, to_json
 from planning.strips import ActionSpan, GroundAction, Problem
 
 _Row = tuple[str, tuple[Fact, ...]]
-"""The text of an action with gaps, and the facts that belong there."""
+"""The text of an action with gaps, and the facts whose numbers fill them."""
 
 
 def written(problem: Problem) -> bytes:
-    """The problem as a line; all engines of a race get the same."""
+    """Return the problem as a line, cached, since all engines of a race get the same."""
     return _written.find(problem, None) or _written.keep(problem, None, _line(problem))
 
 
 def read(request: Mapping[str, Any]) -> Problem:
-    """The problem that was written."""
+    """Return the problem of a request."""
     facts = [Fact(predicate, tuple(args)) for predicate, *args in request["facts"]]
 
     def named(numbers: Iterable[int]) -> tuple[Fact, ...]:
@@ -68,7 +72,7 @@ def _line(problem: Problem) -> bytes:
     rows = [_rows.find(action, None) or _rows.keep(action, None, _row(action)) for action in problem.actions]
     before = len(problem.init) + len(problem.goal)
     mentioned = [*problem.init, *problem.goal, *chain.from_iterable([facts for _, facts in rows])]
-    places = list(map(id, mentioned))  # looked up faster than facts; all of them stay meanwhile
+    places = list(map(id, mentioned))  # compared faster than facts; all facts stay alive meanwhile
     number: dict[Fact, int] = {}
     first = dict(zip(places, mentioned, strict=True))
     known = {place: number.setdefault(fact, len(number)) for place, fact in first.items()}
@@ -107,7 +111,7 @@ def _row(action: GroundAction) -> _Row:
 
 
 def _text(part: Any) -> str:
-    """As JSON, without gaps."""
+    """Return JSON with `%` escaped, for the later formatting."""
     return json.dumps(part).replace("%", "%%")
 
 

@@ -1,4 +1,4 @@
-"""Engines of unified-planning: our problem built as theirs without PDDL text, and their answers read."""
+"""Driver of unified-planning's engines: builds their problem without PDDL text, and reads their answers."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ if TYPE_CHECKING:
 
 
 def translated(problem: Problem, *, costs: bool = False, environment: Environment | None = None) -> UpProblem:
-    """The same problem for an engine of unified-planning.
+    """Return the problem as one of unified-planning.
 
     Args:
-        problem: what to translate; action number i is called `ai`.
-        costs: ask for a plan of low cost, for engines that can.
-        environment: what unified-planning keeps its expressions in, for ever; a new one if none is given. Fast
+        problem: the problem to translate; action number i is called `ai`.
+        costs: ask for a plan of low cost, for engines that support costs.
+        environment: holds unified-planning's expressions for the whole process; by default a new one. Fast
             Downward's binding works only in the global one.
     """
     return _Translation(problem, Environment() if environment is None else environment, costs=costs).result
 
 
 def ticks(problem: Problem) -> int:
-    """How many units of time a second has in the translation: not every engine takes fractions of one."""
+    """Return the time units per second in the translation; some engines take only integer durations."""
     spans = [action.span for action in problem.actions if action.span is not None]
     return math.lcm(*(_nearly(one).denominator for span in spans for one in (span.least, span.most)))
 
@@ -167,31 +167,31 @@ class _Translation:
 
 
 def _exact(number: float) -> Fraction:
-    """The number as people wrote it: 0.1 is a tenth, though no float is."""
+    """Return the decimal number as written: 0.1 is a tenth, though the float is not."""
     return Fraction(repr(number))
 
 
 def _nearly(number: float) -> Fraction:
-    """The same to a thousandth."""
+    """Return the number to a thousandth."""
     return _exact(number).limit_denominator(1000)
 
 
 def _whole(costs: Sequence[float]) -> list[int]:
-    """Whole numbers in the same proportion, to a thousandth: not every engine takes fractions."""
+    """Return integers in the same proportion, to a thousandth: some engines take no fractions."""
     exact = [_nearly(cost) for cost in costs]
     common = math.lcm(*(cost.denominator for cost in exact))
     return [int(cost * common) for cost in exact]
 
 
 _NO_MEMORY = ("OutOfMemoryError", "insufficient memory")
-"""What Java says."""
+"""Java's messages for exhausted memory."""
 
 
 def searching(engine: Engine) -> Search:
-    """The search with an engine made by the class `module:name`, for `planning.engines.worker`.
+    """Return the search of an engine with the class `module:name`, for `planning.engines.worker`.
 
     Raises:
-        ImportError: it is not installed.
+        ImportError: the engine is not installed.
     """
     module, _, name = engine.made_by.partition(":")
     make = getattr(import_module(module), name)
@@ -212,11 +212,11 @@ def _found(engine: Any, translation: UpProblem, problem: Problem) -> Answers:
 
 
 def _actions(result: PlanGenerationResult) -> list[int] | None:
-    """Indices into the problem's actions, or `None` if it is proven that there is no plan.
+    """Return indices of the problem's actions, or `None` if the engine proved that there is no plan.
 
     Raises:
-        MemoryError: the engine says that it ran out of it.
-        RuntimeError: it ended without saying anything of this.
+        MemoryError: the engine reports exhausted memory.
+        RuntimeError: the engine ended with none of these.
     """
     if isinstance(result.plan, TimeTriggeredPlan):
         timed = sorted(result.plan.timed_actions, key=_start)
@@ -232,7 +232,7 @@ def _actions(result: PlanGenerationResult) -> list[int] | None:
 
 
 def _timed(plan: TimeTriggeredPlan, ticks: int) -> list[tuple[int, float, float]]:
-    """Index, start and duration, in seconds, of actions whose times are in ticks."""
+    """Return index, start and duration in seconds of actions with times in ticks."""
     return [
         (int(action.action.name[1:]), float(start / ticks), float((duration or 0) / ticks))
         for start, action, duration in plan.timed_actions
@@ -249,9 +249,9 @@ def _run_in_our_group(
     output_stream: object = None,  # noqa: ARG001
     timeout: float | None = None,  # noqa: ARG001
 ) -> tuple[bool, tuple[list[str], list[str]], int]:
-    """In the place of unified-planning's `run_command`, which would give the program a session of its own.
+    """Replace unified-planning's `run_command`, which starts the program in a separate session.
 
-    There it would outlive the search that it belongs to.
+    In that session the program would outlive its search.
     """
     done = subprocess.run(cmd, capture_output=True, stdin=subprocess.DEVNULL, text=True, check=False)  # noqa: S603
     return False, ([done.stdout], [done.stderr]), done.returncode

@@ -1,16 +1,20 @@
 """The planner process: `python -m planning.engines.worker ENGINE [MEGABYTES]`.
 
-It imports the engine once and then forks for each problem. So every search starts from the same state of the
-process (the same problem gets the same plan), can be ended without ending the worker, gives back its memory,
-and may crash as it likes.
+The worker imports the engine once and forks for each problem. Every search starts from the same state of the process,
+so that the same problem gets the same plan. The worker survives when a search is killed or crashes, and the search
+returns its memory.
 
-One JSON object a line. The worker begins with `{"ready": true}`. For each problem (see `planning.engines.request`) on
-standard input it says `{"searching": G}`, G being the process group of the search and of all that it starts;
-then answers, `{"actions": [3, 0, ...]}` or, with the seconds at which each begins and that it takes, `{"timed":
-[[3, 0.0, 5.0], ...]}` (each plan better than the one before), `{"actions": null}` when there
-is proven to be no plan, or `{"failed": "why"}`; and at last, always, `{"ended": STATUS}`. With what an engine answers
-goes `"translated"`: the seconds of processor time for reading the problem and putting it into the engine's words. It
-ends when its standard input does, and the search with it: a planner never outlives who asked.
+The protocol has one JSON object a line. The worker begins with `{"ready": true}`. It reads problems (see
+`planning.engines.request`) from standard input and writes for each:
+
+- `{"searching": G}`, with the process group G of the search and its processes.
+- Answers, each better than the one before: `{"actions": [3, 0, ...]}` or, with start and duration in seconds,
+  `{"timed": [[3, 0.0, 5.0], ...]}`.
+- `{"actions": null}` if the engine proves that there is no plan, or `{"failed": "why"}`.
+- At last, always, `{"ended": STATUS}`.
+
+Each answer has `"translated"`: seconds of processor time for reading the problem and translating it for the engine. The
+worker and its search end with standard input, so that a planner never outlives its caller.
 """
 
 from __future__ import annotations
@@ -33,43 +37,43 @@ from typing import Any, NoReturn
 _PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 
 Schedule = dict[str, list[tuple[int, float, float]]]
-"""A plan with times as it is answered."""
+"""An answer with a temporal plan: index, start and duration in seconds."""
 
 Answers = Iterator[list[int] | Schedule | None]
-"""What an engine finds, which it searches for when asked for the next one."""
+"""An engine's answers; each is searched for on demand."""
 
 Request = Mapping[str, Any]
-"""A problem as it is read, with numbers for facts, which is all that most engines want to know."""
+"""A decoded problem with fact numbers, sufficient for most engines."""
 
 Search = Callable[[Request], Answers]
-"""Puts a problem into the engine's words; the search begins when the first answer is asked for."""
+"""Translates a problem for the engine; the search begins with the first answer."""
 
 MEGABYTES = 2048
-"""Memory that a search may take, each of its processes by itself, if nobody says otherwise."""
+"""Default memory limit of each process of a search."""
 
 
 def main() -> None:
     """Serve until standard input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one who asked
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the caller
     name, megabytes = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else MEGABYTES
     out = _claim_stdout()
     _adopt_orphans()
     search = _loaded(name)
-    gc.freeze()  # what is there now is shared by all searches
+    gc.freeze()  # all searches share the present objects
     _say(out, {"ready": True})
     for line in sys.stdin.buffer:
         _serve(line, search, out, megabytes)
 
 
 def _claim_stdout() -> int:
-    """Our answers' way out; whatever libraries print goes to standard error instead."""
+    """Return the descriptor for answers; output of libraries goes to standard error instead."""
     out = os.dup(1)
     os.dup2(2, 1)
     return out
 
 
 def _adopt_orphans() -> None:
-    """What a search has started and left is ours to bury (Linux); in a container often nobody else does."""
+    """Adopt processes that a search leaves behind (Linux); a container often has no init process that does."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
@@ -81,7 +85,7 @@ def _say(out: int, said: dict[str, Any]) -> None:
 
 
 def _loaded(name: str) -> Search:
-    """The engine's search; if it cannot be imported, one that says so to each problem."""
+    """Return the engine's search; if its import fails, one that reports the failure for each problem."""
     try:
         import planning.strips  # noqa: F401, PLC0415  before the first fork, so that no search pays for it
         from planning.engines.registry import engine  # noqa: PLC0415
@@ -118,16 +122,16 @@ def _serve(line: bytes, search: Search, out: int, megabytes: int) -> None:
 
 
 def _in_group(child: int) -> None:
-    """Both sides do this, since either may be first."""
-    with contextlib.suppress(OSError):  # it has done so and gone already
+    """Create the process group; parent and child both do, since either may be first."""
+    with contextlib.suppress(OSError):  # the child has done so and ended already
         os.setpgid(child, child)
 
 
 def _relay(heard: int, out: int, child: int) -> None:
-    """Hand on what the search says until it ends; end it when our own input does."""
+    """Relay the search's output until its end; kill it at the end of the worker's input."""
     poll = select.poll()
     poll.register(heard, select.POLLIN)
-    poll.register(0, 0)  # nothing is asked meanwhile: only the hang-up is of interest
+    poll.register(0, 0)  # no request arrives meanwhile: only the hang-up counts
     last = b"\n"
     while True:
         events = dict(poll.poll())
@@ -145,8 +149,8 @@ def _relay(heard: int, out: int, child: int) -> None:
 
 
 def _reaped(child: int) -> int:
-    """Its exit status, negative for a signal; what it has left running is gone."""
-    os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)  # while it is a zombie, its group's number is taken
+    """Return the exit status, negative for a signal, after killing the search's remaining processes."""
+    os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)  # while it is a zombie, its group's number is reserved
     _kill_group(child)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     with contextlib.suppress(ChildProcessError):  # that was the last of the group
@@ -161,7 +165,7 @@ def _kill_group(group: int) -> None:
 
 
 def _search(line: bytes, search: Search, said: int, lifeline: int, megabytes: int) -> NoReturn:
-    """What the forked process does; it never returns to the loop that it was forked from."""
+    """Run the search in the forked process and exit; it never returns to the parent's loop."""
     try:
         _in_group(0)
         threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
@@ -173,20 +177,20 @@ def _search(line: bytes, search: Search, said: int, lifeline: int, megabytes: in
 
 
 def _end_with(lifeline: int) -> None:
-    """End this search with the worker, should that be killed before it could do so itself."""
+    """Kill this search if the worker dies before it could."""
     os.read(lifeline, 1)
     os.killpg(0, signal.SIGKILL)
 
 
 def _limit_memory(megabytes: int) -> None:
-    """Bound what each process of the search may write to.
+    """Limit the writable memory of each process of the search.
 
-    RLIMIT_DATA, unlike RLIMIT_AS, counts no address space that is only reserved, of which Java takes many
-    gigabytes. It is kept by Linux (4.7 and later), not by macOS.
+    RLIMIT_DATA, unlike RLIMIT_AS, does not count reserved address space, of which Java takes many gigabytes. Linux (4.7
+    and later) enforces it, macOS does not.
     """
     allowed = megabytes << 20
     resource.setrlimit(resource.RLIMIT_DATA, (allowed, allowed))
-    # Half of it as heap, so that Java says itself that it has no more; should it crash, it writes no files for that.
+    # Half of the memory is Java's heap, so that Java reports its exhaustion; a crash of Java must leave no files.
     unwritten = "-XX:ErrorFile=/dev/null -XX:ReplayDataFile=/dev/null"
     os.environ["JAVA_TOOL_OPTIONS"] = f"-Xmx{max(16, megabytes // 2)}m {unwritten}"
 
@@ -202,7 +206,7 @@ def _answer(line: bytes, search: Search, said: int) -> None:
     except MemoryError:
         _say(said, {"failed": "it ran out of memory"})
     except Exception as error:  # noqa: BLE001  an engine may raise anything
-        from knowledge_base.errors import described  # noqa: PLC0415  a search that goes well does without
+        from knowledge_base.errors import described  # noqa: PLC0415  a successful search does without
 
         _say(said, {"failed": described(error)})
 
