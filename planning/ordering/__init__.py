@@ -1,1 +1,1 @@
-"""What the steps of a plan do for each other, and which of them wait for which."""
+"""Causal links between the steps of a plan, and the partial order of the steps."""

@@ -1,8 +1,8 @@
-"""A plan carried out in thought: who made what, and who relied on it.
+"""Causal tracing: simulate a plan, and record for each condition the step that establishes it.
 
-Steps are sets of bits here, and of each fact there is one record, so that a step costs what it touches. Most steps
-need and change nothing but facts, whatever the world is like; what that is is worked out once for each of them. The
-others are looked at in the world that the steps before them lead to.
+Sets of steps are bits, and each fact has one record, so that the cost of a step depends on its own facts. The needs and
+changes of most steps are plain facts in every world, and are cached for each step. Other steps are evaluated in the
+simulated world.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from planning.plan import PlanStep
 from planning.problem.conditions import Literal
 
 PRESENT = 0
-"""Who provides what holds already."""
+"""The provider of facts that hold initially."""
 
 
 class CausalTrace:
-    """A plan that leads from `world`, which stays as it is, to its goal.
+    """The trace of a plan that leads from `world`, which it does not change, to its goal.
 
     Args:
         world: the present, with derived facts.
 
     Attributes:
-        links: who brings about what for whom, in the order of the users.
-        earlier: for each step, those that have to be done before it, as bits.
+        links: provider, condition and user of each causal link, in the order of the users.
+        earlier: for each step, the steps that must end before it, as bits.
     """
 
     def __init__(self, world: World) -> None:
@@ -50,10 +50,10 @@ class CausalTrace:
         self._numbers: dict[Fact, _Number] = defaultdict(_Number)
 
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
-        """Step number `number` comes next.
+        """Add step number `number` to the trace.
 
         Raises:
-            InputError: it cannot be taken.
+            InputError: the step is not applicable.
         """
         action, ground = domain.action(step), domain.ground(step)
         self._check_types(action, step)
@@ -69,7 +69,7 @@ class CausalTrace:
             return
         doing = _doing(action, step, ground.effect, domain, self._world)
         for condition in dict.fromkeys(doing.conditions):
-            if holds(condition, self._world, {}):  # else its own start brings it about
+            if holds(condition, self._world, {}):  # otherwise the step's own start makes it true
                 self._need_support(number, condition, step)
         for fluent in doing.reads:
             self._rely(number, fluent)
@@ -83,20 +83,20 @@ class CausalTrace:
             if isinstance(now, int | float) and isinstance(before, int | float):
                 self._numbers[fluent].moves[number] = now - before
         world.apply(made)
-        for literal in doing.makes:  # what is added at the start may be deleted at the end
+        for literal in doing.makes:  # the end may delete a fact that the start adds
             self._record(literal.fact).holds = world.holds(literal.fact.predicate, literal.fact.args)
 
     def reach(self, user: int, goal: Expression) -> None:
-        """The goal is the last user.
+        """Add the goal as the last user.
 
         Raises:
-            InputError: it is not reached.
+            InputError: the goal does not hold.
         """
         self._need_all(user, goal, None)
 
     @property
     def _world(self) -> Overlay:
-        """The state reached."""
+        """The simulated world after the steps so far."""
         if self._pending:
             added = tuple([fact for fact, so in self._pending.items() if so])
             removed = tuple([fact for fact, so in self._pending.items() if not so])
@@ -117,7 +117,7 @@ class CausalTrace:
         return found
 
     def _need(self, user: int, condition: Expression, literal: Literal, whose: PlanStep | None) -> None:
-        """A step, or the goal, needs a fact to be as the literal says."""
+        """Record that a step, or the goal, needs a literal."""
         wanted, record = literal.positive, self._record(literal.fact)
         if record.holds is not wanted:
             raise _missing(condition, whose)
@@ -128,8 +128,8 @@ class CausalTrace:
             self.earlier[user] |= 1 << provider
 
     def _need_all(self, user: int, condition: Expression, whose: PlanStep | None) -> None:
-        """A step, or the goal, needs all parts of a ground condition now."""
-        for part in conjuncts(condition, self._base):  # only asks which things there are, and no step changes that
+        """Record that a step, or the goal, needs all parts of a ground condition now."""
+        for part in conjuncts(condition, self._base):  # reads only objects, which no step changes
             literal = _literal(part, self._base.schema)
             if literal is None:
                 self._need_support(user, part, whose)
@@ -137,11 +137,11 @@ class CausalTrace:
                 self._need(user, part, literal, whose)
 
     def _need_support(self, user: int, condition: Expression, whose: PlanStep | None) -> None:
-        """A step, or the goal, needs a ground condition of any form now."""
+        """Record that a step, or the goal, needs a ground condition of any form now."""
         found = support(condition, self._world, self._latest)
         if found is None:
             raise _missing(condition, whose)
-        if not found:  # nothing can change it
+        if not found:  # no step can change it
             return
         providers = {one for ground in found for one in self._providers(ground) if self._helps(one, ground, condition)}
         self.links += [(one, condition, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
@@ -158,7 +158,7 @@ class CausalTrace:
             self._numbers[ground].users |= 1 << user
 
     def _make(self, number: int, makes: Iterable[Literal]) -> None:
-        """It comes after whoever needs or makes the opposite; what is both deleted and added is true in the end."""
+        """Order the step after users and makers of the opposite; a fact both deleted and added is true at the end."""
         records = [(self._record(literal.fact), literal.positive) for literal in makes]
         own = 1 << number
         for record, positive in records:
@@ -167,7 +167,7 @@ class CausalTrace:
                 record.since[positive] = number
         for record, positive in records:
             record.makers[positive] |= own
-            if record.makers[not positive] & own:  # both
+            if record.makers[not positive] & own:  # the step makes it both false and true
                 record.since[:] = number, number
             record.holds = positive or bool(record.makers[True] & own)
         self.earlier[number] &= ~own
@@ -189,7 +189,7 @@ class CausalTrace:
         return tuple(_numbers(known.adders | known.assigners)) or (PRESENT,)
 
     def _helps(self, provider: int, ground: Ground, condition: Expression) -> bool:
-        """Whether the condition owes something to the provider: who uses up fuel does not provide what is left."""
+        """Return whether the provider contributes to the condition; consuming fuel does not provide the rest."""
         if isinstance(ground, Literal) or provider == PRESENT or self._numbers[ground].assigners:
             return True
         good = favours(condition, ground, self._world)
@@ -201,11 +201,11 @@ class CausalTrace:
 
 @dataclass(slots=True)
 class _Record:
-    """What became of a fact; lists have what is about its falsehood first, then what is about its truth.
+    """The history of a fact; index 0 of each list is about its falsehood, index 1 about its truth.
 
     Attributes:
-        holds: whether it does now.
-        since: the step that made it so; without one, it was so from the beginning.
+        holds: whether the fact holds now.
+        since: the step that made it so; `PRESENT` if it was so initially.
         makers: the steps that make it so, as bits.
         users: the steps that rely on it, as bits.
     """
@@ -218,11 +218,11 @@ class _Record:
 
 @dataclass(slots=True)
 class _Number:
-    """What became of a number.
+    """The history of a number.
 
     Attributes:
-        users, adders, assigners: steps, as bits, that use it, that only add to it, and that change it in other ways.
-        moves: by how much a step made it greater.
+        users, adders, assigners: steps, as bits, that read it, that only add to it, and that change it in other ways.
+        moves: the increase by each step.
     """
 
     users: int = 0
@@ -233,12 +233,12 @@ class _Number:
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """What a step needs and does, as far as that is the same in every world.
+    """The needs and changes of a step that are the same in every world.
 
     Attributes:
-        needs: its conditions; with the literal, where that is all of it.
-        makes: the literals that it makes true; `None` if that depends on the world.
-        changes: what holds then of their facts.
+        needs: its conditions; with the literal if the condition is one.
+        makes: the literals that it makes true; `None` if they depend on the world.
+        changes: the truth values of their facts afterwards.
     """
 
     needs: tuple[tuple[Expression, Literal | None], ...]
@@ -247,7 +247,7 @@ class _Known:
 
     @staticmethod
     def of(step: GroundStep, action: PlanningAction, schema: Vocabulary) -> _Known:
-        """Worked out once: one plan has most steps of the one before."""
+        """Return the cached needs and changes: a new plan shares most steps with the last."""
         return _known.find(step, schema) or _known.keep(step, schema, _Known._of(step, action, schema))
 
     @staticmethod
@@ -297,7 +297,7 @@ def _fact(atom: Atom) -> Fact:
 
 
 def _always_the_same(action: PlanningAction, schema: Vocabulary) -> bool:
-    """Whether it only adds and deletes facts, in any case, that may be told of any arguments of the right types."""
+    """Return whether the action only adds and deletes facts, unconditionally, with valid types for all arguments."""
     types = {parameter.name: parameter.types for parameter in action.parameters}
     return action.timed is None and all(
         isinstance(part, AllOf) or (isinstance(part, Add | Delete) and _may_be_told(part.atom, types, schema))

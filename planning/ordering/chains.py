@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 Kin = Callable[[int, int], bool]
-"""Whether two steps are better kept in one chain, e.g. because one robot takes both."""
+"""Returns whether two steps should share a chain, e.g. because one robot takes both."""
 
 
 def chains(earlier: Mapping[int, frozenset[int]], kin: Kin) -> tuple[tuple[int, ...], ...]:
-    """The fewest chains that hold each step once, by their first steps.
+    """Return the fewest chains that contain each step once, ordered by their first steps.
 
-    A chain is a sequence of steps each of which ends before the next begins. Of all covers with the fewest chains,
-    one is taken that keeps kin together as far as a matching of kin alone can be kept.
+    A chain is a sequence of steps each of which ends before the next begins. Among the covers with the fewest chains,
+    the result extends a maximum matching of kin.
 
     Args:
-        earlier: for each step in order, all that end before it begins.
-        kin: see there.
+        earlier: for each step in order, the steps that end before it begins.
+        kin: see `Kin`.
     """
     matching = _Matching(earlier)
     for relatives in (kin, _anybody):
@@ -38,7 +38,7 @@ def _chain(first: int, following: Mapping[int, int]) -> tuple[int, ...]:
 
 
 class _Matching:
-    """Who comes directly before whom; `follow` makes it larger by one along an augmenting path, if there is any."""
+    """A matching of steps with their direct predecessors; `follow` extends it along an augmenting path."""
 
     def __init__(self, earlier: Mapping[int, frozenset[int]]) -> None:
         self.before: dict[int, int] = {}
@@ -46,7 +46,7 @@ class _Matching:
         self._earlier = {number: sorted(those, reverse=True) for number, those in earlier.items()}
 
     def follow(self, second: int, kin: Kin) -> None:
-        """Let a step come directly after another one, if it does not yet."""
+        """Give a step a direct predecessor if it has none and the matching allows one."""
         if second not in self.before:
             self._augment(second, kin, set())
 

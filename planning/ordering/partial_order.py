@@ -1,15 +1,17 @@
-"""What the steps of a plan do for each other, and which need not wait for each other (S1.5).
+"""Causal links of a plan, and the partial order that follows from them (S1.5).
 
-A *causal link* says that a step (or the present) brings about a condition that a later step (or the goal) needs
-(Tate 1977, *Generating project networks*). *De-ordering* keeps of the plan's order only what has a reason
-(Bäckström 1998, *Computational aspects of reordering plans*); the reasons are
+A *causal link*: a step, or the present, establishes a condition that a later step, or the goal, needs (Tate 1977,
+*Generating project networks*).
 
-    a step needs what an earlier one brings about            (the link)
-    a later step undoes what an earlier one needs             (the threat to it)
-    one makes true what the other makes false, or both set one number in ways that do not commute
+*De-ordering* keeps only the ordered pairs of the plan with a reason (Bäckström 1998, *Computational aspects of
+reordering plans*). The reasons:
 
-so that every linearisation takes the same steps to the same end. A fact that a step deletes and adds is taken to be
-false in between: two such steps never overlap.
+- Link: a step needs a condition that an earlier step establishes.
+- Threat: a later step falsifies a condition that an earlier step needs.
+- Conflict: one step makes a fact true that the other makes false, or both change a number and do not commute.
+
+Every linearization then takes the same steps to the same end. A fact that a step both deletes and adds counts as false
+in between, so that two such steps never overlap.
 """
 
 from __future__ import annotations
@@ -35,11 +37,10 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class CausalLink:
-    """Step number `provider` (0: the present) brings about a fact that step `user` (one past the last: the goal) needs.
+    """Step `provider` (0: the present) establishes a condition of step `user` (one past the last: the goal).
 
-    `fact` is a ground literal wherever the condition can be split that far; what cannot be split (a disjunction, a
-    comparison) is one condition. If several steps bring it about together, each has a link, and it holds when the
-    last of them is done.
+    `fact` is a ground literal if the condition can be split that far; a disjunction or comparison is one condition. If
+    several steps establish it together, each has a link, and the condition holds after the last of them.
     """
 
     provider: int
@@ -47,19 +48,19 @@ class CausalLink:
     user: int
 
     def __str__(self) -> str:
-        """`1 -(holding cup)-> 3`."""
+        """Text such as `1 -(holding cup)-> 3`."""
         return f"{self.provider} -{to_text(self.fact)}-> {self.user}"
 
 
 @dataclass(frozen=True)
 class PartialOrder:
-    """A plan whose steps wait for each other only where there is a reason.
+    """A plan whose steps are ordered only where there is a reason.
 
     Attributes:
-        steps: in the order of the plan, which is one of the linearisations; numbered from 1.
-        links: what is brought about, by whom and for whom.
-        before: pairs of steps of which the first ends before the second begins; those that follow from others are
-            left out (the transitive reduction).
+        steps: in the order of the plan, which is one of the linearizations; numbered from 1.
+        links: the causal links.
+        before: pairs of steps of which the first ends before the second begins, without pairs that follow from others
+            (the transitive reduction).
         begin_before: pairs of steps of which the first begins before the second does; they may overlap.
     """
 
@@ -70,7 +71,7 @@ class PartialOrder:
 
     @cached_property
     def waits_for(self) -> Mapping[int, tuple[int, ...]]:
-        """For each step, in order, those that it waits for directly."""
+        """Step -> the steps that it waits for directly, in order."""
         direct: dict[int, list[int]] = {number: [] for number in range(1, len(self.steps) + 1)}
         for first, second in sorted(self.before):
             direct[second].append(first)
@@ -78,24 +79,24 @@ class PartialOrder:
 
     @cached_property
     def earlier(self) -> Mapping[int, frozenset[int]]:
-        """For each step, in order, all that end before it begins (the transitive closure)."""
+        """Step -> all steps that end before it begins, in order (the transitive closure)."""
         found: dict[int, frozenset[int]] = {}
         for number, direct in self.waits_for.items():
             found[number] = frozenset(direct).union(*(found[one] for one in direct))
         return found
 
     def restricted(self, pairs: Iterable[tuple[int, int]]) -> PartialOrder:
-        """The same with more pairs of steps in order, the first of each also first in the plan."""
+        """Return the order with more ordered pairs, the first step of each also first in the plan."""
         return replace(self, before=reduced({*self.before, *pairs}))
 
 
 def in_sequence(plan: Plan) -> PartialOrder:
-    """All steps one after the other."""
+    """Return the total order of the steps."""
     return PartialOrder(plan.steps, before=frozenset((n, n + 1) for n in range(1, len(plan.steps))))
 
 
 def scheduled(plan: Plan) -> PartialOrder:
-    """The steps as the plan's schedule has them: what it has end before another begins, and the order of the starts."""
+    """Return the order of the plan's schedule: steps that end before others begin, and the order of the starts."""
     timed = list(enumerate(plan.schedule, start=1))
     ends = {(i, j) for j, later in timed for i, earlier in timed[: j - 1] if earlier.end <= later.start}
     order = PartialOrder(plan.steps, before=reduced(ends))
@@ -105,9 +106,9 @@ def scheduled(plan: Plan) -> PartialOrder:
 
 
 def causal_links(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> tuple[CausalLink, ...]:
-    """Who brings about what for whom in a plan that leads from `world` to the goal, by user.
+    """Return the causal links of a plan from `world` to the goal, by user.
 
-    As long as all of them hold, the plan leads to the goal.
+    The plan leads to the goal as long as all of them hold.
 
     Raises:
         InputError: the plan does not lead to the goal.
@@ -116,13 +117,13 @@ def causal_links(plan: Plan, domain: PlanningDomain, world: World, goal: Express
 
 
 def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
-    """The plan without those parts of its order that have no reason.
+    """Return the plan without ordered pairs that have no reason.
 
-    Every linearisation of it leads from `world` to the goal. It is not always the least order with that property,
-    which is NP-hard to find.
+    Every linearization leads from `world` to the goal. The result is not always the least such order, which is NP-hard
+    to find.
 
     Raises:
-        InputError: the plan does not lead to the goal; `planning.validation.validate` says at which step and why.
+        InputError: the plan does not lead to the goal; `planning.validation.validate` returns the step and the reason.
     """
     derived = derivation(domain)
     tracing = CausalTrace(derived.world(world))
@@ -135,14 +136,14 @@ def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression
 
 
 def standing(links: Iterable[CausalLink], done: Collection[int], begun: Collection[int]) -> tuple[CausalLink, ...]:
-    """The links whose facts have to hold now: all who bring them about are done, who needs them has not begun."""
+    """Return the links whose facts must hold now: all their providers are done, and their users have not begun."""
     waiting = [link for link in links if link.user not in begun]
     coming = {(link.fact, link.user) for link in waiting if link.provider not in {PRESENT, *done}}
     return tuple(link for link in waiting if (link.fact, link.user) not in coming)
 
 
 def reduced(pairs: Iterable[tuple[int, int]]) -> frozenset[tuple[int, int]]:
-    """The pairs (the smaller number first) that do not follow from others."""
+    """Return the pairs (the smaller number first) that do not follow from others."""
     direct: dict[int, int] = defaultdict(int)
     for first, second in pairs:
         direct[second] |= 1 << first
@@ -150,13 +151,13 @@ def reduced(pairs: Iterable[tuple[int, int]]) -> frozenset[tuple[int, int]]:
 
 
 def _reduced(direct: Mapping[int, int]) -> frozenset[tuple[int, int]]:
-    """As `reduced`; for each step, those before it as bits."""
+    """Return the transitive reduction; `direct` has for each step the steps before it, as bits."""
     earlier: dict[int, int] = {}
     kept: list[tuple[int, int]] = []
     for number in sorted(direct):
         open_, covered = direct[number], 0
         while open_:
-            one = open_.bit_length() - 1  # what is before it has a smaller number
+            one = open_.bit_length() - 1  # its predecessors have smaller numbers
             kept.append((one, number))
             covered |= earlier.get(one, 0) | 1 << one
             open_ &= ~covered

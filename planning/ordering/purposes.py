@@ -1,4 +1,4 @@
-"""Why a step is in a plan: what it brings about, for whom, and which parts of the goal that serves in the end."""
+"""Purposes of plan steps: the conditions that a step establishes, their users, and the goals that it serves."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from planning.plan import Plan, PlanStep
 
 @dataclass(frozen=True, slots=True)
 class Purpose:
-    """Why a step is in a plan.
+    """The purpose of a step in a plan.
 
     Attributes:
-        number: which step, counted from 1.
+        number: the step's number, counted from 1.
         step: the step.
-        provides: what it brings about, with the later step that needs it; `None` is the goal.
+        provides: the conditions that it establishes, each with the later step that needs it; `None` is the goal.
         serves: the conditions of the goal that it contributes to, directly or through later steps.
     """
 
@@ -30,7 +30,7 @@ class Purpose:
     serves: tuple[Expression, ...]
 
     def __str__(self) -> str:
-        """`3 (pick-up cup1 table): (holding cup1) for step 4; serves (tidy cup1)`."""
+        """Text such as `3 (pick-up cup1 table): (holding cup1) for step 4; serves (tidy cup1)`."""
         if not self.provides:
             return f"{self.number} {self.step}: nothing needs what it does"
         users: dict[str, list[str]] = {}
@@ -43,7 +43,7 @@ class Purpose:
 
 
 def why(order: PartialOrder, number: int) -> Purpose:
-    """Why step `number` is in the plan, from its causal links."""
+    """Return the purpose of step `number`, from its causal links."""
     goal = len(order.steps) + 1
     own = [link for link in order.links if link.provider == number]
     provides = tuple((link.fact, None if link.user == goal else link.user) for link in own)
@@ -51,7 +51,7 @@ def why(order: PartialOrder, number: int) -> Purpose:
 
 
 def purposes(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> tuple[Purpose, ...]:
-    """Why each step is in the plan.
+    """Return the purpose of each step in the plan.
 
     Raises:
         InputError: the plan does not lead to the goal.
@@ -62,7 +62,7 @@ def purposes(plan: Plan, domain: PlanningDomain, world: World, goal: Expression)
 
 def _served(links: tuple[CausalLink, ...], number: int, goal: int) -> tuple[Expression, ...]:
     reached, before = {number}, 0
-    while before != len(reached):  # along a time line, a later step may provide what an earlier one needs
+    while before != len(reached):  # along a time line, a later step may provide for an earlier one
         before = len(reached)
         reached |= {link.user for link in links if link.provider in reached}
     return tuple(dict.fromkeys(link.fact for link in links if link.provider in reached and link.user == goal))

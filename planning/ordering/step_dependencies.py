@@ -1,7 +1,7 @@
-"""What a step needs of the world it is taken in, and what it changes there: the stuff that orders are made of.
+"""Dependencies of a step on its world: the conditions it needs, and the facts and numbers it changes.
 
-A condition is split into ground conditions that must all hold. Each of them is traced to its *support*: facts, as
-they are, and numbers on which its truth rests. Of a disjunction, one part that holds is enough.
+A condition is split into ground conditions that must all hold. Each is traced to its *support*: the literals and
+numeric fluents that decide its truth. For a disjunction, one part that holds is enough.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from knowledge_base.world.overlay import Overlay
 from planning.problem.conditions import Literal
 
 Ground = Literal | Fact
-"""A fact as it is wanted, or a numeric fluent (written as a `Fact`) whose value counts."""
+"""A literal, or a numeric fluent (written as a `Fact`) whose value counts."""
 Support = frozenset[Ground]
-"""What a condition's truth rests on."""
+"""The literals and fluents that decide the truth of a condition."""
 Rank = Callable[[Support], int]
-"""Of several supports the one with the lowest rank is taken."""
+"""The support with the lowest rank is chosen among several."""
 
 _COMMUTING = frozenset({"increase", "decrease"})
 _DIRECTIONS = {">": 1, ">=": 1, "<": -1, "<=": -1}
@@ -48,12 +48,12 @@ _DIRECTIONS = {">": 1, ">=": 1, "<": -1, "<=": -1}
 
 @dataclass(slots=True)
 class Changes:
-    """What an effect does to a world, and what it depends on there.
+    """The changes by an effect in a world, and the conditions and numbers that it reads there.
 
     Attributes:
-        conditions: those of its conditional effects, each in the form that holds.
-        makes: facts that are true or false at some time while it happens; both, if it deletes and adds one.
-        numbers: the fluents it changes, and whether only by adding to them, which may be done in any order.
+        conditions: conditions of its conditional effects, each in the form that holds.
+        makes: literals that are true at some time during the effect; both if it deletes and adds a fact.
+        numbers: the fluents it changes; true if only by additions, which commute.
         reads: fluents whose values it uses.
     """
 
@@ -63,18 +63,18 @@ class Changes:
     reads: set[Fact] = field(default_factory=set)
 
     def delta(self) -> Delta:
-        """The changed facts; what is both deleted and added is true, as in PDDL."""
+        """Return the changed facts; a fact both deleted and added is true, as in PDDL."""
         added = tuple([one.fact for one in self.makes if one.positive])
         return Delta(added=added, removed=tuple([o.fact for o in self.makes if not o.positive and o.fact not in added]))
 
 
 def changes(effect: Effect, world: World, after: Effect | None = None) -> Changes:
-    """What a ground effect does in `world`, which stays as it is.
+    """Return the changes by a ground effect in `world`, which stays unchanged.
 
     Args:
-        effect: of an action.
-        world: where it happens.
-        after: of a durative action, its effect at the start, which comes first.
+        effect: the effect of an action.
+        world: the world before.
+        after: the start effect of a durative action, which comes first.
     """
     found = Changes()
     if after is not None:
@@ -108,7 +108,7 @@ def _collect(effect: Effect, world: World, found: Changes) -> None:
 
 
 def conjuncts(e: Expression, world: World, *, wanted: bool = True) -> Iterator[Expression]:
-    """Ground conditions that together say what `e` says (the opposite if not `wanted`)."""
+    """Yield ground conditions whose conjunction is `e` (its negation if not `wanted`)."""
     match e:
         case Not(body):
             yield from conjuncts(body, world, wanted=not wanted)
@@ -120,7 +120,7 @@ def conjuncts(e: Expression, world: World, *, wanted: bool = True) -> Iterator[E
 
 
 def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> Support | None:
-    """What the truth of a ground condition (its falsehood if not `wanted`) rests on; `None` if it is otherwise."""
+    """Return the support of a ground condition (of its negation if not `wanted`); `None` if it does not hold."""
     match e:
         case Atom(predicate) if predicate in world.schema.predicates:
             fact = ground(e, world)
@@ -137,9 +137,9 @@ def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> 
 
 
 def favours(e: Expression, fluent: Fact, world: World) -> float | None:
-    """The factor by which a greater number is good for a comparison: positive, negative, or 0 if it does not matter.
+    """Return the factor by which a greater number helps a comparison: positive, negative, or 0 without influence.
 
-    `None` if that cannot be said of the condition by itself.
+    `None` if the condition alone does not determine it.
     """
     match e:
         case Not(Comparison(operator, left, right)) if operator in _DIRECTIONS:
@@ -171,13 +171,13 @@ def _slope(term: Term, fluent: Fact, world: World) -> float | None:
 
 
 def ground(form: Atom | Call, world: World) -> Fact:
-    """The fact or fluent that a form without variables names."""
+    """Return the fact or fluent that a form without variables names."""
     name = form.predicate if isinstance(form, Atom) else form.function
     return Fact(name, tuple(t.value if isinstance(t, Constant) else evaluate_argument(t, world) for t in form.args))
 
 
 def _is_conjunction(e: Expression, *, wanted: bool) -> bool:
-    """Whether all parts are needed; of the others, one is enough. De Morgan's laws swap them."""
+    """Return whether all parts are needed; otherwise one is enough. De Morgan's laws swap them."""
     return isinstance(e, And | Forall) is wanted
 
 

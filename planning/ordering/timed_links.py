@@ -1,7 +1,7 @@
-"""What the steps of a plan with a schedule do for each other: causal links along its time line.
+"""Causal links of a plan with a schedule, along its time line.
 
-A step may need something at its start, all the time, and at its end, and bring things about at both ends; so one that
-begins later can provide what an earlier one needs at its end.
+A step may need conditions at its start, over all and at its end, and may establish conditions at both ends. A step that
+begins later can therefore provide a condition that an earlier one needs at its end.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _NOTHING: Expression = And(())
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """One end of a step: what it needs just before, what it does, and what it needs from then on."""
+    """One end of a step: its condition just before, its effect, and its condition from then on."""
 
     number: int
     step: PlanStep
@@ -40,7 +40,7 @@ class _End:
 
 
 def linked(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
-    """The order of the plan's schedule, with what its steps do for each other.
+    """Return the order of the plan's schedule with its causal links.
 
     Raises:
         InputError: the plan does not lead to the goal.
@@ -75,14 +75,14 @@ def _ends(number: int, step: PlanStep, timing: Timing, domain: PlanningDomain) -
 
 @dataclass(slots=True)
 class _Tracing:
-    """A schedule carried out in thought; remembers who made what.
+    """The simulation of a schedule, with the step that made each fact and number.
 
     Attributes:
-        world: the state reached.
-        links: what was found so far.
-        makers: the steps that made a fact, or a number, what it is; without any, it was so from the beginning.
-        moves: by how much a step made a number greater.
-        assigned: numbers that were not only added to.
+        world: the simulated world so far.
+        links: the causal links so far.
+        makers: the steps that made a literal true or changed a number; empty if it holds initially.
+        moves: the increase of a number by a step.
+        assigned: numbers that some step changed in another way than by adding.
     """
 
     world: Overlay
@@ -92,7 +92,7 @@ class _Tracing:
     assigned: set[Fact] = field(default_factory=set)
 
     def happen(self, ends: list[_End]) -> None:
-        """What happens at one moment: all of it finds the world before."""
+        """Execute the events of one moment; all of them see the world before."""
         for end in ends:
             self.need(end.number, end.condition, str(end.step))
         made = [(end, changes(end.effect, self.world)) for end in ends]
@@ -108,7 +108,7 @@ class _Tracing:
             self.need(end.number, end.lasting, str(end.step))
 
     def need(self, user: int, condition: Expression, whose: str) -> None:
-        """A step, or the goal, needs a condition now; what it has brought about itself is no link."""
+        """Record that a step, or the goal, needs a condition now; its own effects are not links."""
         for part in dict.fromkeys(conjuncts(condition, self.world)):
             found = support(part, self.world, self._latest)
             if found is None:
@@ -118,7 +118,7 @@ class _Tracing:
                 self.links += [CausalLink(one, part, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
 
     def _providers(self, ground: Ground, condition: Expression) -> list[int]:
-        """To whom the condition owes that; who uses up fuel does not provide what is left."""
+        """Return the providers of the condition; an action that consumes fuel does not provide the rest."""
         makers = self.makers.get(ground, [PRESENT])
         if isinstance(ground, Literal) or ground in self.assigned or makers == [PRESENT]:
             return makers
