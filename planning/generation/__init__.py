@@ -1,1 +1,1 @@
-"""From a plan to an action plot."""
+"""Generation of action plots from plans."""

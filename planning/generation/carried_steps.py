@@ -1,4 +1,4 @@
-"""Plan steps in a generated plot: their needs and effects, their resources, and the state that carries each out."""
+"""Plan steps in a generated plot: conditions, effects, used components, and the state that executes each step."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ from planning.problem.relevance import changed, names_of
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What plots may use, in whatever way they run.
+    """The components that plots may use in any run.
 
     Attributes:
         components: names of the components that they start, configure or switch.
-        anything: they may use others as well: they plan, or bind a plot that is a value.
+        anything: they may use others too: they plan, or bind a plot that is a value.
         seconds: the sum of the time limits of their skills.
     """
 
@@ -51,15 +51,15 @@ class Usage:
     seconds: float = 0.0
 
     def clashes(self, other: Usage, shared: Iterable[str] = ()) -> bool:
-        """Whether both may need one component at once that is not among the `shared` ones."""
+        """Return whether both may need the same component at the same time, except `shared` ones."""
         return self.anything or other.anything or bool((self.components & other.components).difference(shared))
 
 
 def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] = ()) -> Usage:
-    """What the plots may use, and what the rules have for their outcomes or put before and after them.
+    """Return the usage of the plots and of the plots that matching rules start.
 
     Raises:
-        UnknownNameError: a plot uses one that is not there.
+        UnknownNameError: a plot uses a missing one.
     """
     found: dict[str, ActionPlot] = {}
     waiting = list(plots)
@@ -78,7 +78,7 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
 
 
 def _applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
-    """The rules that may have something to do with a step over these plots."""
+    """Return the rules that may apply to a step with these plots."""
     emitted = FAILURES.union(*(plot.emits for plot in plots))
     actions = {plot.implements for plot in plots}
     named = [rule for rule in rules if not rule.steps or actions.intersection(rule.steps)]
@@ -86,7 +86,7 @@ def _applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
 
 
 def fitting(plots: Iterable[ActionPlot], bindings: Mapping[str, Value]) -> tuple[ActionPlot, ...]:
-    """The plots whose condition does not rule out these arguments, whatever the world is like; all if none does not."""
+    """Return the plots whose conditions these arguments can satisfy in some world; all plots if there are none."""
     plots = tuple(plots)
     return tuple(plot for plot in plots if plot.when is None or not _is_false(plot.when, bindings)) or plots
 
@@ -116,7 +116,7 @@ def _is_open(plot: ActionPlot) -> bool:
 
 
 PATIENCE = 2
-"""A step that takes so many times as long as its action says, or as its skills may take together, is broken off."""
+"""Factor on a step's own duration, or on the total time limit of its skills, after which the step is interrupted."""
 _MOST_CARRIED = 1024  # steps; a plan for 50 items has about 130
 _CONFIRM = ActionPlot.model_fields["confirm"].default
 
@@ -126,17 +126,17 @@ class CarriedStep:
     """A step of a plan, ready to become states.
 
     Attributes:
-        text: the step as in PDDL.
+        text: the step in PDDL.
         needed: ground conditions that must hold when it begins.
-        over_all: those that must hold all the time, as far as it does not change them itself.
-        effect: what it changes.
-        expected: what is to be seen when it is done; nothing if its effects are assumed.
-        assumed: whether its effects are told when it is done.
-        confirm: seconds until they must have been seen.
-        seconds: how long it may take; `None` if nobody knows.
-        content: what stands in its state: the candidates, or the plot it uses.
-        outcomes: what it may end with besides being done.
-        usage: what it takes hold of.
+        over_all: conditions that must hold throughout, except those that it changes itself.
+        effect: its effect.
+        expected: conditions to observe when it is done; empty if its effects are assumed.
+        assumed: whether its effects are asserted when it is done.
+        confirm: seconds within which the expected conditions must be observed.
+        seconds: its time limit; `None` if unknown.
+        content: the content of its state: the candidates, or the plot it uses.
+        outcomes: its outcome events besides `done`.
+        usage: the components it uses.
     """
 
     text: str
@@ -153,36 +153,36 @@ class CarriedStep:
 
 
 class Carrier:
-    """Knows how steps are carried out: by which plots, and what these take hold of.
+    """Maps steps to the plots that execute them, and to the components that these use.
 
     Args:
         domain: has the steps' actions.
         library: has the plots that implement them.
-        rules: may use more plots for what those end with.
+        rules: contingency rules, which may use more plots for outcomes.
     """
 
     def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule] = ()) -> None:
         self._domain = domain
         self._library = library
         self.rules = tuple(rules)
-        self._usage: dict[tuple[str, ...], Usage] = {}  # most steps have the candidates of others
+        self._usage: dict[tuple[str, ...], Usage] = {}  # most steps share their candidates
         self._carried: dict[tuple[PlanStep, tuple[str, ...]], CarriedStep] = {}
 
     @staticmethod
     def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
-        """The same as for the plan before, if that had the same rules: most of its steps come again."""
+        """Return the cached carrier of the last plan if the rules are equal: most of its steps come again."""
         known = _carriers.find(domain, library)
         if known is None or known.rules != tuple(rules):
             known = _carriers.keep(domain, library, Carrier(domain, library, rules))
         return known
 
     def carried(self, step: PlanStep) -> CarriedStep:
-        """The step as a dynamic state over the plots that carry it out, if its arguments do not rule them out.
+        """Return the step as a dynamic state over the plots that implement it and whose conditions its arguments allow.
 
         Raises:
-            UnknownNameError: no plot implements its action, or one uses a plot that is not there.
+            UnknownNameError: no plot implements its action, or a plot uses a missing one.
         """
-        plots = implementing(step, self._library)  # a library may grow, what it has does not change
+        plots = implementing(step, self._library)  # a library may grow, but its plots never change
         key = step, tuple([plot.name for plot in plots])
         known = self._carried.get(key)
         if known is None:
@@ -212,12 +212,16 @@ _carriers: IdentityCache[PlanningDomain, Carrier] = IdentityCache(size=8)
 
 
 def sketched(step: PlanStep, domain: PlanningDomain) -> CarriedStep:
-    """The step as a state that uses a plot called like its action, which is still to be written."""
+    """Return the step as a state with a plot named like its action, to be written by the author."""
     return _step(step, domain, {"use": step.action, "with": domain.bindings(step)}, None)
 
 
 def implementing(step: PlanStep, library: Library) -> tuple[ActionPlot, ...]:
-    """The plots that carry out a step's action; raises `UnknownNameError` if there is none."""
+    """Return the plots that implement a step's action.
+
+    Raises:
+        UnknownNameError: no plot implements the action.
+    """
     found = library.implementing(step.action)
     if not found:
         known = [plot.implements for plot in library if plot.implements]
@@ -228,14 +232,14 @@ def implementing(step: PlanStep, library: Library) -> tuple[ActionPlot, ...]:
 
 
 def expectation(effect: Effect, bindings: Mapping[str, Value]) -> Expression:
-    """What holds after an effect, as far as that does not depend on what held before."""
+    """Return the condition that holds after an effect in every world."""
     ground = [(_ground(part.atom, bindings), isinstance(part, Add)) for part in _literals(effect)]
     added = [atom for atom, adds in ground if adds]
     return And((*added, *(Not(atom) for atom, adds in ground if not adds and atom not in added)))
 
 
 def parts(e: Expression) -> tuple[Expression, ...]:
-    """The conditions that a conjunction consists of."""
+    """Return the conjuncts of a condition."""
     return tuple(chain.from_iterable(map(parts, e.parts))) if isinstance(e, And) else (e,)
 
 
@@ -258,7 +262,7 @@ def _step(
 
 
 def _decided(e: Expression) -> bool:
-    """Whether it holds whatever the world is like; what a recursive predicate stands for is such a condition."""
+    """Return whether the condition holds in every world, as the replacement of a recursive predicate may."""
     match e:
         case Comparison("=", Constant(one), Constant(other)):
             return one == other
@@ -271,7 +275,7 @@ def _decided(e: Expression) -> bool:
 
 
 def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None:
-    """How long the action may take, if it says so itself."""
+    """Return the time limit from the action's own duration, or `None`."""
     if action.duration is None or action.duration.most == Constant(float("inf")):
         return None
     match substitute_term(action.duration.most, bindings):
@@ -282,7 +286,7 @@ def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None
 
 
 def _watched(action: PlanningAction) -> Iterator[Expression]:
-    """Over-all conditions that the action does not change itself: what it does when is its own affair."""
+    """Yield the conditions over all without those that the action changes itself, whose timing is its own concern."""
     if action.timed is not None:
         effects = (action.timed.start_effect, action.timed.end_effect)
         own = {name for effect in effects for name in changed(effect)}

@@ -1,13 +1,13 @@
-r"""One control flow of a generated plot: steps one after the other, waiting for those of other flows where they must.
+r"""One control flow of a generated plot: a sequence of steps, some of which wait for steps of other flows.
 
-    before_3 -> step_3 -> after_3 -> before_5 -> step_5 -> after_5 -> finished_1
-                                 \-> replan_1, if what a step needs does not hold
+        before_3 -> step_3 -> after_3 -> before_5 -> step_5 -> after_5 -> finished_1
+               \-> replan_1, if a condition of a step does not hold
 
-`after_n` waits until the step's effects are observed. `before_n` waits for steps of other flows: they set the variables
-`done_n` and `begun_n`, so that nobody has to ask again and again. Then it looks at what the step needs, so that no step
-begins on a wrong premise. Where there is nobody to wait for, `after_n` does that as well. Once the planner's component
-has said that other steps take the place of what is left (`held`), none begins. A step that rules may leave out has
-`step_n_skipped` besides: like `after_n`, without waiting for what the step would have changed.
+- `after_n` waits until the step's effects are observed.
+- `before_n` waits for steps of other flows, which set the variables `done_n` and `begun_n`. It then checks the
+  conditions of the step, so that no step begins with a false precondition. Without such steps `after_n` does that too.
+- `held` is set when the planner's component announces other steps instead. No step begins after that.
+- `step_n_skipped` exists for a step that rules may skip: `after_n` without waiting for the step's effects.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from planning.ordering.partial_order import PartialOrder
 
 FINISHED = "finished"
 HELD = "held"
-"""Variable of a plot: no more steps begin, since others are going to take their place."""
+"""A variable of the plot: no more steps begin, since another plan replaces them."""
 MOST_WATCHED = 86400
-"""Seconds: who watches a plan does so for as long as it takes; every wait has a bound."""
+"""Time limit in seconds for the watch of a plan, as long as any plan may take; every wait has a limit."""
 _HELD = Comparison("=", Variable(HELD), Constant(value=True))
 _DONE, _BEGUN = "done", "begun"
 
 
 @dataclass(frozen=True, slots=True)
 class ControlFlow:
-    """A chain of steps; `mark` stands behind the names of its ends, which are unique in the plot."""
+    """A chain of steps; `mark` is the suffix of its end states, whose names are unique in the plot."""
 
     numbers: tuple[int, ...]
     mark: str = ""
@@ -45,7 +45,7 @@ class ControlFlow:
 
     @property
     def finished(self) -> str:
-        """Name of the state at its end."""
+        """The name of the state at its end."""
         return FINISHED + self.mark
 
 
@@ -54,11 +54,11 @@ class Writer:
 
     Args:
         steps: all steps.
-        order: which of them wait for which.
-        lanes: how they are spread.
-        plan: name under which the planner's component hears which step begins; nobody hears of a plot without it.
-        left_out: the steps that rules may leave out.
-        leading: outcomes with which rules leave the plan for another state, with what they pass to it.
+        order: the partial order of the steps.
+        lanes: the chains of steps.
+        plan: the name under which the planner's component gets the number of each step; `None` for a plot without it.
+        left_out: the steps that rules may skip.
+        leading: outcomes with which rules leave the plan for another state, with the names of the data passed to it.
     """
 
     def __init__(
@@ -85,12 +85,12 @@ class Writer:
 
     @property
     def variables(self) -> Mapping[str, Any]:
-        """What lanes tell each other, and what they are told."""
+        """The variables that lanes set for each other, and `held`."""
         names = (*self._flags, *([] if self._plan is None else [HELD]))
         return {flag: {"type": "boolean", "initial": False} for flag in names}
 
     def states(self, lane: ControlFlow) -> dict[str, Any]:
-        """The states of one lane, without the one at its end."""
+        """Return the states of one lane, without the one at its end."""
         first = lane.numbers[0] if lane.numbers else None
         states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
         for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
@@ -147,9 +147,9 @@ class Writer:
         self, number: int | None, lane: ControlFlow, first: Iterable[Expression], told: Mapping[str, Any] | None = None,
         after: CarriedStep | None = None,
     ) -> list[dict[str, Any]]:  # fmt: skip
-        """To a step if it is applicable, else back to planning; both only once the `first` conditions hold.
+        """Return transitions to a step if it is applicable, else to planning; both wait for the `first` conditions.
 
-        These are what `after` is expected to bring about, if that is given.
+        With `after`, these are its expected effects.
         """
         first, assigned = tuple(first), dict((told or {}).get("assign", {}))
         begun = _joined(first) if after is None else _seen(after)
@@ -164,7 +164,7 @@ class Writer:
         return [*self._held(lane, first, after), _guarded(begin, both), *otherwise]
 
     def _held(self, lane: ControlFlow, first: Iterable[Expression], after: CarriedStep | None) -> list[dict[str, Any]]:
-        """No step begins if others take its place."""
+        """Return the transition that prevents a step when another plan replaces it."""
         if self._plan is None:
             return []
         when = _joined((_HELD, *first)) if after is None else _held_after(after)
@@ -175,7 +175,7 @@ class Writer:
 
 
 def passed(name: str) -> str:
-    """The variable of what a rule passes under that name to a state outside of the plan."""
+    """Return the variable for data that a rule passes to a state outside the plan."""
     return f"passed_{name}"
 
 
@@ -184,30 +184,30 @@ def _guarded(transition: dict[str, Any], when: Expression | None) -> dict[str, A
 
 
 def _joined(conditions: Iterable[Expression]) -> Expression | None:
-    """All of them; `None` if there are none."""
+    """Return the conjunction; `None` if it is empty."""
     all_ = tuple(dict.fromkeys(conditions))
     return None if not all_ else all_[0] if len(all_) == 1 else And(all_)
 
 
-# What is known of a condition is known by its identity, and one plan has most pairs of steps of the one before.
+# Other caches use a condition's identity as the key, and a new plan shares most pairs of steps with the last.
 _pairs: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
 _ends: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
 
 
 def _seen(step: CarriedStep) -> Expression | None:
-    """What is to be seen when it is done."""
+    """Return the expected effects of a step."""
     (found,) = _pairs.find(step, None) or _pairs.keep(step, None, (_joined(step.expected),))
     return found
 
 
 def _held_after(step: CarriedStep) -> Expression | None:
-    """When nothing begins after it."""
+    """Return the condition under which no step begins after this one."""
     (found,) = _ends.find(step, None) or _ends.keep(step, None, (_joined((_HELD, *step.expected)),))
     return found
 
 
 def _between(step: CarriedStep, following: CarriedStep) -> Expression | None:
-    """What is to be seen when the one is done and needed by the other."""
+    """Return the expected effects of a step with the conditions of the next."""
     both = (*step.expected, *following.needed)
     (found,) = _pairs.find(step, following) or _pairs.keep(step, following, (_joined(both),))
     return found

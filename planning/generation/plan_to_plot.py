@@ -1,11 +1,10 @@
-r"""From plan to plot: every step a dynamic state over the plots that carry it out (S0.12, S1.5, S2.7).
+r"""From a plan to a plot: each step is a dynamic state over the plots that implement it (S0.12, S1.5, S2.7).
 
-    before_1 -> step_1 -> after_1 -> step_2 -> after_2 -> ... -> finished
-                            \-> replan, if what a step needs does not hold
+        before_1 -> step_1 -> after_1 -> step_2 -> after_2 -> ... -> finished
+               \-> replan, if a condition of a step does not hold
 
-Independent steps stand in regions side by side (`planning.generation.control_flow`); a region is a
-chain of the plan's partial order, which is as a rule what one robot does. Outcomes that no inherited rule answers
-lead to `replan`.
+Independent steps are in parallel regions (`planning.generation.control_flow`). A region is a chain of the plan's
+partial order, mostly the steps of one robot. Outcomes without an inherited rule lead to `replan`.
 """
 
 from __future__ import annotations
@@ -31,18 +30,18 @@ if TYPE_CHECKING:
     from planning.plan import Plan, PlanStep
 
 WORK = "work"
-"""Name of the state that holds the regions."""
+"""Name of the state with the regions."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How the steps of a plan are spread.
+    """The arrangement of a plan's steps in a plot.
 
     Attributes:
         steps: ready to become states.
-        order: which of them wait for which, also since they use the same component.
-        lanes: the chains that they stand in.
-        rules: those that the plot inherits, as far as they are about its steps.
+        order: the partial order, extended by steps that use the same component.
+        lanes: the chains of steps.
+        rules: the inherited rules that concern steps of the plan.
     """
 
     steps: Sequence[CarriedStep]
@@ -52,7 +51,7 @@ class Layout:
 
     @property
     def before(self) -> frozenset[tuple[int, int]]:
-        """Pairs of steps of which the first is done, or left out, when the second begins."""
+        """Pairs of steps of which the first is done, or skipped, when the second begins."""
         return self.order.before.union(*(pairwise(lane.numbers) for lane in self.lanes))
 
 
@@ -64,10 +63,10 @@ def laid_out(
     order: PartialOrder | None = None,
     shared: Collection[str] = (),
 ) -> Layout:
-    """How the plot of a plan will carry it out; the arguments are those of `plot_from_plan`."""
+    """Return the layout of a plan; for the arguments see `plot_from_plan`."""
     if order is None:
         order = scheduled(plan) if plan.schedule else in_sequence(plan)
-    domain = derivation(domain).domain  # the knowledge base knows no derived predicates
+    domain = derivation(domain).domain  # the knowledge base has no derived predicates
     rules = [own for rule in rules if (own := _inherited(rule, plan)) is not None]
     writing = None if library is None else Carrier.of(domain, library, rules)
     steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
@@ -86,17 +85,17 @@ def plot_from_plan(
     order: PartialOrder | None = None,
     shared: Collection[str] = (),
 ) -> ActionPlot:
-    """The action plot that carries out a plan.
+    """Return the action plot that executes a plan.
 
     Args:
-        plan: its steps; with a schedule they begin in its order, and side by side where it has them so.
+        plan: its steps; with a schedule they begin in its order, concurrently where the schedule overlaps them.
         domain: gives each step's precondition and effects.
-        library: has the plots that implement the planning actions. Without one, a sketch is made for somebody to
-            complete: every step uses a plot that is called like its action and takes all of its arguments.
+        library: has the plots that implement the planning actions. Without one the result is a sketch to complete:
+            every step uses a plot with its action's name and arguments.
         rules: the contingency rules it inherits.
         name: the plot's name.
-        order: which steps wait for which, e.g. from `ordering.order.deordered`; one after the other if left out.
-        shared: components that can carry out several skills at once. Steps that use any other one never overlap.
+        order: the partial order of the steps, e.g. from `ordering.partial_order.deordered`; by default a sequence.
+        shared: components that can run several skills concurrently. Steps that share another component never overlap.
 
     Raises:
         UnknownNameError: no plot implements a step's action.
@@ -106,7 +105,7 @@ def plot_from_plan(
 
 
 def plot_of(plan: Plan, layout: Layout, name: str, *, watched: bool) -> ActionPlot:
-    """The plot of a plan that is laid out; `watched`: the planner's component hears how far it is."""
+    """Return the plot of a layout; with `watched`, its states report progress to the planner's component."""
     steps, lanes, rules = layout.steps, layout.lanes, layout.rules
     left_out = [n for n, step in enumerate(plan.steps, start=1) if any(_leaves_out(rule, step) for rule in rules)]
     leading = {rule.outcome: dict.fromkeys(rule.do.passed, "symbol") for rule in rules if rule.leads_away}
@@ -135,7 +134,7 @@ def plot_of(plan: Plan, layout: Layout, name: str, *, watched: bool) -> ActionPl
 
 
 def _inherited(rule: Rule, plan: Plan) -> Rule | None:
-    """The rule as far as it is about steps of this plan."""
+    """Return the rule restricted to steps of this plan, or `None`."""
     if not rule.steps:
         return rule
     done = {step.action for step in plan.steps}
@@ -149,7 +148,7 @@ def _leaves_out(rule: Rule, step: PlanStep) -> bool:
 
 
 def _clashes(used: Sequence[Usage], order: PartialOrder, shared: Collection[str]) -> Iterable[tuple[int, int]]:
-    """The pairs of steps that have nothing to do with each other but the components they use."""
+    """Yield unordered pairs of steps that use the same component."""
     for second, earlier in order.earlier.items():
         for first in range(1, second):
             if first not in earlier and used[first - 1].clashes(used[second - 1], shared):
