@@ -1,6 +1,6 @@
-"""`dsc plan`, `dsc doctor` and `dsc bundles`: ask for a plan, and see what there is to plan and to build with.
+"""Commands `dsc plan`, `dsc doctor` and `dsc bundles`: find a plan, and list engines and bundles.
 
-The commands import what they run, so that `dsc --help` stays light.
+The commands import their modules inside the function, so that `dsc --help` stays light.
 """
 
 from __future__ import annotations

@@ -124,7 +124,7 @@ def plan_command(
         str | None, typer.Option(metavar="NAME", help="Which engine plans.  [default: those that suit it race]")
     ] = None,
     seconds: Annotated[float, typer.Option(min=0.0, help="Stop posing and planning after this long.")] = 10.0,
-    parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can go side by side.")] = False,
+    parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can run concurrently.")] = False,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete; - is standard output.")
     ] = None,
@@ -180,13 +180,13 @@ def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expre
 
 
 def _untraced(domain: PlanningDomain) -> list[str]:
-    """A note where plans are only for looking at."""
+    """Return a note if plans are only for display."""
     from planning.problem.axioms import Derivable
 
     form = Derivable.of(domain)
     names = ", ".join(f"'{one}'" for one in sorted(form.predicates)) if form else ""
     why = "planning actions change what it follows from, itself included"
-    return [f"{names}: {why}, so who needs what is not traced, and no robot can carry the plan out"] if form else []
+    return [f"{names}: {why}, so causal links are not traced, and no robot can execute the plan"] if form else []
 
 
 def _plot_text(plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> str:

@@ -1,4 +1,4 @@
-"""Report of `dsc plan`: plain data for `--json`, a text for people, and warnings about the problem."""
+"""Report of `dsc plan`: plain data for `--json`, a text for readers, and warnings about the problem."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FOUND, UNSOLVABLE, TIMED_OUT, FAILED = 0, 1, 3, 4
 
 
 def end(status: int, answer: dict[str, Any], notes: list[str], *, as_json: bool) -> NoReturn:
-    """Say it, the notes on standard error, and exit."""
+    """Print the answer, the notes on standard error, and exit."""
     for note in () if as_json else notes:
         typer.echo(f"note: {note}", err=True)
     typer.echo(json.dumps(answer | {"notes": notes}) if as_json else _text(answer), err=status != FOUND and not as_json)
@@ -35,7 +35,7 @@ def end(status: int, answer: dict[str, Any], notes: list[str], *, as_json: bool)
 
 
 def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
-    """Exit status and what is printed."""
+    """Return the exit status and the answer to print."""
     from planning.plan import EngineFailed, NobodyCan, NoneFound, PlanFound, ProvenUnsolvable, TimedOut
 
     match outcome:
@@ -57,7 +57,7 @@ def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
 
 
 def ordered(order: PartialOrder) -> dict[str, Any]:
-    """The chains that can go side by side, and what each step waits for; steps are numbered from 1."""
+    """Return the concurrent chains, and the steps that each step waits for; steps are numbered from 1."""
     from planning.ordering.chains import chains
 
     linked = {(link.provider, link.user) for link in order.links}
@@ -67,7 +67,7 @@ def ordered(order: PartialOrder) -> dict[str, Any]:
 
 
 def purposes(order: PartialOrder) -> dict[str, Any]:
-    """For each step what it brings about and for whom; 0 is the goal."""
+    """Return the facts that each step establishes, each with its user; 0 is the goal."""
     from knowledge_base.language.printer import to_text
 
     purposes: dict[int, list[dict[str, Any]]] = {number: [] for number in range(1, len(order.steps) + 1)}
@@ -95,7 +95,7 @@ def _text(answer: Mapping[str, Any]) -> str:
 
 
 def _plan_text(answer: Mapping[str, Any]) -> str:
-    """One step a line, by lanes if they are known, each with what it waits for and what it is for."""
+    """Return one step a line, by lanes if they are known, each with its waits and purposes."""
     lanes = answer.get("lanes") or [range(1, len(answer["steps"]) + 1)]
     lines: list[str] = []
     for number, lane in enumerate(lanes, 1):
@@ -114,12 +114,12 @@ def _plan_text(answer: Mapping[str, Any]) -> str:
 
 
 def _time_text(start: float, seconds: float) -> str:
-    """When a step begins and how long it takes, in the way of temporal planners."""
+    """Return a step's start and duration in the notation of temporal planners."""
     return f"{start:8.3f}: [{seconds:g}] "
 
 
 def without_derived(read: ProblemText, domain: PlanningDomain, file: Path) -> ProblemText:
-    """The problem without facts that only follow from others, with a note for each predicate."""
+    """Return the problem without facts of derived predicates, with a note for each predicate."""
     derived = {axiom.predicate for axiom in domain.axioms}
     said = dict.fromkeys(fact.predicate for fact in read.init if fact.predicate in derived)
     notes = [f"{file}: what :init says of '{name}' is not heeded: it is derived" for name in said]
@@ -128,7 +128,7 @@ def without_derived(read: ProblemText, domain: PlanningDomain, file: Path) -> Pr
 
 
 def valueless(plan: Plan, domain: PlanningDomain, read: ProblemText) -> list[str]:
-    """A note for each number that a step of the plan asks for and nobody has given a value; it counts as 0."""
+    """Return a note for each number that a step of the plan reads without a value; it counts as 0."""
     given, missing = set(read.values), dict[Fact, None]()
     for step in plan.steps:
         ground = domain.ground(step)
@@ -153,7 +153,7 @@ def _assigned(effect: Effect) -> Iterator[tuple[Fact, Term]]:
 
 
 def _fluents(e: Expression | Term) -> Iterator[Fact]:
-    """Those that are named without variables."""
+    """Yield the fluents without variables."""
     if isinstance(e, Call) and all(isinstance(arg, Constant) for arg in e.args):
         yield Fact(e.function, tuple(arg.value for arg in e.args if isinstance(arg, Constant)))
     for part in parts_of(e):

@@ -1,4 +1,4 @@
-"""What `dsc plan` does: read files, ask for a plan, wait for a cheaper one, find out why there is none."""
+"""The work of `dsc plan`: read files, plan, wait for a cheaper plan, explain why there is none."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from planning.strips import Problem
 
 PATIENCE, PATIENT_SECONDS = 3.0, 2.0
-"""A cheaper plan is waited for that many times as long as the first took, and for as many seconds at least."""
+"""The wait for a cheaper plan: a factor on the time of the first one, and the minimum in seconds."""
 
 
 def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, KnowledgeBase]:
-    """The domain, the problem and the world that it begins with.
+    """Return the domain, the problem and its initial world.
 
     Raises:
         InputError: a file cannot be read or has a mistake, or there is no problem or no goal.
@@ -48,10 +48,10 @@ def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, Knowledg
 def solved(
     domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float, engine: str | None
 ) -> tuple[Problem, PlanningOutcome]:
-    """The problem and what comes of it; the time is for both together.
+    """Return the problem and the planning outcome; `seconds` is the limit for both together.
 
     Raises:
-        WorkLimitError: it was not even posed in time.
+        WorkLimitError: the time was up during problem construction.
     """
     import asyncio
 
@@ -86,7 +86,7 @@ def solved(
 
 
 def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float) -> list[str]:
-    """Why there is no plan, one sentence a line, or that this was not found out in time."""
+    """Return why there is no plan, one sentence a line, or that the explanation timed out."""
     import asyncio
 
     from planning.cancellable_work import WorkLimit, WorkLimitError, aside
@@ -107,7 +107,7 @@ def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, se
 
 
 async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, seconds: float) -> PlanningOutcome:
-    """The first outcome; where actions have costs, the cheapest plan that comes in some more of the time."""
+    """Return the first outcome; if actions have costs, the cheapest plan within some more time."""
     import asyncio
     import time
     from contextlib import aclosing, suppress
@@ -127,7 +127,7 @@ async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, sec
 
 
 def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRace:
-    """The named engine, if it can do the problem and is installed; else a race."""
+    """Return the named engine if it supports the problem and is installed; without a name, a race."""
     from knowledge_base.errors import InputError, UnknownNameError
     from planning.engines.planner import PlannerProcess
     from planning.engines.race import PlannerRace
