@@ -95,10 +95,10 @@ WORDS = {
 """Private or archaic words (patterns), and the words to use instead."""
 
 PENDING = {
-    "README.md", "CHANGELOG.md", "SECURITY.md", "docs/bundles.md", "docs/clean-up-table.md", "docs/conformance.md",
-    "docs/dependencies.md", "docs/durable-runs.md", "docs/engines.md", "docs/knowledge.md", "docs/language.md",
-    "docs/limits.md", "docs/pddl.md", "docs/plots.md", "docs/profiles.md", "docs/robot.md", "docs/semantics.md",
-    "docs/skills.md", "docs/speed.md", "docs/testing.md", "docs/threat-model.md", "docs/viewer.md",
+    "CHANGELOG.md", "docs/bundles.md", "docs/clean-up-table.md", "docs/conformance.md",
+    "docs/dependencies.md", "docs/engines.md", "docs/knowledge.md", "docs/language.md",
+    "docs/limits.md", "docs/pddl.md", "docs/profiles.md", "docs/semantics.md",
+    "docs/speed.md", "docs/testing.md", "docs/threat-model.md", "docs/viewer.md",
     "knowledge_base", "knowledge_base/cli", "knowledge_base/conditions", "knowledge_base/drawing",
     "knowledge_base/exchange", "knowledge_base/journal", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
