@@ -28,13 +28,13 @@ class Requirement(NamedTuple):
     bound: str
 
 
-IN_PROCESS, APART, BUILD = "imported", "a process of its own", "to develop"
+IN_PROCESS, APART, BUILD = "imported", "a separate process", "to develop"
 WHY = {
     "networkx": ("the public graph of a knowledge base, and layouts of drawings", IN_PROCESS),
     "numpy": ("layouts of networkx", IN_PROCESS),
     "scipy": ("layouts of networkx", IN_PROCESS),
-    "pydantic": ("plots, profiles and scenarios as values that are judged when they are read", IN_PROCESS),
-    "pyperplan": ("the planner that is always there", APART),
+    "pydantic": ("plots, profiles and scenarios as validated values", IN_PROCESS),
+    "pyperplan": ("the default planner", APART),
     "rich": ("trees, tables and progress on a terminal", IN_PROCESS),
     "ruamel.yaml": ("YAML 1.2 with places and comments", IN_PROCESS),
     "typer": ("the command line", IN_PROCESS),
@@ -42,7 +42,7 @@ WHY = {
         "other planning engines, and problems in its form (`to_unified`)",
         "imported by `planning.unified` and in the engines' processes",
     ),
-    "up-pyperplan": ("pyperplan for who plans with unified-planning", "found by unified-planning; not imported"),
+    "up-pyperplan": ("pyperplan as an engine of unified-planning", "found by unified-planning; not imported"),
     "up-fast-downward": ("the engine `fast-downward`", APART),
     "up-enhsp": ("the engine `enhsp`, which is a Java program", APART),
     "up-aries": ("the engine `aries`", APART),
@@ -86,15 +86,15 @@ TITLES = {
 }  # fmt: skip
 HEAD = """# Dependencies
 
-The page is made by `python tests/dependencies.py --write` of pyproject.toml and the metadata of the installed packages.
+`python tests/dependencies.py --write` writes this page from pyproject.toml and the metadata of the installed packages.
 The project itself is Apache-2.0.
 
-`make lower-bounds` installs the core and what its tests need exactly at the lower bounds, in an environment of its own,
-and runs tests of every room. There are no upper bounds.
+`make lower-bounds` installs the core and the packages of its tests exactly at the lower bounds, in a separate
+environment, and runs tests of every room. There are no upper bounds.
 
 Planning engines never run in the program's process: `planning/engines/process.py` starts `planning.engines.worker` for
-each and talks to it in lines of JSON. `pyperplan` is GPL-3.0-or-later and is imported in that worker alone; a program
-that must not depend on it passes another `Planner`. A test checks that the program does not import it.
+each and exchanges lines of JSON with it. `pyperplan` is GPL-3.0-or-later, and only that worker imports it. A program
+can replace it by passing another `Planner`. A test checks that the program does not import it.
 """
 
 
@@ -129,7 +129,7 @@ def page() -> str:
     for group, title in TITLES.items():
         lines += [
             f"## {title}\n",
-            "| package | from | licence | for | how it is met |",
+            "| package | from | licence | purpose | use |",
             "| --- | --- | --- | --- | --- |",
         ]
         for one in requirements():

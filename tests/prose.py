@@ -95,9 +95,6 @@ WORDS = {
 """Private or archaic words (patterns), and the words to use instead."""
 
 PENDING = {
-    "CHANGELOG.md", "docs/conformance.md",
-    "docs/dependencies.md",
-    "docs/speed.md",
     "knowledge_base", "knowledge_base/cli", "knowledge_base/conditions", "knowledge_base/drawing",
     "knowledge_base/exchange", "knowledge_base/journal", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
