@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 MOST_COMPLAINTS = 5
 """Upper bound of damaged records named on the terminal; the rest is counted."""
-Port = Annotated[int, typer.Option(min=0, max=65535, help="Where to listen on this machine; 0 picks a free port.")]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 picks a free one.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
 
 
 def view_command(
-    file: Annotated[Path, typer.Argument(metavar="TRACE.jsonl|STORE", help="What `--trace` wrote, or a store.")],
+    file: Annotated[Path, typer.Argument(metavar="TRACE.jsonl|STORE", help="A trace or a store.")],
     port: Port = 0,
     no_open: NoOpen = False,
 ) -> None:

@@ -61,5 +61,5 @@ def require_stand_in(original: ActionPlot, substitute: ActionPlot) -> None:
 
 
 def _refusal(original: ActionPlot, substitute: ActionPlot, why: str, found: str, valid: Iterable[str]) -> InputError:
-    message = f"'{substitute.name}' cannot stand in for '{original.name}': it {why}"
+    message = f"'{substitute.name}' cannot replace '{original.name}': it {why}"
     return SchemaError(message, place=substitute.place(("plot",)), found=found, valid=valid)

@@ -190,7 +190,7 @@ class _Heir(Generic[_Result]):
     def result(self, problems: list[str]) -> _Result:
         """Return its result; add a problem if the old program has written since."""
         if _told(self._store) != self._left:
-            problems.append("an old sequencer went on writing a run that another had taken over")
+            problems.append("an old sequencer has written to a run that another had taken over")
         if not self._results:
             raise StoreError("the run that was taken over has not come to its end")
         return self._results[0]

@@ -1,4 +1,4 @@
-"""Plot files: read YAML into `ActionPlot`s and write it."""
+"""Plot files: conversion between YAML and `ActionPlot`s."""
 
 from __future__ import annotations
 

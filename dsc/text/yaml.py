@@ -106,7 +106,7 @@ def load_document(text: str, source: str | None = None) -> Document:
         ParseError: it is not YAML, or uses a refused feature.
         InputError: it is too large.
     """
-    require_text(text, "what is read as YAML")
+    require_text(text, "the YAML text")
     check_size(len(text), Place(source))
     places: dict[FormPath, Place] = {(): Place(source, 1)}
     reader = _Reader(text, source, places)
@@ -270,17 +270,17 @@ def _quoted(data: Any) -> Any:
 
 
 _PLAINER = {
-    r"found character '\\t' that cannot start any token": "a tab stands where YAML wants spaces",
-    r"found a tab character that violates indentation": "a tab stands where YAML wants spaces",
+    r"found character '\\t' that cannot start any token": "a tab in place of spaces",
+    r"found a tab character that violates indentation": "a tab in place of spaces",
     r"expected <block end>, but found '<block \w+ start>'": "the line is indented differently from those above it",
-    r"expected <block end>, but found '-'": "a list goes on where the keys of a mapping stand",
-    r"expected <block end>, but found '\?'": "a key stands where the entries of a list do",
+    r"expected <block end>, but found '-'": "a list item among the keys of a mapping",
+    r"expected <block end>, but found '\?'": "a key among the items of a list",
     r"expected <block end>, but found (.*)": r"\1 does not belong there",
     r"expected ',' or '(.)', but got .*": r"a ',' or '\1' is missing",
     r"expected the node content, but found (.*)": r"no value begins with \1",
-    r"expected '<document start>', but found .*": "something goes on after the end",
+    r"expected '<document start>', but found .*": "text after the end of the document",
     r"could not find expected ':'": "a key without ':'",
-    r"mapping values are not allowed here": "a ':' stands where no key can be; is the indentation right?",
+    r"mapping values are not allowed here": "a ':' is misplaced; is the indentation right?",
     r"found unexpected end of stream": "a quote is never closed",
     r"'<stream end>'": "the end of the text",
 }

@@ -53,7 +53,7 @@ def _own(plot: ActionPlot, name: str, parameter: PlotParameter) -> Iterator[Find
         return
     if parameter.default is None:
         if parameter.changed_by != "plots":
-            message = f"'{name}' needs a default, as not everybody who uses the plot may say its value"
+            message = f"'{name}' needs a default, because not every user of the plot may set it"
             error = SchemaError(message, place=plot.place(here))
             yield Finding(error, "parameter roles", "a profile may say another one")
     elif isinstance(parameter.default, Constant) and parameter.bounded:

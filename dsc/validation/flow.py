@@ -41,7 +41,7 @@ def check_completion(
     for name, state, path in nesting.states:
         if type(state) is State and DONE in state.on and any(isinstance(a, Trigger) for a in state.entry):
             error = SchemaError(
-                f"state '{name}' has no content, so it is done at once and would cancel its skill",
+                f"state '{name}' has no content, so it is done immediately and would cancel its skill",
                 place=plot.place((*path, "on", DONE)),
             )
             yield Finding(error, "done at once", "wire the outcome of the skill")
@@ -156,7 +156,7 @@ def _left_out_in_a_circle(plot: ActionPlot, expanded: ActionPlot) -> Iterator[Fi
     connectors = ((name, state) for name, state, _ in expanded.walk() if isinstance(state, Connector))
     ways = {name: [way.target or "" for _, way in state.transitions()] for name, state in connectors}
     if circle_of(ways):
-        error = SchemaError("these rules may leave out all steps of a circle, for ever", place=plot.place(("rules",)))
+        error = SchemaError("these rules may skip all steps of a cycle without end", place=plot.place(("rules",)))
         yield Finding(error, "connectors lead on", "let `then` lead to a state where a run can rest")
 
 

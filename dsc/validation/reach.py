@@ -36,7 +36,7 @@ def _branches(plot: ActionPlot, name: str, path: Path, nesting: Nesting) -> Iter
     for inside, _, transition in earlier:
         if transition.guard is None:
             error = SchemaError(
-                f"what follows this branch of '{name}' is never reached: it has no `when`",
+                f"this branch of '{name}' has no `when`, so later branches are never reached",
                 place=plot.place((*path, *inside)),
             )
             yield Finding(error, "choice", "give it a `when`, or put it last")
@@ -90,7 +90,7 @@ def _nothing_leads_to(name: str, plot: ActionPlot, library: Library, nesting: Ne
     replacing = [rule for rule in plot.rules if rule.before and rule.when is None and rule.then != ENTER]
     for rule in replacing:
         if isinstance(state, Step) and concerns(rule, name, state, library):
-            message = f"the rule '{rule.label}' always takes the place of step '{name}', which is never entered"
+            message = f"the rule '{rule.label}' always replaces step '{name}', which is never entered"
             error = SchemaError(message, place=place, found=name)
             return Finding(error, "reachable", "say with `when` when the rule does so")
     error = SchemaError(f"nothing leads to the state '{name}'", place=place, found=name)
@@ -132,7 +132,7 @@ def _circle(plot: ActionPlot, used: dict[str, Path], library: Library) -> Iterat
         circle = _found_circle([plot.name, name], library)
         if circle:
             error = SchemaError(
-                f"plots use each other in a circle: {' -> '.join(circle)}", place=plot.place((*path, "use")), found=name
+                f"plots use each other in a cycle: {' -> '.join(circle)}", place=plot.place((*path, "use")), found=name
             )
             yield Finding(error, "no circle", "choose one of them in a dynamic state")
             return

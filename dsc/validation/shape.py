@@ -100,7 +100,7 @@ def _default(plot: ActionPlot, state: HistoryState, path: Path, nesting: Nesting
     around = path[:-2]
     if not nesting.inside(state.target, around):
         error = UnknownNameError(
-            f"there is no state '{state.target}' beside the history", place=plot.place((*path, "to")),
+            f"there is no state '{state.target}' in the scope of the history", place=plot.place((*path, "to")),
             found=state.target, valid=nesting.within(around),
         )  # fmt: skip
         yield Finding(error, "target")

@@ -21,8 +21,8 @@ MOST_WRONG_CODES = 20
 MOST_PARAMETERS = 20
 MISSING = "the token is missing or wrong; open the address that was printed"
 USED = (
-    f"this link is used up: it opens one browser, once, within {CODE_LIFE_S:.0f} seconds; open the address that was "
-    "printed. If nobody of yours has used the link, end the program: somebody else on this machine has"
+    f"this link is used up: it opens one browser, once, within {CODE_LIFE_S:.0f} seconds. Open the address that was "
+    "printed. If no browser of yours has used the link, end the program: another user of this machine has"
 )
 
 
@@ -135,7 +135,7 @@ class Access:
 
 
 def cookies(headers: Headers, name: str) -> Iterator[str]:
-    """Yield every value of a cookie, besides malformed cookies of other programs on this machine.
+    """Yield every value of a cookie of that name, also those of other programs on this machine.
 
     Browsers send the cookies of all ports of a machine: a name may occur twice, and a value may be malformed.
     """

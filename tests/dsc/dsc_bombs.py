@@ -79,7 +79,7 @@ BOMBS = {
     ),
     "many_circles.yaml": (
         "plot: p\nstates:\n" + "".join(f"  s{n}: {{use: p, on: {{done: s{n + 1}}}}}\n" for n in range(1_400)) + "  s1400: {final: true}\n",
-        3, "in a circle: p -> p",
+        3, "in a cycle: p -> p",
     ),
     "many_variables.yaml": (
         "plot: p\nvariables: {" + ", ".join(f"v{n}: number" for n in range(1_000)) + "}\nstates:\n"

@@ -76,7 +76,7 @@ def test_a_clone_that_does_not_fit_any_more_is_named_with_the_reason():
     plots = library()
     adapted = parse_plot("plot: b_look\nstates: {e: {final: true}}", "b_look.yaml")
     with pytest.raises(
-        SchemaError, match=r"b_look\.yaml:1:1: 'b_look' cannot stand in for 'look': it lacks its parameter 'thing'"
+        SchemaError, match=r"b_look\.yaml:1:1: 'b_look' cannot replace 'look': it lacks its parameter 'thing'"
     ):
         cloned(plots.plot("place"), plots, "b_", made=Library([adapted]))
 

@@ -119,7 +119,7 @@ def test_a_step_that_a_rule_always_replaces_is_said_to_be():
     ends = ("{on: failed, do: {then: continue}}", "{on: broken, do: {then: continue}}")
     said, _ = said_of("{before: do_it, do: {use: recover, then: continue}}", *ends)
     assert (
-        "the rule 'before do_it: recover, continue' always takes the place of step 'do_it', which is never entered"
+        "the rule 'before do_it: recover, continue' always replaces step 'do_it', which is never entered"
         in said
     )
 

@@ -50,7 +50,7 @@ def test_what_a_holder_would_notice_is_refused_and_says_where(interface, said):
     stub = plot("{plot: stub, " + interface + " states: {e: {final: true}}}", "stub.yaml")
     with pytest.raises(SchemaError) as refused:
         LIBRARY.substitute("pick", stub)
-    assert "'stub' cannot stand in for 'pick': it " in str(refused.value)
+    assert "'stub' cannot replace 'pick': it " in str(refused.value)
     assert said in str(refused.value)
     assert str(refused.value).startswith("stub.yaml:1")
 

@@ -216,7 +216,7 @@ WRONG = [
     (
         "done at once",
         S + "  a:\n    entry: {trigger: arm.push}\n    on: {pushed: e, done: e}\n" + E,
-        5, "state 'a' has no content, so it is done at once and would cancel its skill", "the outcome of the skill",
+        5, "state 'a' has no content, so it is done immediately and would cancel its skill", "the outcome of the skill",
     ),
     # -- data
     ("known type", "plot: p\nparameters:\n  x: itme\nstates: {a: {on: {done: e}}, e: {final: true}}\n", 3, "mean 'item'", ""),
@@ -314,9 +314,9 @@ WRONG = [
     ("reachable", S + "  a: {on: {done: e}}\n  b: {on: {done: e}}\n" + E, 4, "nothing leads to the state 'b'", "`initial`"),
     ("reachable", S + "  a:\n    on: {done: e}\n    states: {b: {final: true}, c: {final: true}}\n" + E, 5, "state 'c'", ""),
     ("reachable", S + "  a:\n    on: {done: e}\n    regions: {r: {states: {b: {final: true}, c: {final: true}}}}\n" + E, 5, "state 'c'", ""),
-    ("no circle", S + "  a:\n    use: p\n    on: {done: e}\n" + E, 4, "in a circle: p -> p", "in a dynamic state"),
-    ("no circle", S + "  a:\n    use: ring\n    on: {done: e}\n" + E, 4, "in a circle: p -> ring -> p", "in a dynamic state"),
-    ("no circle", S + "  a:\n    use: endless\n    on: {done: e}\n" + E, 4, "in a circle: endless -> endless", ""),
+    ("no circle", S + "  a:\n    use: p\n    on: {done: e}\n" + E, 4, "in a cycle: p -> p", "in a dynamic state"),
+    ("no circle", S + "  a:\n    use: ring\n    on: {done: e}\n" + E, 4, "in a cycle: p -> ring -> p", "in a dynamic state"),
+    ("no circle", S + "  a:\n    use: endless\n    on: {done: e}\n" + E, 4, "in a cycle: endless -> endless", ""),
     (
         "bounded rules",
         S + "  a:\n    goal: (free)\n    on: {done: e, no_plan: e, gave_up: e}\n" + E + "rules:\n"

@@ -110,7 +110,7 @@ def sequencer_of(**other):
         (lambda: validate_library([PLOT], None, None), "the plots are given as a Library"),
         (lambda: Library(["p"]), "a plot is an ActionPlot, as load_plot and parse_plot give it, not 'p'"),
         (lambda: Library(PLOT), "a library is made of a list of plots"),
-        (lambda: parse_plot(None), "what is read as YAML is text, not None"),
+        (lambda: parse_plot(None), "the YAML text is text, not None"),
         (lambda: load_plot(5), "a file or folder is named by a text or a Path, not 5"),
         (lambda: load_library(None), "a file or folder is named by a text or a Path, not None"),
         (lambda: load_library("/nowhere"), "there are no plots (*.yaml) in '/nowhere'"),
