@@ -96,7 +96,7 @@ WORDS = {
 
 PENDING = {
     "knowledge_base", "knowledge_base/cli", "knowledge_base/conditions", "knowledge_base/drawing",
-    "knowledge_base/exchange", "knowledge_base/journal", "knowledge_base/language", "knowledge_base/pddl",
+    "knowledge_base/exchange", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
     "dsc", "dsc/components", "dsc/sequencer", "planning/execution",
     "domains", "domains/clean_up_table",

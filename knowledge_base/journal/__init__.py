@@ -1,1 +1,1 @@
-"""What happened to a world: every change since the beginning or since a snapshot, in a file or in memory."""
+"""The history of a world: every change since the beginning or since a snapshot, in a file or in memory."""

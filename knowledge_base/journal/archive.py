@@ -1,4 +1,4 @@
-"""The past as a store's file tells it; each question opens the file, so that nobody who writes has to wait."""
+"""The readers' side of a store file: each query opens the file, so that readers never block the writer."""
 
 from __future__ import annotations
 
@@ -48,15 +48,15 @@ _SNAPSHOTS = "SELECT version, time, world, head, digest FROM snapshots"
 
 
 class Archive:
-    """A `History` that is only read; a writer may go on meanwhile, here or elsewhere.
+    """A read-only `History`; a writer may commit at the same time, in this process or another.
 
     Args:
         path: the store.
-        schema: an extension of the store's own, which is taken when it is `None`.
+        schema: an extension of the store's own schema; `None` takes the store's.
 
     Raises:
-        StoreError: the file is not there, not a store, damaged, or cannot be read.
-        SchemaMismatchError: the store was written with a schema that `schema` does not extend.
+        StoreError: the file is missing, not a store, damaged, or unreadable.
+        SchemaMismatchError: `schema` does not extend the schema in the store.
     """
 
     def __init__(self, path: Path, schema: Schema | None) -> None:
@@ -72,65 +72,57 @@ class Archive:
 
     @property
     def schema(self) -> Schema:
-        """With which it is read."""
+        """The schema of the reader."""
         return self._schema
 
     def newest(self) -> Version:
-        """The last world that was committed."""
+        """Return the last committed world."""
         with self._reading() as connection:
             return self._world(connection, self._last(connection))
 
     @property
     def digest(self) -> bytes:
-        """Of the newest version, and so of everything before it."""
+        """Digest of the newest version, which covers all versions before it."""
         with self._reading() as connection:
             return self._digest_at(connection, self._last(connection))
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:  # noqa: ARG002
-        """Refused.
-
-        Raises:
-            ConflictError: always.
-        """
+        """Raise `ConflictError`: the history is read-only."""
         raise self._only_read()
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """Refused.
-
-        Raises:
-            ConflictError: always.
-        """
+        """Raise `ConflictError`: the history is read-only."""
         raise self._only_read()
 
     def first(self, key: str) -> Change | None:
-        """The change that was kept under that key."""
+        """Return the change that was kept under that key."""
         with self._reading() as connection:
             return self._by_key(connection, key)
 
     def changes(self, since: int, until: int) -> list[Change]:
-        """The changes after version `since`, up to that which made version `until`."""
+        """Return the changes after version `since` up to version `until`."""
         with self._reading() as connection:
             return self._since(connection, since, until)
 
     def later(self, version: int) -> list[Change]:
-        """What the writer has committed after `version`."""
+        """Return the changes after `version` that the writer has committed."""
         with self._reading() as connection:
             if self._schema_hash(connection) != self._written:
-                raise StoreError("the writer has a longer schema now; open the store anew", place=self._place)
+                raise StoreError("the writer has extended the schema; open the store again", place=self._place)
             return self._since(connection, version, self._last(connection))
 
     def oldest(self) -> int:
-        """The first version that is still kept."""
+        """Return the oldest version that is still kept."""
         with self._reading() as connection:
             return _oldest(connection)
 
-    def state(self, version: int, newest: Callable[[], Version]) -> WorldState:  # noqa: ARG002  the file knows
-        """The world of that version: a snapshot and the changes after it."""
+    def state(self, version: int, newest: Callable[[], Version]) -> WorldState:  # noqa: ARG002  the file has it
+        """Return the world of that version: a snapshot and the changes after it."""
         with self._reading() as connection:
             return self._world(connection, version).state
 
     def version_at(self, time: float) -> int:
-        """The version that the world had at that time."""
+        """Return the version that the world had at that time."""
         with self._reading() as connection:
             found = connection.execute(
                 "SELECT version FROM changes WHERE time <= ? ORDER BY version DESC LIMIT 1", (time,)
@@ -138,30 +130,26 @@ class Archive:
             oldest, last = _oldest(connection), self._last(connection)
             reached = oldest if found is None else int(found[0])
             for _ in self._changes(connection, max(oldest, reached - 1), min(last, reached + 1)):
-                pass  # the change and the one after it are what was written, their times too
+                pass  # reading checks the digests of this change and the next, times included
             if found is None and time < self._snapshot(connection, oldest)[1]:
                 raise too_early(time, oldest, self._place)
             return reached
 
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002
-        """Refused.
-
-        Raises:
-            ConflictError: always.
-        """
+        """Raise `ConflictError`: the history is read-only."""
         raise self._only_read()
 
     def close(self) -> None:
-        """Nothing is kept open."""
+        """Do nothing: no file stays open."""
 
     def require_whole(self, connection: sqlite3.Connection) -> None:
-        """Look whether the store has the tables that a store has, and its chains end where they ended.
+        """Check that the store has its tables, and that its chains end where `ends` records it.
 
-        Rows are judged when they are read. A store that was not closed is judged page by page: it may be the copy of
-        one that was written meanwhile, or what a crash has left.
+        Rows are checked when they are read. A store that was not closed is checked page by page. It may be a copy made
+        during a write, or the result of a crash.
 
         Raises:
-            DamagedStoreError: it is not what was written.
+            DamagedStoreError: the content differs from the written one.
         """
         require_tables(connection, self._path, TABLES)
         ends = Ends(connection, self._path)
@@ -182,13 +170,13 @@ class Archive:
                 ends.require(chain, tip)
 
     def require_all(self) -> int:
-        """Read every row, and let SQLite look at every page; takes time in proportion to the file.
+        """Read every row, and let SQLite check every page; the time is proportional to the file's size.
 
         Returns:
             The last version.
 
         Raises:
-            DamagedStoreError: something is not what was written.
+            DamagedStoreError: some content differs from the written one.
         """
         with self._reading() as connection:
             require_sound(connection, self._path)
@@ -204,7 +192,7 @@ class Archive:
         return last
 
     def written_schema(self, connection: sqlite3.Connection) -> Schema:
-        """The schema that the store has now."""
+        """Return the latest schema in the store."""
         digest, text = Ends(connection, self._path).identity, ""
         for number, row in enumerate(connection.execute("SELECT * FROM schemas ORDER BY rowid"), 1):
             version, name, text, found = row
@@ -246,7 +234,7 @@ class Archive:
             self._unreadable(f"the snapshot of version {version}", error)
 
     def _snapshot(self, connection: sqlite3.Connection, version: int) -> tuple[str, float]:
-        """The text of a world that is kept as a whole, and its time."""
+        """Return the text of a snapshot, and its time."""
         _, time, text, head, digest = connection.execute(f"{_SNAPSHOTS} WHERE version = ?", (version,)).fetchone()
         name = f"the snapshot of version {version}"
         require_link(self._path, name, digest, (head, schema_at(connection, version)), version, time, text)
@@ -256,7 +244,7 @@ class Archive:
         return text, time
 
     def _tips(self, connection: sqlite3.Connection) -> Iterator[tuple[str, Tip]]:
-        """Where the chains of knowledge end; the ends of all others belong to those who write them."""
+        """Yield the tips of the knowledge chains; other chains belong to other writers."""
         last = self._last(connection)
         yield "changes", Tip(last, self._digest_at(connection, last))
         for chain, question in _TIPS.items():
@@ -304,7 +292,7 @@ class Archive:
         return self._key(row) if row is not None else None
 
     def _key(self, row: Any) -> Change:
-        """The change that a key stands for."""
+        """Return the change of a key."""
         number, key, version, time, author, delta, context, digest, before = row
         name = f"key {number} ('{key}')"
         change = link(context, version, time, author, delta) if isinstance(context, bytes) else None
@@ -327,12 +315,12 @@ def _oldest(connection: sqlite3.Connection) -> int:
 
 
 def _schemas(connection: sqlite3.Connection) -> list[tuple[int, bytes]]:
-    """The digest of each schema, with the first version that was made with it."""
+    """Return the first version of each schema, with its digest."""
     rows = connection.execute("SELECT version, digest FROM schemas WHERE typeof(digest) = 'blob' ORDER BY rowid")
     return [(version, digest) for version, digest in rows if isinstance(version, int)] or [(0, NOTHING)]
 
 
 def schema_at(connection: sqlite3.Connection, version: int) -> bytes:
-    """The digest of the schema with which that version was made."""
+    """Return the digest of the schema with which that version was committed."""
     first, *later = _schemas(connection)
     return next((digest for since, digest in reversed(later) if since <= version), first[1])

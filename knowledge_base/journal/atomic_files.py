@@ -1,4 +1,4 @@
-"""Atomic files: a new file is there as a whole or not at all, and never replaces another."""
+"""Atomic files: a new file appears complete or not at all, and never replaces another."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from knowledge_base.journal.sidecar_files import store_owning
 MODE = 0o644
 _PAGE_SIZE = 4096
 _WAL = b"\2\2"
-"""What SQLite's header has at byte 18 when there is a log beside the file, to be read and written."""
+"""Bytes 18 and 19 of SQLite's header for a database in WAL mode, for writing and reading."""
 
 
 @contextmanager
 def new_database(path: Path, application_id: int, form: int, *, lasting: bool) -> Iterator[sqlite3.Connection]:
-    """A connection to a database in memory, in a transaction, which is a file at `path` when the block is left.
+    """Yield a connection to a database in memory, in a transaction; the end of the block makes it a file at `path`.
 
     Args:
-        path: a place where nothing is.
-        application_id: by which the file is known, in SQLite's header.
+        path: the path of the new file.
+        application_id: identifies the kind of file in SQLite's header.
         form: the number of its format, SQLite's `user_version`.
         lasting: whether its name survives a power cut, as its content does.
 
     Raises:
-        OSError: there is a file meanwhile, or none can be made; all is as before.
+        OSError: a file exists at `path`, or none can be made; nothing has changed.
         sqlite3.Error: likewise.
     """
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
@@ -44,26 +44,26 @@ def new_database(path: Path, application_id: int, form: int, *, lasting: bool) -
         yield connection
         connection.execute("COMMIT")
         content = bytearray(connection.serialize())
-    content[18:20] = _WAL  # so that SQLite never keeps the older kind of log beside it
+    content[18:20] = _WAL  # so that SQLite never keeps a rollback journal
     os.close(place(path, bytes(content), lasting=lasting, synced=True))
 
 
 def place(path: Path, content: bytes, *, locked: bool = False, synced: bool = False, lasting: bool = False) -> int:
-    """Make a file; returns its descriptor, to read and write.
+    """Make a file; return its descriptor, open to read and write.
 
-    It has no name until it is complete. A file system without nameless files shows it under a random name until then,
-    and keeps that if the process is killed meanwhile.
+    The file has no name until it is complete. On a file system without nameless files it has a random name until then,
+    which remains if the process is killed.
 
     Args:
-        path: a place where nothing is.
-        content: all of it.
-        locked: whether this process has the lock on it (`flock`), from the beginning.
+        path: the path of the new file.
+        content: its whole content.
+        locked: whether this process holds a lock on it (`flock`) from the beginning.
         synced: whether its content survives a power cut.
-        lasting: whether its name does.
+        lasting: whether its name survives a power cut.
 
     Raises:
-        FileExistsError: something is there.
-        OSError: it cannot be made.
+        FileExistsError: `path` exists.
+        OSError: the file cannot be made.
     """
     folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
@@ -75,7 +75,7 @@ def place(path: Path, content: bytes, *, locked: bool = False, synced: bool = Fa
                 os.fsync(file)
             if locked:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            os.link(name, path, src_dir_fd=folder, follow_symlinks=True)  # fails where anything is
+            os.link(name, path, src_dir_fd=folder, follow_symlinks=True)  # fails if the path exists
             if lasting:
                 os.fsync(folder)
         except BaseException:
@@ -90,8 +90,8 @@ def place(path: Path, content: bytes, *, locked: bool = False, synced: bool = Fa
 
 
 def _nameless(parent: Path, folder: int) -> tuple[int, Path]:
-    """A new file and the name by which it can be linked."""
-    with suppress(OSError, AttributeError):  # not every system and file system has them
+    """Return the descriptor of a new file, and the name by which it can be linked."""
+    with suppress(OSError, AttributeError):  # some systems and file systems lack nameless files
         Path("/proc/self/fd").lstat()
         file = os.open(".", os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC, MODE, dir_fd=folder)
         return file, Path(f"/proc/self/fd/{file}")
@@ -114,16 +114,16 @@ TABLES = {
 
 @contextmanager
 def making(path: Path, durability: Durability) -> Iterator[sqlite3.Connection]:
-    """A connection to a new store with empty tables, which has its name when the block is left.
+    """Yield a connection to a new store with empty tables, in memory until the end of the block.
 
-    Until then it is in memory. To be used by who has the right to write, where nothing is.
+    The caller holds the writer lock of the path, which must be free.
 
     Raises:
-        StoreError: it cannot be made; nothing is there then.
+        StoreError: the store cannot be made; the path stays free.
     """
     owner = store_owning(path)
     if owner not in (None, path):
-        said = f"'{path.name}' is a name that the store '{owner}' has for a file of its own"
+        said = f"'{path.name}' is the name of a sidecar file of the store '{owner}'"
         raise StoreError(said, place=Place(str(path)))
     try:
         with (
@@ -134,7 +134,7 @@ def making(path: Path, durability: Durability) -> Iterator[sqlite3.Connection]:
                 connection.execute(statement)
             yield connection
     except FileExistsError:
-        said = f"'{path.name}' is there already; a new store takes the place of no file"
+        said = f"'{path.name}' is there already; a new store replaces no file"
         raise StoreError(said, place=Place(str(path))) from None
     except OSError as error:
         raise StoreError(f"cannot make the store '{path}': {error.strerror}") from error

@@ -1,12 +1,13 @@
-"""What was committed is put in its place in the file (SQLite's `checkpoint`) by a thread of its own.
+"""A thread that moves committed pages from SQLite's log into the store file (SQLite's `checkpoint`).
 
-That waits for the disk, twice, which nobody who commits should: one thread does it for all stores of the process, one
-store after the other and with rests in between, so that the disk has time for the commits.
+A checkpoint waits for the disk twice, which would delay commits. One thread serves all stores of the process in turn,
+with pauses, so that the disk has time for commits.
 
-SQLite from 3.7.0 to 3.51.2 (but for 3.44.6 and 3.50.7) may lose commits when one checkpoint has put everything in its
-place, another one begins soon after it, and at that very moment a commit begins the log anew: a later checkpoint may
-leave out what counts as done then (https://www.sqlite.org/wal.html#walresetbug). So a store is asked for only together
-with a commit that has left something in the log, and whoever does it himself lets the thread `leave` it first.
+SQLite from 3.7.0 to 3.51.2 (except 3.44.6 and 3.50.7) may lose commits; see
+https://www.sqlite.org/wal.html#walresetbug for the details. It needs a checkpoint that completes, another one soon
+after, and a commit that restarts the log at that moment. A later checkpoint may then skip committed pages. The
+thread therefore takes a request only together with a commit that left pages in the log. A caller calls `leave` before
+its own checkpoint.
 """
 
 from __future__ import annotations
@@ -22,30 +23,30 @@ from threading import Condition, Thread
 from knowledge_base.journal.file import to_tidy_up
 
 MOST_IN_LOG = 4000
-"""Pages after which the writer had better do it himself: he commits so fast that the log is never all done."""
+"""Pages in the log after which the writer runs the checkpoint itself: its commits leave the thread no gap."""
 MOST_ASKED = 8
-"""How often he asks before he does it himself."""
+"""Number of requests after which the writer runs the checkpoint itself."""
 PAUSE = 1.0
-"""How long the thread rests, as a multiple of what it has just worked."""
+"""Pause of the thread, as a multiple of its last working time."""
 
 
 class Checkpoints:
-    """Stores that are to be tidied up; the thread is there only while there are any."""
+    """Stores that wait for a checkpoint; the thread exists only while there are any."""
 
     def __init__(self) -> None:
         self._begin()
-        os.register_at_fork(after_in_child=self._begin)  # threads stay behind
+        os.register_at_fork(after_in_child=self._begin)  # threads do not survive a fork
 
     def _begin(self) -> None:
         self._changed = Condition()
-        self._waiting: dict[Path, int] = {}  # how often it was asked for
-        self._pages: dict[Path, int] = {}  # in the log, when it was tidied up
+        self._waiting: dict[Path, int] = {}  # number of requests
+        self._pages: dict[Path, int] = {}  # in the log at its last checkpoint
         self._at_work: Path | None = None
         self._thread: Thread | None = None
 
     @contextmanager
     def asking(self, path: Path) -> Iterator[None]:
-        """Tidy up that store soon, which its writer has open, if what is in the block, a commit, succeeds."""
+        """Request a checkpoint of the store if the commit in the block succeeds; the store is open for writing."""
         with self._changed:  # no checkpoint begins meanwhile
             yield
             if self._at_work == path:
@@ -55,19 +56,19 @@ class Checkpoints:
                 self._thread = _started(self._run)
 
     def is_behind(self, path: Path) -> bool:
-        """Whether the writer had better tidy up himself."""
+        """Return whether the writer should run the checkpoint itself."""
         with self._changed:
             return self._waiting.get(path, 0) >= MOST_ASKED or self._pages.get(path, 0) > MOST_IN_LOG
 
     def leave(self, path: Path) -> None:
-        """Do not touch that store any more: when this returns, nobody does."""
+        """Cancel requests for the store, and wait until no checkpoint of it runs."""
         with self._changed:
             self._waiting.pop(path, None)
             self._changed.wait_for(lambda: self._at_work != path)
             self._pages.pop(path, None)
 
     def settle(self) -> None:
-        """Wait until nothing waits to be tidied up."""
+        """Wait until no request is pending."""
         with self._changed:
             self._changed.wait_for(lambda: self._at_work is None and not self._waiting)
 
@@ -94,7 +95,7 @@ class Checkpoints:
 
 
 def _started(work: Callable[[], None]) -> Thread | None:
-    """`None` where no thread can be had: then the writer tidies up himself, after a while."""
+    """Return the thread, or `None` if the system has none; the writer then runs checkpoints after a while."""
     thread = Thread(target=work, name="checkpoints", daemon=True)
     with suppress(RuntimeError):
         thread.start()
@@ -103,7 +104,7 @@ def _started(work: Callable[[], None]) -> Thread | None:
 
 
 def _tidy_up(path: Path) -> int:
-    """What cannot be done now is done next time: until then all is in the log, and SQLite reads it there."""
+    """Run a checkpoint; return the pages in the log. Blocked pages stay in the log, where SQLite reads them."""
     with suppress(sqlite3.Error), closing(to_tidy_up(path)) as connection:
         _, pages, _ = connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         return int(pages)
@@ -111,4 +112,4 @@ def _tidy_up(path: Path) -> int:
 
 
 CHECKPOINTS = Checkpoints()
-"""Those of this process."""
+"""The instance of this process."""

@@ -1,4 +1,4 @@
-"""The SQLite file of a store: how it is opened, and what its errors mean to people."""
+"""The SQLite file of a store: connections, headers, and errors with their meaning."""
 
 from __future__ import annotations
 
@@ -17,24 +17,26 @@ from knowledge_base.journal.sidecar_files import INDEX, LOG, OLD_LOG, regular, r
 from knowledge_base.pddl.files import files_beside
 
 Durability = Literal["memory", "process", "power"]
-"""What a commit outlives: nothing; the death of the process; a power cut (as far as the disk is honest)."""
+"""The events that a commit survives: none; the death of the process; a power cut (if the disk reports writes
+correctly).
+"""
 
-APPLICATION_ID = 0x6473636B  # "dsck", by which a file is known as ours (SQLite's application_id)
+APPLICATION_ID = 0x6473636B  # "dsck", the file kind in SQLite's application_id
 FORMAT = 3
 PATIENCE_S = 1.0
-"""How long to wait for others who lock the file; there should be none."""
+"""Seconds to wait for another process that locks the file; normally there is none."""
 
 _LONGEST_PATH = 500
-"""In bytes; SQLite opens no file with a path of more than 511."""
+"""Bytes; SQLite opens no file with a path of more than 511."""
 _PAGES_IN_LOG = {"process": 0, "power": 1000}
-"""Pages of 4 KiB in SQLite's log after which it makes the commit put them in their place; 0: others see to that."""
+"""Pages of 4 KiB in SQLite's log after which a commit runs a checkpoint; 0: a thread runs it."""
 _LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its head; commits are not cut
 _SYNCHRONOUS = {"process": "NORMAL", "power": "FULL"}  # in WAL mode only FULL waits for the disk in each commit
 
 
 @contextmanager
 def reported(path: Path, doing: str) -> Iterator[None]:
-    """Turns SQLite's errors into a `StoreError` that says what could not be done to which file."""
+    """Convert SQLite's errors into a `StoreError` with the failed operation and the file."""
     try:
         yield
     except sqlite3.Error as error:
@@ -43,7 +45,7 @@ def reported(path: Path, doing: str) -> Iterator[None]:
 
 
 def _means_damage(error: sqlite3.Error) -> bool:
-    """Whether SQLite says that the file is malformed, or text in it is no UTF-8 (which is Python's own finding)."""
+    """Return whether SQLite reports a malformed file, or Python finds invalid UTF-8 in a text."""
     code = getattr(error, "sqlite_errorcode", None)
     if code is None:
         return "UTF-8" in str(error)
@@ -52,18 +54,18 @@ def _means_damage(error: sqlite3.Error) -> bool:
 
 @contextmanager
 def reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """A connection that sees one version of the file, whatever is written meanwhile.
+    """Yield a connection that sees one version of the file, independent of later commits.
 
     Args:
         path: as from `located`.
 
     Raises:
-        StoreError: the file is not there, not a store, or cannot be read.
+        StoreError: the file is missing, not a store, or unreadable.
     """
     seen = _seen(str(path))
     with reported(path, "read"):
         _require_readable(path, seen)
-        if not all(seen[:3]) and is_still(path):  # SQLite makes the missing ones
+        if not all(seen[:3]) and is_still(path):  # SQLite creates missing ones
             with _reading_still(path) as connection:
                 yield connection
             return
@@ -77,7 +79,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
 
 
 Seen = tuple[tuple[int, int, bool] | None, ...]
-"""Device, inode, and whether there is content: of a store and of SQLite's files beside it."""
+"""Device, inode, and whether there is content: of a store and of SQLite's sidecar files."""
 
 
 def _seen(name: str) -> Seen:
@@ -92,7 +94,7 @@ def _identity(name: str) -> tuple[int, int, bool] | None:
     return found.st_dev, found.st_ino, found.st_size > 0
 
 
-@lru_cache(maxsize=256)  # whoever asks for the past, or follows a writer, opens the same files again and again
+@lru_cache(maxsize=256)  # queries of the past and followers open the same files repeatedly
 def _require_readable(path: Path, seen: Seen) -> None:  # noqa: ARG001  other files, another answer
     if not is_there(path):
         beside = files_beside(path)
@@ -117,10 +119,10 @@ def _reading_still(path: Path) -> Iterator[sqlite3.Connection]:
 
 
 def located(path: str | Path) -> Path:
-    """The place of a store that somebody names, without links on the way.
+    """Return the resolved path of a store.
 
     Raises:
-        StoreError: it is no name of a file, too long, or a link that leads nowhere.
+        StoreError: the path does not name a file, is too long, or is a broken link.
     """
     text = str(path)
     if text == ":memory:" or text.startswith("file:"):
@@ -130,8 +132,8 @@ def located(path: str | Path) -> Path:
     try:
         found = Path(path).resolve()
         if Path(path).is_symlink() and not found.exists():
-            raise StoreError(f"'{text}' is a link to '{found}', which is not there")
-    except (OSError, RuntimeError, ValueError) as error:  # e.g. links that lead to each other
+            raise StoreError(f"'{text}' is a link to '{found}', which is missing")
+    except (OSError, RuntimeError, ValueError) as error:  # e.g. circular links
         raise StoreError(f"cannot open the store: {error}", place=Place(text)) from None
     if len(os.fsencode(found)) > _LONGEST_PATH:
         raise StoreError(f"the path of the store has more than {_LONGEST_PATH} bytes", place=Place(str(found)))
@@ -139,27 +141,26 @@ def located(path: str | Path) -> Path:
 
 
 def is_there(path: Path) -> bool:
-    """Whether a store can be there; if not, one can be made.
+    """Return whether a store may exist at the path; if not, one can be made.
 
     Raises:
-        StoreError: neither: something else than a file with content is there, or a file of a store that is none of
-            this one's is beside it, or there is no folder.
+        StoreError: another kind of file, an empty file, or a foreign sidecar file is there, or the folder is missing.
     """
     found = regular(path)
     if found is None and not path.parent.is_dir():
         raise StoreError(f"there is no folder '{path.parent}' for a store to be in", place=Place(str(path)))
     require_no_strangers(path, there=bool(found and found.st_size))
     if found is not None and not found.st_size:
-        said = f"'{path.name}' is empty, and no store; a new store takes the place of no file"
+        said = f"'{path.name}' is empty, and no store; a new store replaces no file"
         raise StoreError(said, place=Place(str(path)))
     return found is not None
 
 
 def writing(path: Path, durability: Durability) -> sqlite3.Connection:
-    """A connection to write with.
+    """Return a connection to write with.
 
     Raises:
-        StoreError: it cannot be opened, or is something else than a store.
+        StoreError: the file cannot be opened, or is not a store.
     """
     with reported(path, "open"):
         require_own(path)
@@ -177,7 +178,7 @@ def writing(path: Path, durability: Durability) -> sqlite3.Connection:
 
 
 def require_one_name(path: Path) -> None:
-    """Raise `StoreError` for a file with several names (hard links): each would have a log and a lock of its own."""
+    """Raise `StoreError` for a file with several names (hard links), for each would have a separate log and lock."""
     found = regular(path)
     if found is not None and found.st_nlink > 1:
         said = f"the file has {found.st_nlink} names (hard links); only a store with one name is written"
@@ -185,20 +186,24 @@ def require_one_name(path: Path) -> None:
 
 
 def to_tidy_up(path: Path) -> sqlite3.Connection:
-    """A connection besides that of the one who writes; raises `sqlite3.Error` if it cannot be had."""
+    """Return a second connection to an open store, for a checkpoint.
+
+    Raises:
+        sqlite3.Error: the connection cannot be opened.
+    """
     connection = connect(path, "rw")
-    connection.execute("PRAGMA synchronous = NORMAL")  # or the log would be gone before the file is on the disk
+    connection.execute("PRAGMA synchronous = NORMAL")  # otherwise the log could be reset before the file is on the disk
     return connection
 
 
 def lay_out_log(path: Path) -> None:
-    """Let SQLite's log have the length it comes to have, where it is shorter; the writer's connection is open.
+    """Extend SQLite's log to its final length; the writer's connection is open.
 
-    Waiting for the disk takes longer, and depends on what others write, as long as a file grows: its length has to be
-    kept then, too. What follows the last commit is no commit to SQLite, whatever it is; zeros are none anywhere.
+    A growing file makes each wait for the disk longer and dependent on other writers, since its length must be stored
+    too. SQLite ignores content after the last commit; zeros are never a commit.
 
     Raises:
-        StoreError: there is no room for it.
+        StoreError: the disk is full.
     """
     try:
         with open(path.with_name(path.name + LOG), "r+b", opener=_not_through_links) as log:
@@ -211,7 +216,7 @@ def lay_out_log(path: Path) -> None:
 
 
 def delete_empty_log(path: Path) -> None:
-    """Delete what SQLite leaves beside a store that was moved away; the writer still has its lock."""
+    """Delete the sidecar files that SQLite leaves at a moved store's old path; the writer still holds its lock."""
     log = path.with_name(path.name + LOG)
     if not path.exists() and log.exists() and not log.stat().st_size:
         log.unlink()
@@ -224,11 +229,11 @@ def _not_through_links(path: str, flags: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a file is known by, in SQLite's header.
+    """A kind of SQLite file, by its header.
 
     Attributes:
-        name: in messages.
-        application_id: says whose it is.
+        name: its name in messages.
+        application_id: SQLite's `application_id`.
         form: number of its format.
     """
 
@@ -241,10 +246,10 @@ STORE = Kind("knowledge store", APPLICATION_ID, FORMAT)
 
 
 def require_own(path: Path, kind: Kind = STORE) -> None:
-    """Raise `StoreError` unless the file is of that kind; SQLite's files beside it stay as they are.
+    """Raise `StoreError` unless the file is of that kind; SQLite's sidecar files stay unchanged.
 
-    Opening somebody else's database in the usual way may already put its log into it. A file that SQLite calls
-    malformed may be one into which the log is being put, or was when the process died; its log tells.
+    Normal opening of a foreign database may already run a checkpoint of its log. SQLite calls a file malformed during a
+    checkpoint, or after the process died in one; its log has the missing pages.
     """
     try:
         with closing(unlocked(path)) as connection:
@@ -255,7 +260,7 @@ def require_own(path: Path, kind: Kind = STORE) -> None:
 
 
 def require_store(connection: sqlite3.Connection, path: Path, kind: Kind = STORE) -> None:
-    """Raise `StoreError` unless the file is a store of a format known here."""
+    """Raise `StoreError` unless the file has the kind's identity and format."""
     if _number(connection, "PRAGMA application_id") != kind.application_id:
         raise StoreError(f"this is a database, but no {kind.name}", place=Place(str(path)))
     form = _number(connection, "PRAGMA user_version")
@@ -269,6 +274,6 @@ def _number(connection: sqlite3.Connection, statement: str) -> int:
 
 
 def connect(path: Path, mode: str) -> sqlite3.Connection:
-    """A connection without transactions of its own; `mode` as SQLite has it in the names of files."""
+    """Return a connection in autocommit mode; `mode` is SQLite's `mode` of URI filenames."""
     uri = f"{path.absolute().as_uri()}?mode={mode}"
     return sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False, timeout=PATIENCE_S)

@@ -1,4 +1,4 @@
-"""What a knowledge base needs to know of its past, wherever that is kept."""
+"""The interface of a knowledge base to its past, in a file or in memory."""
 
 from __future__ import annotations
 
@@ -26,102 +26,102 @@ class Version:
 
 
 class History(Protocol):
-    """Keeps changes. Methods that ask may be called by any thread; `append` is called by one at a time."""
+    """A sequence of changes. Any thread may call the reading methods; one thread at a time calls `append`."""
 
     @property
     def digest(self) -> bytes:
-        """Of the newest version, and so of everything before it; empty where nothing is kept for long."""
+        """Digest of the newest version, which covers all versions before it; empty for a history in memory."""
         ...
 
     def newest(self) -> Version:
-        """The world to go on with; it belongs to the caller."""
+        """Return the newest world, which the caller may change."""
         ...
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:
-        """Keep a change that is about to be made to `before`; when this returns it is acknowledged.
+        """Keep a change before it is applied to `before`; the change is acknowledged when this returns.
 
         Args:
-            change: an empty one is kept only for its `key`.
-            key: under which it is found again by `first`.
+            change: the change; an empty one is kept only for its `key`.
+            key: an idempotency key, under which `first` finds the change.
             before: the world without the change.
-            along: what else is written with it.
+            along: writes further rows in the same transaction.
 
         Raises:
-            StoreError: it could not be written; nothing is kept.
-            ConflictError: this history is only read.
+            StoreError: the change could not be written; nothing is kept.
+            ConflictError: the history is read-only.
         """
         ...
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """What is appended inside the block, and what is written with the connection, is kept as one or not at all.
+        """Return a block whose appended changes and own rows are kept together or not at all.
 
         Raises:
-            StoreError: it could not be written, or there is no file; from then on nothing can be appended, since
-                the world in memory has gone on without it.
-            ConflictError: this history is only read.
+            StoreError: the block could not be written, or there is no file. Later appends fail too, since the world in
+                memory is ahead of the file.
+            ConflictError: the history is read-only.
         """
         ...
 
     def first(self, key: str) -> Change | None:
-        """The change that was kept under that key."""
+        """Return the change that was kept under that key."""
         ...
 
     def changes(self, since: int, until: int) -> list[Change]:
-        """The changes after version `since`, up to that which made version `until`.
+        """Return the changes after version `since` up to version `until`.
 
         Raises:
-            HistoryError: some of them are not kept any more.
+            HistoryError: some of them are no longer kept.
         """
         ...
 
     def oldest(self) -> int:
-        """The first version that is still kept."""
+        """Return the oldest version that is still kept."""
         ...
 
     def later(self, version: int) -> list[Change]:
-        """What somebody else has committed after `version`.
+        """Return the changes after `version` that another writer has committed.
 
         Raises:
-            ConflictError: nobody else writes here.
-            HistoryError: some of it is not kept any more.
-            StoreError: the schema is not that which it was opened with, or it cannot be read.
+            ConflictError: this history is the only writer.
+            HistoryError: some of them are no longer kept.
+            StoreError: the schema has changed since the store was opened, or the file cannot be read.
         """
         ...
 
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
-        """The world of that version, as a copy; `newest` tells the present one to those who go back from it.
+        """Return a copy of the world of that version; `newest` returns the present one, from which changes are undone.
 
         Raises:
-            HistoryError: it is not kept any more.
+            HistoryError: the version is no longer kept.
         """
         ...
 
     def version_at(self, time: float) -> int:
-        """The version that the world had at that time.
+        """Return the version that the world had at that time.
 
         Raises:
-            HistoryError: that was before anything that is kept.
+            HistoryError: the time is before the oldest kept version.
         """
         ...
 
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:
-        """Forget what is needed only for versions before `keep_since`; keys are remembered.
+        """Remove the content that only versions before `keep_since` need; keys are kept.
 
         Raises:
-            StoreError: it could not be written; all is as before.
+            StoreError: the change could not be written; nothing has changed.
         """
         ...
 
     def close(self) -> None:
-        """Give back files and locks."""
+        """Close files and release locks."""
         ...
 
 
 def gone(version: int, oldest: int, place: Place | None = None) -> HistoryError:
-    """The error for a version that is not kept any more."""
-    return HistoryError(f"version {version} is not kept any more; the oldest kept is {oldest}", place=place)
+    """Return the error for a version that is no longer kept."""
+    return HistoryError(f"version {version} is no longer kept; the oldest kept is {oldest}", place=place)
 
 
 def too_early(time: float, oldest: int, place: Place | None = None) -> HistoryError:
-    """The error for a time before everything that is kept."""
+    """Return the error for a time before the oldest kept version."""
     return HistoryError(f"time {time} is before all that is kept, which begins with version {oldest}", place=place)

@@ -1,9 +1,10 @@
-"""Whether a store has what was written, all of it and nothing else: chained digests, and the ends of the chains.
+"""Integrity of a store: chained digests prove that its rows are complete and unchanged.
 
-Each row of a journal carries a digest of the row before it and of its own content. A row that is edited, missing,
-inserted or moved breaks the chain there. `ends` says where a chain ends; it is written when a store is closed, so only
-a store that was not closed (a crash, or a writer at work) can lack its last rows unnoticed: SQLite's log ends there.
-The digests find damage; they are no signature, since they need no secret.
+Each row of a journal carries a digest of its content and of the row before it. An edited, missing, inserted or moved
+row breaks the chain. The table `ends` records the tip of each chain when a store is closed. The last rows of an open
+store (a crash, or a running writer) may therefore be lost unnoticed, where SQLite's log ends.
+
+The digests detect damage. They need no secret, and so they do not prove the author.
 """
 
 from __future__ import annotations
@@ -24,57 +25,57 @@ NOTHING: Final = b""
 """The digest before the first row of a chain."""
 ENDS = "CREATE TABLE ends (chain TEXT PRIMARY KEY, count INTEGER, digest BLOB) WITHOUT ROWID"
 STORE: Final = "store"
-"""In the table of ends, the random identity of the store, with which its chains begin."""
+"""The row of `ends` with the random identity of the store, the first digest of its chains."""
 _OPEN = "open"
 _PUT_END = "INSERT OR REPLACE INTO ends VALUES (?, ?, ?)"
 _SHOWN = 3
-"""Problems of SQLite's own check that a message shows."""
+"""Number of problems of SQLite's own check in a message."""
 
 
 class Tip(NamedTuple):
-    """The end of a chain: how many rows it has, and the digest of the last."""
+    """The end of a chain: its number of rows, and the digest of the last."""
 
     rows: int
     digest: bytes
 
 
 def link(before: bytes, *values: Any) -> bytes:
-    """The digest of a row.
+    """Return the digest of a row.
 
     Args:
-        before: the digest of the row before it, and of what else the row depends on.
-        values: its columns as SQLite gives them back; a REAL is a float.
+        before: the digest of the row before it, and of other content that the row depends on.
+        values: its columns as SQLite returns them; a REAL is a float.
     """
     return blake2b(before + (_joined(len(values)) % values).encode(), digest_size=SIZE).digest()
 
 
 @cache
 def _joined(columns: int) -> str:
-    """The pattern of a row's text; formatting by it takes half the time of `join`."""
+    """Return the pattern of a row's text; formatting takes half the time of `join`."""
     return "\0".join(["%s"] * columns)
 
 
 def damaged(path: Path, what: str) -> DamagedStoreError:
-    """The error about a store whose content is not what was written."""
+    """Return the error for a store whose content differs from the written one."""
     return DamagedStoreError(f"the store is damaged: {what}", place=Place(str(path)))
 
 
 def require_link(path: Path, row: str, digest: object, before: tuple[Any, ...], *values: Any) -> bytes:
-    """The digest of a row that was read.
+    """Return the digest of a row that was read.
 
     Args:
         path: the store.
-        row: names the row.
-        digest: the one that stands in it.
-        before: the parts of what `link` takes as `before`.
+        row: the name of the row in messages.
+        digest: the digest in the row.
+        before: the parts of `before` for `link`.
         values: the row's columns.
 
     Raises:
-        DamagedStoreError: the digest is not that of its content after the row before it.
+        DamagedStoreError: the digest does not match the row's content after the row before it.
     """
     try:
         expected = link(b"".join(before), *values)
-    except (TypeError, UnicodeError):  # a part that is no digest
+    except (TypeError, UnicodeError):  # a part that is not a digest
         expected = None
     if expected is None or digest != expected:
         raise damaged(path, f"{row} is not what was written, or does not belong here")
@@ -82,7 +83,7 @@ def require_link(path: Path, row: str, digest: object, before: tuple[Any, ...], 
 
 
 def require_tables(connection: sqlite3.Connection, path: Path, tables: Mapping[str, str]) -> None:
-    """Raise `DamagedStoreError` unless these tables are there, by name, made with exactly that statement."""
+    """Raise `DamagedStoreError` unless each table exists and was made with exactly that statement."""
     there = dict(connection.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'").fetchall())
     for name, statement in tables.items():
         if name not in there:
@@ -99,11 +100,11 @@ def require_sound(connection: sqlite3.Connection, path: Path, table: str | None 
 
 
 def require_own_log(path: Path, identity: bytes) -> None:
-    """Raise `DamagedStoreError` if SQLite's log beside the file is that of another store, with that identity."""
+    """Raise `DamagedStoreError` if SQLite's log at the path belongs to a store with another identity."""
     log = path.with_name(path.name + "-wal")
     if not log.exists() or not log.stat().st_size:
         return
-    with suppress(sqlite3.Error):  # a crash may have left the file itself half written: then the log completes it
+    with suppress(sqlite3.Error):  # a crash may leave the file half written, and the log completes it
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as alone:
             (own,) = alone.execute("SELECT digest FROM ends WHERE chain = ?", (STORE,)).fetchone() or (identity,)
         if own != identity:
@@ -111,11 +112,11 @@ def require_own_log(path: Path, identity: bytes) -> None:
 
 
 class Ends:
-    """The ends of the chains of a file, as they were written last.
+    """The recorded ends of the chains of a file.
 
     Attributes:
-        closed: whether the last writer has closed the store, so that these ends hold.
-        tips: those that are said, by chain.
+        closed: whether the last writer has closed the store, so that the ends are valid.
+        tips: the recorded tips by chain.
     """
 
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
@@ -129,11 +130,11 @@ class Ends:
 
     @property
     def identity(self) -> bytes:
-        """What no other store has."""
+        """The random identity of the store."""
         return self.tips[STORE].digest
 
     def require(self, chain: str, found: Tip) -> None:
-        """Raise `DamagedStoreError` if the chain ends elsewhere."""
+        """Raise `DamagedStoreError` if the chain's tip differs from the recorded one."""
         said = self.tips.get(chain)
         if said is None:
             raise damaged(self._path, f"the table 'ends' does not say where '{chain}' ends")
@@ -145,15 +146,15 @@ class Ends:
 
 
 def put_ends(connection: sqlite3.Connection, tips: Iterable[tuple[str, Tip | None]]) -> None:
-    """Say where chains end; `None` is not known, as long as somebody writes."""
+    """Record the tips of chains; `None` is unknown, while a writer has the store open."""
     connection.executemany(_PUT_END, [(chain, *(tip or (None, None))) for chain, tip in tips])
 
 
 def mark_open(connection: sqlite3.Connection, token: bytes) -> None:
-    """Say that a writer is at work, from whose commit on the ends do not hold."""
+    """Record that a writer has the store open, so that the ends are invalid from its commit on."""
     connection.execute(_PUT_END, (_OPEN, None, token))
 
 
 def mark_closed(connection: sqlite3.Connection, token: bytes) -> bool:
-    """Say that the ends hold again; nothing is done, and the answer is `False`, if another one is the writer now."""
+    """Record that the ends are valid again; return `False` and do nothing if another writer has the store open."""
     return connection.execute("DELETE FROM ends WHERE chain = ? AND digest = ?", (_OPEN, token)).rowcount == 1

@@ -1,4 +1,4 @@
-"""A store's file with the right to write it: each change is one SQLite transaction, acknowledged when written."""
+"""The writer's side of a store file: each change is one SQLite transaction, acknowledged when written."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ from knowledge_base.world.schema_compatibility import missing_constants, require
 from knowledge_base.world.state import WorldState
 
 SNAPSHOT_AFTER = 2_000_000
-"""How many characters of changes follow a snapshot at least before the next.
+"""Minimum number of characters of changes between two snapshots.
 
-They are read back in a fraction of a second. A world that is longer than this is written only after as many
-characters of changes as it has itself: so snapshots at most double the file and the work.
+Reading these takes a fraction of a second. A longer world waits for as many characters of changes as it has itself.
+Snapshots therefore at most double the file and the work.
 """
 
 _INSERT_CHANGE = "INSERT INTO changes VALUES (?, ?, ?, ?, ?)"
@@ -63,19 +63,19 @@ _FORGET = (
 
 
 class Journal(Archive):
-    """A `History` that is written by one process, one thread at a time.
+    """A `History` with one writing process, and one writing thread at a time.
 
     Args:
-        path: the store; it is made when it is not there.
-        schema: that of a new store, or an extension of the store's own; `None` takes that.
-        durability: what a commit outlives.
-        clock: gives the time of what opening it writes, in seconds.
-        new: whether it must not be there yet.
+        path: the store; created if missing.
+        schema: the schema of a new store, or an extension of the store's own; `None` takes the store's.
+        durability: the events that a commit survives.
+        clock: returns the time in seconds for changes at opening.
+        new: whether the store must not exist yet.
 
     Raises:
-        StoreError: another writer has it, it is something else, or cannot be read or written.
-        SchemaMismatchError: the store was written with a schema that `schema` does not extend.
-        InputError: there is no store yet and no schema for it.
+        StoreError: another writer has it open, or it is not a store, or it cannot be read or written.
+        SchemaMismatchError: `schema` does not extend the schema in the store.
+        InputError: there is no store and no schema for a new one.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Journal(Archive):
             raise _no_schema(path)
         self._place = Place(str(path))
         self._head = self._schema_digest = self._identity = NOTHING
-        self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that
+        self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that snapshot
         self._durability = durability
         self._writers = WriterLock(path)
         try:
@@ -113,19 +113,19 @@ class Journal(Archive):
             raise
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:
-        """Write a change, and first a snapshot when much was written since the last one."""
+        """Write a change, after a snapshot if many characters were written since the last one."""
         if not change.delta and key is None and along is None:
             return
         _require_text(change.author, key or "")
         if along is not None and not callable(along):
-            raise InputError(f"what writes along is a function of a connection, not {along!r}")
+            raise InputError(f"`along` is a function of a connection, not {along!r}")
         delta = compact(delta_form(change.delta))
         time, context = float(change.time), self._head + self._schema_digest
         digest = link(context, change.version, time, change.author, delta)
         snapshot = None if self._tail < max(SNAPSHOT_AFTER, self._snapshot_size) else compact(world_form(before))
         with self._part() as connection:
             if snapshot is not None:
-                self._put_snapshot(snapshot, change.version - bool(change.delta))  # that of the world before it
+                self._put_snapshot(snapshot, change.version - bool(change.delta))  # of the world before the change
             if change.delta:
                 connection.execute(_INSERT_CHANGE, (change.version, time, change.author, delta, digest))
             if key is not None:
@@ -143,32 +143,28 @@ class Journal(Archive):
             self._head = digest
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """Write what is appended in the block, and what else the block writes, in one transaction."""
+        """Return a block whose appended changes and own rows are one transaction."""
         return self._group
 
     def first(self, key: str) -> Change | None:
-        """The change that was kept under that key; asked by the one who writes."""
+        """Return the change that was kept under that key; only the writer may ask."""
         _require_text(key)
         with reported(self._path, "read"):
             return self._by_key(self._connection, key)
 
     def later(self, version: int) -> list[Change]:
-        """Refused.
-
-        Raises:
-            ConflictError: always.
-        """
+        """Raise `ConflictError`: this journal is the only writer."""
         raise ConflictError(f"{self._place}: version {version} is the newest, as this is the store's only writer")
 
     @property
     def digest(self) -> bytes:
-        """Of the newest version, and so of everything before it."""
+        """Digest of the newest version, which covers all versions before it."""
         return self._head
 
-    def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  the file knows
-        """Make version `keep_since` the oldest: a snapshot of it takes the place of all before."""
+    def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  the file has it
+        """Make version `keep_since` the oldest: its snapshot replaces all earlier rows."""
         with self._reading() as connection:
-            require_sound(connection, self._path)  # pages are moved about
+            require_sound(connection, self._path)  # vacuum moves pages
             world = compact(world_form(self._world(connection, keep_since).state))
         with self._transaction as connection:
             self._put_snapshot(world, keep_since)
@@ -182,12 +178,12 @@ class Journal(Archive):
         self._lay_out_log()
 
     def close(self) -> None:
-        """Let others write; nothing stays beside the file."""
+        """Close the store and release its lock; no sidecar file remains."""
         CHECKPOINTS.leave(self._path)
         self._end()
         moved = not self._transaction.is_in_place()
-        if moved:  # SQLite puts the log only into a file that is in its place
-            with suppress(sqlite3.Error):  # it is closed already
+        if moved:  # SQLite runs the last checkpoint only on a file at its own path
+            with suppress(sqlite3.Error):  # already closed
                 self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
         self._connection.close()
         if moved:
@@ -195,7 +191,7 @@ class Journal(Archive):
         self._writers.release()
 
     def _end(self) -> None:
-        """Say where the chains end; if that cannot be written, the store is as after a crash."""
+        """Record the tips of the chains; if that fails, the store is as after a crash."""
         if self._transaction.marked and self._group.behind is None:
             with suppress(StoreError), self._transaction as connection:
                 if mark_closed(connection, self._token):
@@ -209,7 +205,7 @@ class Journal(Archive):
     def _prepare(self, schema: Schema | None, clock: Callable[[], float]) -> None:
         with reported(self._path, "read"):
             self.require_whole(self._connection)
-            require_sound(self._connection, self._path, "keys")  # of which one that is not found is made again
+            require_sound(self._connection, self._path, "keys")  # a missing key would be inserted again
             self._identity = Ends(self._connection, self._path).identity
             written = self.written_schema(self._connection)
             self._schema = schema or written
@@ -220,7 +216,7 @@ class Journal(Archive):
             self._measure()
 
     def _extend(self, written: Schema, clock: Callable[[], float]) -> None:
-        """Go on with more declarations; new constants come into the world by a change of their own."""
+        """Extend the schema; a separate change adds new constants to the world."""
         require_extension(written, self._schema, self._place)
         last = self.newest()
         require_functional(last.state, self._place)
@@ -235,7 +231,7 @@ class Journal(Archive):
         self._schema_digest, self._head = schema, head
 
     def _put_snapshot(self, world: str, version: int) -> None:
-        """Keep the world of a version that is in the journal, or in a snapshot already."""
+        """Keep the world of a version in the journal; ignore a version with a snapshot."""
         found = self._connection.execute("SELECT time, digest FROM changes WHERE version = ?", (version,)).fetchone()
         if found is not None:
             time, head = found
@@ -247,7 +243,7 @@ class Journal(Archive):
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
-        """What is committed; inside `together`, whose caller alone asks then, what it has appended as well."""
+        """Yield committed content; inside `together` also the block's own appended changes, for its only caller."""
         if self._group.open:
             with reported(self._path, "read"):
                 yield self._connection
@@ -257,7 +253,7 @@ class Journal(Archive):
 
     @contextmanager
     def _part(self) -> Iterator[sqlite3.Connection]:
-        """One change: a transaction of its own, or a part of the one that is open."""
+        """Yield a transaction for one change, or the open one of the group."""
         self._group.require_abreast()
         if not self._group.open:
             with self._transaction as connection:
@@ -274,7 +270,7 @@ class Journal(Archive):
 
 @contextmanager
 def _guarded(connection: sqlite3.Connection) -> Iterator[None]:
-    """Whoever writes in the block cannot end its transaction; what came before would be kept without the rest."""
+    """Forbid the end of the transaction in the block, which would keep its first part without the rest."""
     refused = False
 
     def judge(action: int, *_: str | None) -> int:
@@ -289,7 +285,7 @@ def _guarded(connection: sqlite3.Connection) -> Iterator[None]:
         yield
     except sqlite3.DatabaseError as error:
         if refused:
-            raise StoreError("what is written along neither begins nor ends a transaction") from error
+            raise StoreError("rows written along with a change neither begin nor end a transaction") from error
         raise
     finally:
         connection.set_authorizer(None)
@@ -300,10 +296,10 @@ def _no_schema(path: Path) -> InputError:
 
 
 def _make(path: Path, schema: Schema | None, durability: Durability, time: float) -> None:
-    if schema is None:  # somebody has just taken it away
+    if schema is None:  # another process has just removed the store
         raise _no_schema(path)
     with making(path, durability) as connection:
-        identity = os.urandom(SIZE)  # no row of another store fits this one
+        identity = os.urandom(SIZE)  # no row of another store matches it
         first = _put_schema(connection, schema, 0, identity)
         _put_world(connection, 0, float(time), compact(world_form(WorldState(schema))), identity, first)
         tips = {"changes": Tip(0, identity), "schemas": Tip(1, first), "keys": Tip(0, NOTHING), STORE: Tip(1, identity)}
@@ -311,7 +307,7 @@ def _make(path: Path, schema: Schema | None, durability: Durability, time: float
 
 
 def _put_schema(connection: sqlite3.Connection, schema: Schema, version: int, before: bytes) -> bytes:
-    """Keep a schema, with which the next change is made, after the one with that digest; its own digest."""
+    """Insert a schema after the one with the digest `before`; return its digest."""
     row = (version, schema_hash(schema), compact(schema_form(schema)))
     digest = link(before, *row)
     connection.execute("INSERT INTO schemas VALUES (?, ?, ?, ?)", (*row, digest))
@@ -331,4 +327,4 @@ def _require_text(*words: str) -> None:
             try:
                 word.encode()
             except UnicodeEncodeError:
-                raise InputError(f"{word!r} is no text that can be written to a file") from None
+                raise InputError(f"{word!r} is not a text that can be written to a file") from None

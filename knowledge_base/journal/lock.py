@@ -1,4 +1,4 @@
-"""One writer at a time: a lock that the operating system takes back from a process that dies."""
+"""One writer at a time: a lock that the operating system releases when its process dies."""
 
 from __future__ import annotations
 
@@ -12,18 +12,17 @@ from knowledge_base.journal.atomic_files import place
 from knowledge_base.journal.sidecar_files import LOCK, foreign, open_own
 
 _MARK = re.compile(rb"dsc writer +(\d+)\n")
-"""The content of a lock file, always of the same length; there is never one without it."""
+"""The content of a lock file, always of the same length; a lock file is never empty."""
 
 
 class WriterLock:
     """The right to write a store, from now until `release`.
 
-    A file beside the store holds it and names the process; it goes with the lock. Not the store itself: SQLite's own
-    locks on it would be lost whenever anyone in this process closed it. A file of that name that no store has made
-    stays as it is.
+    A sidecar file holds the lock and names the process; `release` deletes it. The store file cannot hold it, since
+    closing it in any thread would drop SQLite's own locks. A file of that name that is not a lock stays unchanged.
 
     Raises:
-        StoreError: somebody else writes, in this process or another, or the file cannot be made, or is another one.
+        StoreError: another writer has the store open, in this process or another, or the lock file cannot be made.
     """
 
     def __init__(self, store: Path) -> None:
@@ -31,13 +30,13 @@ class WriterLock:
         self._path = store.with_name(store.name + LOCK)
         self._released = False
         self._file = self._locked()
-        while not self._is_there():  # its owner deleted the file between our opening and locking it
+        while not self._is_there():  # its owner deleted the file between open and lock
             os.close(self._file)
             self._file = self._locked()
         os.pwrite(self._file, _mark(), 0)
 
     def release(self) -> None:
-        """Let others write; repeating it is fine."""
+        """Release the lock and delete its file; further calls do nothing."""
         if not self._released:
             self._released = True
             if self._is_there():
@@ -45,7 +44,7 @@ class WriterLock:
             os.close(self._file)
 
     def _is_there(self) -> bool:
-        """Whether the locked file is the one that others find."""
+        """Return whether the locked file is still the one at the path."""
         try:
             return os.path.samestat(os.fstat(self._file), self._path.lstat())
         except FileNotFoundError:
@@ -56,7 +55,7 @@ class WriterLock:
             try:
                 return self._found()
             except FileNotFoundError:
-                pass  # the first writer, or the one before has just gone
+                pass  # there was no writer, or it has just left
             try:
                 return place(self._path, _mark(), locked=True)
             except FileExistsError:
@@ -66,7 +65,12 @@ class WriterLock:
                 raise StoreError(said, place=Place(str(self._store))) from None
 
     def _found(self) -> int:
-        """The file that is there, locked; errors as of `__init__`, and `FileNotFoundError`."""
+        """Return the locked descriptor of the existing file.
+
+        Raises:
+            FileNotFoundError: there is no lock file.
+            StoreError: as for the class.
+        """
         file = open_own(self._path, self._store)
         try:
             process = self._process(file)
@@ -80,10 +84,10 @@ class WriterLock:
         return file
 
     def _process(self, file: int) -> str:
-        """The one that the file names."""
+        """Return the process number in the file."""
         found = _MARK.fullmatch(os.pread(file, 2 * len(_mark()), 0))
         if found is None:
-            raise foreign(self._path, self._store, "is no lock of a store")
+            raise foreign(self._path, self._store, "is not the lock of a store")
         return found[1].decode()
 
 

@@ -1,4 +1,4 @@
-"""The last changes of a world that is only in memory, so that one can look back a little."""
+"""The last changes of a world that is only in memory, for queries of the recent past."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from knowledge_base.journal.history import Version, Writer, gone, too_early
 from knowledge_base.world.state import WorldState
 
 MOST_KEPT = 10_000
-"""How many things, facts and numbers the kept changes name together."""
+"""Maximum number of objects, facts and numbers in the kept changes."""
 MOST_KEYS = 10_000
-"""How many idempotency keys are remembered."""
+"""Maximum number of idempotency keys."""
 
 
 class _Taken(NamedTuple):
-    """What a change took away that it does not say itself."""
+    """The content that a change removed without listing it."""
 
     values: Sequence[Content | None] = ()
-    """What its functions were worth before, in its order; `None` is not set."""
+    """The previous values of its functions, in its order; `None` is undefined."""
     types: Mapping[str, str] = {}
     departed: Mapping[Fact, Content] = {}
-    """All values about the things that it removed."""
+    """All values about the objects that it removed."""
 
 
 class _Kept(NamedTuple):
@@ -41,9 +41,9 @@ _NOTHING = _Taken()
 
 
 class MemoryHistory:
-    """A `History` that costs next to nothing: older worlds are reached by undoing changes.
+    """A `History` that costs almost nothing: undoing changes restores older worlds.
 
-    Facts that are undone to be true again come last, so the order of facts may not be that of then.
+    Restored facts come last, so the order of facts may differ from the original.
     """
 
     def __init__(self, start: Version) -> None:
@@ -56,18 +56,18 @@ class MemoryHistory:
 
     @property
     def digest(self) -> bytes:
-        """None: what is in memory is not damaged."""
+        """Empty: memory is not checked for damage."""
         return b""
 
     def newest(self) -> Version:
-        """The world it was made with."""
+        """Return the world it was made with."""
         return self._start
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:
-        """Keep a change and forget the oldest beyond `MOST_KEPT`.
+        """Keep a change and drop the oldest beyond `MOST_KEPT`.
 
         Raises:
-            StoreError: `along` is given, and there is no file for it.
+            StoreError: `along` is given, but there is no file.
         """
         if along is not None:
             raise StoreError("a knowledge base in memory has no file to write along into")
@@ -84,38 +84,30 @@ class MemoryHistory:
                 self._forget_oldest()
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """Refused.
-
-        Raises:
-            StoreError: always.
-        """
+        """Raise `StoreError`: there is no file."""
         raise StoreError("a knowledge base in memory has no file to write into")
 
     def first(self, key: str) -> Change | None:
-        """The change that was kept under that key, if it is one of the last `MOST_KEYS`."""
+        """Return the change that was kept under that key, if it is one of the last `MOST_KEYS`."""
         return self._keys.get(key)
 
     def changes(self, since: int, until: int) -> list[Change]:
-        """The changes after version `since`, up to that which made version `until`."""
+        """Return the changes after version `since` up to version `until`."""
         with self._lock:
             self._require(since)
             return [k.change for k in self._kept if since < k.change.version <= until]
 
     def oldest(self) -> int:
-        """The first version that is still kept."""
+        """Return the oldest version that is still kept."""
         with self._lock:
             return self._oldest[0]
 
     def later(self, version: int) -> list[Change]:
-        """Refused.
-
-        Raises:
-            ConflictError: always.
-        """
+        """Raise `ConflictError`: there is no other writer."""
         raise ConflictError(f"version {version} is the newest; in memory there is no other writer to follow")
 
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
-        """The world of that version: the newest with all later changes undone."""
+        """Return the world of that version: the newest with all later changes undone."""
         present = newest()
         with self._lock:
             self._require(version)
@@ -123,21 +115,21 @@ class MemoryHistory:
         return _undone(present.state, later)
 
     def version_at(self, time: float) -> int:
-        """The version that the world had at that time."""
+        """Return the version that the world had at that time."""
         with self._lock:
             oldest, begin = self._oldest
             if time < begin:
                 raise too_early(time, oldest)
             return oldest + bisect_right(self._kept, time, key=lambda k: k.change.time)
 
-    def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  nothing to write down
-        """Forget the changes up to version `keep_since`."""
+    def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  there is no file
+        """Drop the changes up to version `keep_since`."""
         with self._lock:
             while self._kept and self._oldest[0] < keep_since:
                 self._forget_oldest()
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Do nothing: there is no file."""
 
     def _require(self, version: int) -> None:
         if version < self._oldest[0]:

@@ -1,7 +1,7 @@
-"""Stores that this process cannot write, and where SQLite cannot have its own files: read all the same.
+"""Reading of stores that this process cannot write, and where SQLite cannot create its sidecar files.
 
-A store with nothing in its log is read where it is, without locks. Of another one a private copy is read, so that
-what was committed last is there as well.
+A store with an empty log is read in place, without locks. Any other store is read from a private copy with its log, so
+that the last commits are included.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.sidecar_files import INDEX, LOG, regular, unlocked
 
 _TRIES = 5
-"""How often a copy is made of a file that somebody writes meanwhile."""
+"""Number of attempts to copy a file during writes."""
 Stamp = tuple[tuple[int, int, int] | None, ...]
-"""Inode, length and time of the store's file and of its log; equal as long as nobody has written them."""
+"""Inode, length and time of the store's file and of its log; equal until either is written."""
 
 
 class _Copy(NamedTuple):
@@ -33,35 +33,35 @@ class _Copy(NamedTuple):
 
 _lock = Lock()
 _copies: list[_Copy] = []
-"""The last one: a store is asked more than once."""
+"""The last copy, since a store is mostly read more than once."""
 
 
 def is_still(path: Path) -> bool:
-    """Whether SQLite would need a file beside the store that is missing and that this process must not make."""
+    """Return whether SQLite would need to create a sidecar file that this process must not create."""
     if all(regular(path.with_name(path.name + ending)) for ending in (LOG, INDEX)):
         return False
     return not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK))
 
 
 def open_still(path: Path) -> tuple[sqlite3.Connection, Stamp | None]:
-    """A connection that is in a transaction, with the stamp that the store must have when it has been read.
+    """Return a connection in a transaction, with the stamp that the store must still have after reading.
 
-    There is no stamp for a copy.
+    A copy has no stamp.
 
     Raises:
-        StoreError: it cannot be copied.
-        sqlite3.Error: it cannot be read.
+        StoreError: the store cannot be copied.
+        sqlite3.Error: the store cannot be read.
     """
     stamp = stamp_of(path)
     log = stamp[1]
     if log is None or log[1] == 0:
         return _begun(unlocked(path)), stamp
-    with _lock:  # until SQLite has opened the log as well
+    with _lock:  # until SQLite has opened the log too
         return _begun(sqlite3.connect(_copied(path), isolation_level=None, check_same_thread=False)), None
 
 
 def stamp_of(path: Path) -> Stamp:
-    """The stamp of a store as it is now."""
+    """Return the present stamp of a store."""
     found = (regular(path), regular(path.with_name(path.name + LOG)))
     return tuple(one and (one.st_ino, one.st_size, one.st_mtime_ns) for one in found)
 
@@ -97,12 +97,12 @@ def _copied(path: Path) -> Path:
 
 
 def changed(path: Path) -> StoreError:
-    """The error for a store that was written while it was read as if nobody wrote it."""
+    """Return the error for a store that changed during a read without locks."""
     return StoreError("the store was written while it was read; read it again", place=Place(str(path)))
 
 
 def _forget() -> None:
-    """Delete the copy; after a fork it is the other process's."""
+    """Delete the copy; after a fork it belongs to the parent."""
     while _copies:
         copy = _copies.pop()
         if copy.process == os.getpid():

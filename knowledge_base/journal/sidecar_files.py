@@ -1,4 +1,4 @@
-"""The files that a store keeps beside itself: what they are called, and whether they are its own."""
+"""Sidecar files of a store: their names, and checks that they belong to it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from knowledge_base.errors import Place, StoreError
 
 LOG, INDEX, OLD_LOG, LOCK, WORLD = "-wal", "-shm", "-journal", "-lock", "-world"
 ENDINGS = (LOG, INDEX, OLD_LOG, LOCK, WORLD)
-"""What the name of a store ends in for SQLite's log and its index, the log that SQLite kept in earlier times, our lock,
-and the simulated world of a run."""
+"""Endings of the sidecar files: SQLite's log, its index and its rollback journal, the writer lock, and the simulated
+world of a run.
+"""
 
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -25,36 +26,36 @@ _KINDS = {
     stat.S_IFBLK: "a device",
 }
 _LOG_HEADS = (bytes.fromhex("377f0682002de21800001000"), bytes.fromhex("377f0683002de21800001000"), bytes(12))
-"""A log with pages of 4 KiB begins with one of these; with zeros while it has its length, but no commit."""
+"""The first bytes of a log with pages of 4 KiB; zeros in a log without a commit."""
 _INDEX_HEADS = ((3007000).to_bytes(4, "little"), (3007000).to_bytes(4, "big"), bytes(4), bytes(3), b"")
 _MAGIC = b"SQLite format 3\0"
 _SHORTEST = 512
-"""Bytes of the smallest database; what is shorter SQLite takes for an empty one."""
+"""Bytes of the smallest database; SQLite treats a shorter file as empty."""
 _INDEX_PART = 32768
-"""An index has a multiple of so many bytes; 3, for a moment, when SQLite begins it."""
+"""An index has a multiple of this number of bytes; 3, briefly, when SQLite creates it."""
 
 
 def store_owning(path: Path, in_use: Iterable[Path] = ()) -> Path | None:
-    """The store that a file is, or is kept beside, so that nothing else may be written there; `None` if it is free.
+    """Return the store that the file is, or is a sidecar of; `None` if other programs may write the path.
 
     Every SQLite file counts as a store. The file itself may be missing. Links are followed.
 
     Args:
         path: the file to be written.
-        in_use: stores of this process, which may be missing yet.
+        in_use: stores of this process, which may not exist yet.
     """
     try:
         stores = {store.resolve() for store in in_use}
         owner: Path | None = path.resolve()
         while owner is not None and owner not in stores and not is_database(owner):
             owner = _beside(owner)
-    except (OSError, RuntimeError, ValueError):  # a name that no file has: too long, a null character, circular links
+    except (OSError, RuntimeError, ValueError):  # an invalid name: too long, a null character, circular links
         return None
     return owner
 
 
 def is_database(path: Path) -> bool:
-    """Whether the file is an SQLite database, ours or not; nothing is created, changed or waited for."""
+    """Return whether the file is an SQLite database of any kind; creates, changes and locks nothing."""
     try:
         found = path.stat()
         if not stat.S_ISREG(found.st_mode):
@@ -72,20 +73,20 @@ def is_database(path: Path) -> bool:
 
 
 def unlocked(path: Path) -> sqlite3.Connection:
-    """A connection to a file as if nobody ever wrote it: it takes no locks, creates no files and ignores the log.
+    """Return a connection that takes no locks, creates no files and ignores the log.
 
-    Even the head of a store is read in this way. A file that is closed loses all locks that this process has on it;
-    SQLite knows its own.
+    Even headers are read in this way. Closing a file in Python drops all locks of this process on it; SQLite avoids
+    that for its own locks.
     """
     uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
     return sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False)
 
 
 def regular(path: Path) -> os.stat_result | None:
-    """What the system says about a regular file; `None` if nothing is there. The path leads through no link.
+    """Return the status of a regular file; `None` if it is missing. The path must not be a link.
 
     Raises:
-        StoreError: something else is there, or nobody can tell.
+        StoreError: the path has another kind of file, or its status cannot be read.
     """
     try:
         found = path.lstat()
@@ -100,13 +101,13 @@ def regular(path: Path) -> os.stat_result | None:
 
 
 def open_own(path: Path, store: Path) -> int:
-    """A descriptor of a file beside a store, to read and write: of a regular file, never of what a link leads to.
+    """Return a descriptor of a regular sidecar file, to read and write, without following a link.
 
     Raises:
-        FileNotFoundError: nothing is there.
-        StoreError: something else is there, or it cannot be opened.
+        FileNotFoundError: the file is missing.
+        StoreError: the path has another kind of file, or cannot be opened.
     """
-    regular(path)  # to open a device may do something already
+    regular(path)  # opening a device may have side effects
     try:
         file = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
@@ -115,27 +116,27 @@ def open_own(path: Path, store: Path) -> int:
         raise StoreError(f"cannot open '{path.name}': {error.strerror}", place=Place(str(store))) from None
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
-        raise foreign(path, store, "is no regular file")
+        raise foreign(path, store, "is not a regular file")
     return file
 
 
 def foreign(path: Path, store: Path, reason: str) -> StoreError:
-    """The error for a file beside a store that is not the store's."""
-    said = f"'{path.name}' beside the store {reason}; move it away, or take another name for the store"
+    """Return the error for a file at a sidecar's path that does not belong to the store."""
+    said = f"'{path.name}' next to the store {reason}; move it away, or take another name for the store"
     return StoreError(said, place=Place(str(store)))
 
 
 def require_no_strangers(store: Path, *, there: bool) -> None:
-    """Raise `StoreError` for what SQLite would take for its own beside a store, and is not.
+    """Raise `StoreError` for files that SQLite would take for the store's own, but which are not.
 
     Args:
         store: its resolved path.
-        there: whether it is there; SQLite's files without it are all that is left of another store.
+        there: whether it exists; SQLite's files without it are the rest of another store.
     """
     old_log, index, log = (store.with_name(store.name + ending) for ending in (OLD_LOG, INDEX, LOG))
     if regular(old_log) is not None:
         raise foreign(old_log, store, "is none of its files: a store has no log of that kind")
-    size = _size(index)  # asked for first: SQLite begins with the log, and deletes it last
+    size = _size(index)  # read first: SQLite begins with the log, and deletes it last
     if there and _size(log) is not None:
         _require(log, store, _head(log, 12) in (*_LOG_HEADS, b"", None), "is no log of SQLite")
         _require(index, store, size is None or size % _INDEX_PART in (0, 3), "is no index of SQLite")
@@ -152,7 +153,7 @@ def _size(path: Path) -> int | None:
 
 
 def _head(path: Path, length: int) -> bytes | None:
-    """The first bytes of a file that SQLite has no locks on; `None` if it is gone."""
+    """Return the first bytes of a file without SQLite's locks; `None` if it is missing."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
@@ -171,13 +172,13 @@ def _require(path: Path, store: Path, holds: object, reason: str) -> None:
 
 
 def _begins_as_database(path: Path) -> bool:
-    """Whether the file begins as a database does; to be asked of what SQLite cannot open: closing it loses locks."""
+    """Return whether the file has SQLite's magic; only for files that SQLite cannot open, since closing drops locks."""
     with path.open("rb") as file:
         return file.read(len(_MAGIC)) == _MAGIC
 
 
 def _beside(path: Path) -> Path | None:
-    """The file that one of that name is kept beside."""
+    """Return the file whose sidecar has that name, or `None`."""
     for ending in ENDINGS:
         name = path.name.removesuffix(ending)
         if name not in ("", path.name):

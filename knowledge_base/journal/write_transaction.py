@@ -1,6 +1,6 @@
-"""SQLite transactions of a store's writer: all that is written in a block, or nothing.
+"""SQLite transactions of a store's writer: a block is written completely or not at all.
 
-They are classes and no generators, since every change and every macrostep of a kept run passes here.
+They are classes instead of generators, since every change and every macrostep of a kept run passes here.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from knowledge_base.journal.file import Durability, reported
 from knowledge_base.journal.integrity import mark_open
 
 TIDY_UP_AFTER = 500
-"""Commits after which the file is tidied up; SQLite itself would after a thousand pages, and they take one or two."""
+"""Commits between checkpoints; SQLite's default is a thousand pages, and a commit takes one or two."""
 
 
 class WriteTransaction:
-    """A context manager that is used again and again, for one transaction after the other.
+    """A reusable context manager, one transaction at a time.
 
     Args:
-        connection: that of the one who writes.
+        connection: the writer's connection.
         path: the store.
-        durability: what a commit outlives.
-        token: of this writer, with which its first commit says that the store is open.
+        durability: the events that a commit survives.
+        token: identifies the writer; its first commit marks the store as open with it.
 
     Attributes:
-        marked: whether it has said so.
+        marked: whether the store is marked as open.
 
     Raises:
-        StoreError: on entering or leaving, it cannot be written; nothing of the block is.
+        StoreError: on entry or exit, the store cannot be written; nothing of the block is.
     """
 
     def __init__(self, connection: sqlite3.Connection, path: Path, durability: Durability, token: bytes) -> None:
@@ -42,12 +42,12 @@ class WriteTransaction:
         self._connection = connection
         self._path = path
         self._durability = durability
-        self._name = str(path)  # a `Path` takes longer
+        self._name = str(path)  # faster than a `Path`
         found = os.stat(self._name)  # noqa: PTH116
         self._file = found.st_dev, found.st_ino
-        self._cursor = connection.cursor()  # `Connection.execute` makes one each time
+        self._cursor = connection.cursor()  # `Connection.execute` makes a new one each time
         self._commits = 0
-        self._rows = 0  # ever written, when it began
+        self._rows = 0  # rows written so far, at its beginning
 
     def __enter__(self) -> sqlite3.Connection:
         self._rows = self._connection.total_changes
@@ -71,7 +71,7 @@ class WriteTransaction:
             raise
 
     def is_in_place(self) -> bool:
-        """Whether the file that is written still has its name; without it a restart finds nothing of a commit."""
+        """Return whether the file is still at its path; otherwise a restart would not find a commit."""
         try:
             found = os.stat(self._name)  # noqa: PTH116
         except OSError:
@@ -80,7 +80,7 @@ class WriteTransaction:
 
     def _roll_back(self, error: BaseException) -> None:
         with reported(self._path, "write"):
-            if self._connection.in_transaction:  # SQLite ends it by itself when the disk is full
+            if self._connection.in_transaction:  # SQLite ends it itself when the disk is full
                 self._connection.execute("ROLLBACK")
             if isinstance(error, sqlite3.Error):
                 raise error
@@ -99,25 +99,25 @@ class WriteTransaction:
         else:
             self._cursor.execute("COMMIT")
             CHECKPOINTS.leave(self._path)
-            with suppress(sqlite3.Error):  # it is committed; what cannot be tidied up now is later
+            with suppress(sqlite3.Error):  # committed; a failed checkpoint runs later
                 connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         self.marked = self.marked or changed
 
 
 class TransactionGroup:
-    """Several changes of the world in memory, written as one transaction; a context manager like that.
+    """Several changes of the world in memory, written as one transaction; a reusable context manager.
 
     Args:
-        transaction: how they are written.
+        transaction: the writer's transaction.
         place: the store, for errors.
 
     Attributes:
-        open: whether a group is being made.
+        open: whether a group is active.
         appended: whether a change is part of it.
-        behind: why the file lacks what the world in memory has, if it does.
+        behind: the reason if the file lacks changes of the world in memory.
 
     Raises:
-        StoreError: on entering, the file lacks something; or on leaving, it cannot be written.
+        StoreError: on entry, the file lacks changes; on exit, the group cannot be written.
     """
 
     def __init__(self, transaction: WriteTransaction, place: Place) -> None:
@@ -146,13 +146,13 @@ class TransactionGroup:
                 self.behind = error if isinstance(error, StoreError) else StoreError(str(error) or type(error).__name__)
 
     def require_abreast(self) -> None:
-        """Raise `StoreError` if the file lacks what the world in memory has."""
+        """Raise `StoreError` if the file lacks changes of the world in memory."""
         if self.behind is not None:
-            message = f"the store lacks the last changes, open it anew: {self.behind.message}"
+            message = f"the store lacks the last changes, open it again: {self.behind.message}"
             raise StoreError(message, place=self._place)
 
     def _require_parts(self) -> None:
-        """A part that failed takes all others with it."""
+        """Roll back all changes if one of them failed."""
         try:
             self.require_abreast()
         except StoreError as error:

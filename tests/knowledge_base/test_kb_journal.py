@@ -145,11 +145,11 @@ def test_changes_since_a_version_come_in_order_with_author_and_delta(kb):
         (lambda kb: kb.at(version=9), "version 9 is not there yet; the newest is 1"),
         (lambda kb: kb.changes(since=9), "version 9 is not there yet; the newest is 1"),
         (lambda kb: kb.compact(keep_since=9), "version 9 is not there yet; the newest is 1"),
-        (lambda kb: kb.at(version=-1), "version -1 is not kept any more; the oldest kept is 0"),
-        (lambda kb: kb.changes(since=-1), "version -1 is not kept any more; the oldest kept is 0"),
-        (lambda kb: kb.compact(keep_since=-1), "version -1 is not kept any more; the oldest kept is 0"),
+        (lambda kb: kb.at(version=-1), "version -1 is no longer kept; the oldest kept is 0"),
+        (lambda kb: kb.changes(since=-1), "version -1 is no longer kept; the oldest kept is 0"),
+        (lambda kb: kb.compact(keep_since=-1), "version -1 is no longer kept; the oldest kept is 0"),
         (lambda kb: kb.changes(1, 0), "from 1 until 0"),
-        (lambda kb: kb.changes(0, -1), "version -1 is not kept any more; the oldest kept is 0"),
+        (lambda kb: kb.changes(0, -1), "version -1 is no longer kept; the oldest kept is 0"),
         (lambda kb: kb.at(), "takes a version or a time"),
         (lambda kb: kb.at(version=1, time=1.0), "takes a version or a time"),
     ],
@@ -195,7 +195,7 @@ def test_compaction_forgets_what_was_before_and_nothing_else(kb):
     assert kb.changes(since=4) == later
     assert [kb.at(version=v).ask("(quiet)") for v in (4, 5, 6)] == [True, False, True]
     for ask in (lambda: kb.at(version=3), lambda: kb.changes(since=3)):
-        with pytest.raises(HistoryError, match="version 3 is not kept any more; the oldest kept is 4"):
+        with pytest.raises(HistoryError, match="version 3 is no longer kept; the oldest kept is 4"):
             ask()
     kb.compact()
     assert kb.changes(since=kb.version) == []
@@ -234,7 +234,7 @@ def test_in_memory_only_the_last_changes_are_kept(monkeypatch):
     assert len(kb.changes(since=2)) == 3
     assert kb.at(version=3).ask("(quiet)")
     assert not kb.at(version=2).ask("(quiet)")
-    with pytest.raises(HistoryError, match="version 1 is not kept any more; the oldest kept is 2"):
+    with pytest.raises(HistoryError, match="version 1 is no longer kept; the oldest kept is 2"):
         kb.at(version=1)
 
 
@@ -452,7 +452,7 @@ def test_others_write_along_or_not_at_all(path):
 )
 def test_who_writes_along_cannot_end_the_commit(path, along):
     with opened(path) as kb:
-        with pytest.raises(StoreError, match="what is written along neither begins nor ends a transaction"):
+        with pytest.raises(StoreError, match="rows written along with a change neither begin nor end a transaction"):
             kb.apply(QUIET, author="runs", along=along)
         assert (kb.version, kb.ask("(quiet)")) == (0, False)
         assert kb.apply(QUIET, author="a").version == 1

@@ -125,7 +125,7 @@ def test_what_the_writer_forgot_cannot_be_taken_in(writer, replica):
     writer.apply(ON_SHELF, author="writer")
     writer.apply(OFF_SHELF, author="writer")
     writer.compact()
-    with pytest.raises(HistoryError, match="version 1 is not kept any more; the oldest kept is 3"):
+    with pytest.raises(HistoryError, match="version 1 is no longer kept; the oldest kept is 3"):
         replica.refresh()
     assert replica.version == 1
 
@@ -139,7 +139,7 @@ def test_a_writer_with_a_longer_schema_is_not_followed(path):
     with KnowledgeBase.open(None, path, read_only=True) as replica:
         with KnowledgeBase.open(schema("cup can"), path) as writer:
             writer.apply(Delta(nodes={"can1": "can"}), author="writer")
-        with pytest.raises(StoreError, match="longer schema now; open the store anew"):
+        with pytest.raises(StoreError, match="extended the schema; open the store again"):
             replica.refresh()
         assert (replica.version, replica.nodes()) == (0, {})
     with KnowledgeBase.open(None, path, read_only=True) as again:
