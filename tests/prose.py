@@ -95,7 +95,6 @@ WORDS = {
 """Private or archaic words (patterns), and the words to use instead."""
 
 PENDING = {
-    "knowledge_base", "knowledge_base/cli", "knowledge_base/conditions", "knowledge_base/drawing",
     "knowledge_base/exchange", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
     "dsc", "dsc/components", "dsc/sequencer", "planning/execution",

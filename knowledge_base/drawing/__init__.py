@@ -1,4 +1,4 @@
-"""Pictures of a world: things as cards, what joins them as arrows."""
+"""Pictures of a world graph: objects as cards, facts between objects as arrows."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from knowledge_base.drawing.rendering import to_svg
 from knowledge_base.view import View
 
 MOST_DRAWN = 150
-"""Things in one picture; of more nobody sees anything, and the picture says how many are left out."""
+"""Maximum number of objects in a picture; the picture states the number of omitted ones."""
 
 
 def draw(world: View, thing: str | None = None, hops: int = 1) -> str:
-    """The world's graph as an SVG document, or the neighbourhood of a thing.
+    """Return the world graph, or the neighbourhood of an object, as an SVG document.
 
     Args:
-        world: what is drawn, present or past.
-        thing: the middle of the picture; the whole world when left out.
-        hops: how many facts away from it things are still drawn, 0 or more.
+        world: a present or past world.
+        thing: the object in the middle; by default the whole world.
+        hops: maximum distance from it in facts, 0 or more.
 
     Raises:
-        UnknownNameError: there is no such thing.
+        UnknownNameError: there is no such object.
     """
     return to_svg(arranged(picture_of(world, thing, hops, MOST_DRAWN)))

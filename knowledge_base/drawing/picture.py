@@ -1,4 +1,4 @@
-"""What a picture of a world shows: which things, what is said of each, what joins them; without any positions."""
+"""The content of a picture, without positions: objects, their facts, and the arrows between them."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from knowledge_base.spelling import value_text
 from knowledge_base.view import View
 
 MOST_LINES = 12
-"""What is said on one card at most."""
+"""Maximum number of lines on a card."""
 
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """A thing, or a fact about several things at once.
+    """An object, or a fact about several objects.
 
     Attributes:
-        key: by which links name it.
-        title: its name, or the fact's predicate.
-        kind: its type; empty for a fact.
-        lines: what is said of it alone.
-        middle: whether the picture is about it.
+        key: its name in arrows.
+        title: the object's name, or the fact's predicate.
+        kind: the object's type; empty for a fact.
+        lines: facts and values about this object alone.
+        middle: whether the picture is centred on it.
     """
 
     key: str
@@ -36,7 +36,7 @@ class Card:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """An arrow between two cards, with what it says."""
+    """An arrow between two cards, with its label."""
 
     source: str
     target: str
@@ -45,7 +45,7 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Cards and links; `left_out` counts the things that there was no room for."""
+    """Cards and arrows; `left_out` counts the omitted objects."""
 
     cards: tuple[Card, ...]
     links: tuple[Arrow, ...]
@@ -54,7 +54,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """A fact or fluent: the things in it, in order, and how it reads without them."""
+    """A fact or fluent: the objects in it, in order, and its text without them."""
 
     things: tuple[str, ...]
     predicate: str
@@ -62,10 +62,10 @@ class _Said:
 
 
 def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
-    """What to draw of the world, or of what is around a thing; at most so many things, the nearest first.
+    """Return the picture of a world, or of an object's neighbourhood; at most `most` objects, the nearest first.
 
     Raises:
-        UnknownNameError: there is no such thing.
+        UnknownNameError: there is no such object.
     """
     types = world.nodes()
     said = [_said(fact, types) for fact in world.facts()]
@@ -95,7 +95,7 @@ def _content(content: Content) -> str:
 
 
 def _around(thing: str, said: Iterable[_Said], hops: int) -> Iterator[str]:
-    """The things that so many facts lead to, the nearest first."""
+    """Yield the objects at most `hops` facts away, the nearest first."""
     beside: dict[str, dict[str, None]] = {}
     for one in said:
         for name in one.things:
@@ -118,7 +118,7 @@ def _lines(said: list[_Said]) -> Iterator[str]:
 
 
 def _links(said: Iterable[_Said]) -> tuple[tuple[Arrow, ...], list[Card]]:
-    """Facts about two things as arrows, those from one thing to the same other as one; the others as cards."""
+    """Return facts about two objects as arrows, one for each ordered pair, and all other facts as cards."""
     labels: dict[tuple[str, str], list[str]] = {}
     links: list[Arrow] = []
     relations: list[Card] = []
@@ -126,7 +126,7 @@ def _links(said: Iterable[_Said]) -> tuple[tuple[Arrow, ...], list[Card]]:
         if len(one.things) == 2:
             labels.setdefault((one.things[0], one.things[1]), []).append(f"{one.predicate} {one.rest}".strip())
             continue
-        key = f"fact {len(relations)}"  # with a blank, which no drawn thing's key can be mistaken for
+        key = f"fact {len(relations)}"  # with a blank, which no object's name contains
         relations.append(Card(key, f"{one.predicate} {one.rest}".strip(), ""))
         links += [Arrow(key, name, str(number)) for number, name in enumerate(one.things, 1)]
     joined = [Arrow(source, target, ", ".join(label)) for (source, target), label in labels.items()]

@@ -1,4 +1,4 @@
-"""Where the cards of a picture go: networkx places them by distance in the graph, then none may cover another."""
+"""Placement of a picture's cards: networkx places them by distance in the graph, then overlaps are removed."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import networkx as nx
 from knowledge_base.drawing.picture import Arrow, Card, Picture
 
 LINE = 16.0
-"""Pixels from one line of text to the next; other lengths are in pixels too."""
+"""Pixels between two lines of text; other lengths are in pixels too."""
 CHARACTER = 7.0
 PADDING = 10.0
 GAP = 46.0
-"""Room that is left between two cards, for arrows and what they say."""
+"""Space between two cards, for arrows and their labels."""
 HOP = 170.0
-"""How far apart the middles of neighbours are on average, before cards are pushed apart."""
+"""Average distance of neighbours' centres, before cards are pushed apart."""
 ROW = 1400.0
-"""How wide a picture gets before parts that nothing joins go into another row."""
+"""Width of a picture after which further connected parts go into another row."""
 FINE = 60
-"""Parts of up to so many cards are placed by Kamada and Kawai (1989), which is finer and slower than springs."""
+"""Maximum number of cards for the layout by Kamada and Kawai (1989), which is finer and slower than springs."""
 
 Point = tuple[float, float]
 
 
 @dataclass(slots=True)
 class Placed:
-    """A card with its middle and its size."""
+    """A card with its centre and its size."""
 
     card: Card
     x: float
@@ -39,7 +39,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class Arranged:
-    """A scene with positions; all of it lies between (0, 0) and (width, height)."""
+    """A picture with positions between (0, 0) and (width, height)."""
 
     cards: Mapping[str, Placed]
     links: tuple[Arrow, ...]
@@ -49,7 +49,7 @@ class Arranged:
 
 
 def arranged(scene: Picture) -> Arranged:
-    """Positions for all cards; the same scene gets the same ones."""
+    """Return positions for all cards; the same picture always gets the same ones."""
     graph: nx.Graph[str] = nx.Graph()
     graph.add_nodes_from(card.key for card in scene.cards)
     graph.add_edges_from((link.source, link.target) for link in scene.links)
@@ -64,8 +64,8 @@ def arranged(scene: Picture) -> Arranged:
 
 
 def _part(graph: nx.Graph[str], cards: list[Card]) -> list[Placed]:
-    """The cards of one connected part, its upper left corner at (0, 0)."""
-    own: nx.Graph[str] = nx.Graph()  # in the order of the cards, on which the positions depend
+    """Return the cards of one connected part, its upper left corner at (0, 0)."""
+    own: nx.Graph[str] = nx.Graph()  # positions depend on the order of the cards
     own.add_nodes_from(card.key for card in cards)
     own.add_edges_from(sorted(graph.subgraph([card.key for card in cards]).edges))
     positions = _positions(own)
@@ -95,7 +95,7 @@ def _placed(card: Card, at: Sequence[float], scale: float) -> Placed:
 
 
 def _push_apart(placed: list[Placed], rounds: int = 300) -> None:
-    """Move cards that come too near each other, along the axis where less is needed, until none do."""
+    """Move cards that are too close along the axis with the smaller overlap, until none are."""
     for _ in range(rounds):
         moved = False
         for i, one in enumerate(placed):
@@ -121,7 +121,7 @@ def _part_two(one: Placed, other: Placed) -> bool:
 
 
 def _in_rows(parts: Iterable[list[Placed]]) -> Point:
-    """Put the parts side by side in rows; gives the size of the whole."""
+    """Place the parts in rows; return the size of the whole."""
     x = y = row_height = width = 0.0
     for part in parts:
         own_width = max(one.x + one.width / 2 for one in part)

@@ -1,4 +1,4 @@
-"""An arranged picture as SVG. The colours are told apart without seeing red and green apart (Okabe and Ito 2008)."""
+"""Rendering of an arranged picture as SVG, with colours for colour-blind readers (Okabe and Ito 2008)."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _COLOURS = (
     ("#f3effc", "#5b3fa0"),
     ("#f6f8fb", "#475569"),
 )
-"""Fill and border, a pair for each type; the last one for those that are left."""
+"""Fill and border, a pair for each type; further types share the last one."""
 _RELATION = ("#ffffff", "#64748b")
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 def to_svg(picture: Arranged) -> str:
-    """The picture as one SVG document with a background of its own."""
+    """Return the picture as one SVG document with an opaque background."""
     note = f"{picture.left_out} more things are not drawn" if picture.left_out else ""
     width, height = picture.width + 2 * MARGIN, picture.height + 2 * MARGIN + LINE * bool(note)
     width = max(width, len(note) * 7 + 2 * MARGIN)
@@ -92,13 +92,13 @@ def _arrow(link: Arrow, picture: Arranged) -> Iterator[str]:
 
 def _label(link: Arrow, picture: Arranged) -> Iterator[str]:
     (x1, y1), (x2, y2) = _ends(link, picture)
-    along = 0.3 if _is_both_ways(link, picture) else 0.5  # the two labels of a pair do not meet
+    along = 0.3 if _is_both_ways(link, picture) else 0.5  # the labels of an opposite pair must not meet
     x, y = x1 + (x2 - x1) * along, y1 + (y2 - y1) * along
     yield f'<text class="label" x="{_n(x)}" y="{_n(y + 4)}">{_x(link.label)}</text>'
 
 
 def _ends(link: Arrow, picture: Arranged) -> tuple[tuple[float, float], tuple[float, float]]:
-    """From border to border; two arrows between the same cards run side by side."""
+    """Return both ends of an arrow at the cards' borders; opposite arrows are shifted apart."""
     source, target = picture.cards[link.source], picture.cards[link.target]
     dx, dy = target.x - source.x, target.y - source.y
     length = hypot(dx, dy) or 1.0
@@ -113,7 +113,7 @@ def _is_both_ways(link: Arrow, picture: Arranged) -> bool:
 
 
 def _border(one: Placed, dx: float, dy: float) -> tuple[float, float]:
-    """Where a line from the card's middle in that direction leaves it."""
+    """Return the point where a line from the card's centre in that direction crosses its border."""
     share = min(
         one.width / 2 / abs(dx) if dx else float("inf"),
         one.height / 2 / abs(dy) if dy else float("inf"),
