@@ -1,4 +1,4 @@
-"""`dsc kb`: a world model on the command line; the commands import what they run, so that help stays light."""
+"""`dsc kb`: a world model on the command line; commands import their modules on use, so that help stays light."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands of `dsc kb`, put together."""
+"""The app of `dsc kb` with its commands."""
 
 from __future__ import annotations
 

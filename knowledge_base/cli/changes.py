@@ -37,7 +37,7 @@ def new(
         typer.Option(metavar="PREDICATE", help="Only one of its facts that differ in the last argument alone is true."),
     ] = None,
 ) -> None:
-    """Make an empty store whose schema is that of a PDDL domain."""
+    """Make an empty store with the schema of a PDDL domain."""
     from knowledge_base.store import KnowledgeBase
     from knowledge_base.world.schema import Schema
 
@@ -69,7 +69,7 @@ def retract(
     key: Key = None,
     json: Json = False,
 ) -> None:
-    """Take facts back, or things with all that is about them: all of it or, with a mistake, nothing."""
+    """Retract facts, or remove things with all facts about them: all of it or, with a mistake, nothing."""
     from knowledge_base.statements import retracted
 
     _change(store, facts, retracted, author, expect, key, as_json=json)
@@ -95,7 +95,7 @@ def compact(
 
 
 def _size(store: Path) -> int:
-    """In bytes, with what SQLite has beside the file and will put into it."""
+    """Return the size in bytes, with SQLite's log."""
     log = store.with_name(store.name + "-wal")
     return store.stat().st_size + (log.stat().st_size if log.exists() else 0)
 

@@ -1,4 +1,4 @@
-"""Commands that bring a world in, take it out, and draw it."""
+"""Commands that import, export and draw a world."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class ExchangeFormat(StrEnum):
-    """What a world is written as."""
+    """The format of an exported world."""
 
     JSON = "json"
     PDDL = "pddl"
@@ -31,7 +31,7 @@ def import_(
     author: Annotated[str | None, typer.Option(help="Who says so.  [default: SOURCE]")] = None,
     domain: Domain = None,
 ) -> None:
-    """Tell a store all that another world says, as one change; what the store knows already stays."""
+    """Add the content of another world to a store, as one change; the store's own content stays."""
     from knowledge_base.facts import Delta
 
     with opened(source, domain) as (other, _), writable(store) as kb:
@@ -76,7 +76,7 @@ def draw(
 
 
 def _output(to: Path, source: Path, domain: Path | None) -> Output:
-    """Where it goes, which must be another place than it comes from."""
+    """Return the output, which must not be the input."""
     from knowledge_base.output_files import Output
 
     return Output(to, "--to", source, domain or domain_of(source))

@@ -1,4 +1,4 @@
-"""Commands that tell what happened to a store, and what is happening."""
+"""Commands that list a store's past changes and follow new ones."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ Pattern = Annotated[
     str | None, typer.Argument(metavar="[PATTERN]", help="Only changes of this, e.g. '(on ?x table)' or '(weight ?x)'.")
 ]
 TOGETHER = 1000
-"""Changes that are read together."""
+"""Number of changes that are read together."""
 POLL_S = 0.1
-"""How often a store that others write is looked at."""
+"""Seconds between two looks at a store that other processes write."""
 
 
 def history(
@@ -40,7 +40,7 @@ def history(
     until: Annotated[int | None, typer.Option(metavar="VERSION", help="Only changes up to this one.")] = None,
     json: Json = False,
 ) -> None:
-    """List what changed, when, and who did it."""
+    """List each change with its time and author."""
     with opened_store(store) as kb:
         touches = _touches(kb, pattern)
         changes = filter(touches, _changes(kb, kb.oldest if since is None else since, until))
@@ -52,7 +52,7 @@ def history(
 
 
 def check(store: Store, json: Json = False) -> None:
-    """Look whether a store's knowledge is what was written into it; all of it is read. Runs: `dsc runs check`."""
+    """Check that a store's knowledge is complete and unchanged; reads all of it. For runs see `dsc runs check`."""
     from knowledge_base.journal.archive import Archive
 
     archive = Archive(store.resolve(), None)
@@ -88,9 +88,9 @@ def watch(
 
 
 def _changes(kb: KnowledgeBase, since: int, until: int | None) -> Iterator[Change]:
-    """The changes of a store, read some at a time."""
+    """Yield the changes of a store, in several reads."""
     last = kb.version if until is None else until
-    kb.changes(last, last)  # a mistake comes before the first change
+    kb.changes(last, last)  # report a wrong version before the first change
     yield from kb.changes(since, min(last, since + TOGETHER))
     for first in range(since + TOGETHER, last, TOGETHER):
         yield from kb.changes(first, min(last, first + TOGETHER))

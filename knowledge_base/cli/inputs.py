@@ -1,4 +1,4 @@
-"""What a command is asked to look into or to change: a store, a problem, a world in JSON, a scenario."""
+"""Inputs of commands: a store, a PDDL problem, a world in JSON, or a scenario."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ Domain = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
-_MARK = b"\xef\xbb\xbf"  # of byte order, in UTF-8
+_MARK = b"\xef\xbb\xbf"  # byte order mark, in UTF-8
 
 readers: dict[str, Callable[[Path], KnowledgeBase]] = {}
-"""More kinds of sources by the ending of their file, e.g. `.yaml`; upper rooms add theirs."""
+"""Readers of further sources by file ending, e.g. `.yaml`; upper rooms register theirs."""
 
 
 class Opened(NamedTuple):
-    """A world that was opened, and the problem that it is the start of, if it is one."""
+    """An opened world, and the problem whose initial state it is, if any."""
 
     kb: KnowledgeBase
     problem: ProblemText | None = None
@@ -38,10 +38,10 @@ class Opened(NamedTuple):
 
 @contextmanager
 def opened(source: Path, domain: Path | None = None) -> Iterator[Opened]:
-    """Any source, to be looked into; a store may be written by others meanwhile.
+    """Open any source for reading; other processes may write a store meanwhile.
 
     Raises:
-        InputError: there is no such file, or it is none of these.
+        InputError: the file is missing, or of none of these kinds.
     """
     found = _opened(source, domain)
     with found.kb:
@@ -50,10 +50,10 @@ def opened(source: Path, domain: Path | None = None) -> Iterator[Opened]:
 
 @contextmanager
 def opened_store(store: Path) -> Iterator[KnowledgeBase]:
-    """A store, and nothing else, to be looked into: only a store has a past.
+    """Open a store for reading; other sources have no past.
 
     Raises:
-        StoreError: it is not there, or is no store.
+        StoreError: the file is missing, or not a store.
     """
     from knowledge_base.store import KnowledgeBase
 
@@ -63,21 +63,21 @@ def opened_store(store: Path) -> Iterator[KnowledgeBase]:
 
 @contextmanager
 def writable(store: Path) -> Iterator[KnowledgeBase]:
-    """A store that is there, to be changed.
+    """Open an existing store for writing.
 
     Raises:
-        StoreError: it is not there, is no store, or somebody else is writing it.
+        StoreError: the file is missing or not a store, or another writer has it open.
     """
     from knowledge_base.store import KnowledgeBase
 
     with KnowledgeBase.open(None, store, read_only=True):
-        pass  # what is no store gets the message of a reader, and no file is made
+        pass  # another kind of file gets the reader's message, and no file is made
     with KnowledgeBase.open(None, store) as kb:
         yield kb
 
 
 def domain_of(problem: Path) -> Path:
-    """Where a problem's domain is, if nobody names it."""
+    """Return the default path of a problem's domain."""
     return problem.parent / "domain.pddl"
 
 
@@ -91,7 +91,7 @@ def _opened(source: Path, domain: Path | None) -> Opened:
         return Opened(KnowledgeBase.open(None, source, read_only=True))
     if source.suffix in readers:
         return Opened(readers[source.suffix](source))
-    data = read_bytes(source, MAX_WORLD_BYTES)  # once: a pipe gives nothing a second time
+    data = read_bytes(source, MAX_WORLD_BYTES)  # once, since a pipe can be read only once
     if data.removeprefix(_MARK).lstrip()[:1] == b"{":
         return Opened(KnowledgeBase.from_json(decoded(data, source), source=str(source)))
     require_size(len(data), MAX_BYTES, str(source))
@@ -115,5 +115,5 @@ def _beside(problem: Path) -> Path:
 
     domain = domain_of(problem)
     if not domain.exists():
-        raise InputError(f"there is no '{domain}' beside the problem; name its domain with --domain")
+        raise InputError(f"there is no '{domain}' next to the problem; name its domain with --domain")
     return domain

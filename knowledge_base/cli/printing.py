@@ -1,4 +1,4 @@
-"""What the commands print: tables for people, JSON for programs, changes and truth as lines."""
+"""Output of commands: tables for people, JSON for programs, changes and explanations as lines."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ if TYPE_CHECKING:
     from knowledge_base.language.evaluation import Explanation
 
 MOST_ROWS = 5000
-"""Of a table, whose columns are as wide as their widest cell: so all rows must be there before the first is printed."""
+"""Rows of one table. Columns are as wide as their widest cell, so that all rows must exist before the first is
+printed.
+"""
 
 
 def print_json(said: Any) -> None:
-    """One JSON value, for programs."""
+    """Print one JSON value."""
     import json
 
     typer.echo(json.dumps(said, indent=2))
 
 
 def print_json_list(items: Iterable[Any], said: Mapping[str, Any] | None = None, name: str = "") -> None:
-    """What `print_json` prints of the list, or of `{**said, name: [*items]}`, but each item when it comes."""
+    """Print the list, or `{**said, name: [*items]}`, as `print_json` does, but each item as it arrives."""
     import json
     import sys
 
@@ -41,7 +43,7 @@ def print_json_list(items: Iterable[Any], said: Mapping[str, Any] | None = None,
 
 
 def print_line(said: Mapping[str, Any]) -> None:
-    """One JSON object on a line of its own, for programs that read while it is going on."""
+    """Print one JSON object on a line and flush, for programs that follow the output."""
     import json
     import sys
 
@@ -50,7 +52,7 @@ def print_line(said: Mapping[str, Any]) -> None:
 
 
 def print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """A table, as wide as the terminal or what it goes to lets it be; after `MOST_ROWS` rows another one begins."""
+    """Print a table up to the width of the terminal or output; after `MOST_ROWS` rows another one begins."""
     rest = iter(rows)
     _print_table(head, islice(rest, MOST_ROWS))
     while some := list(islice(rest, MOST_ROWS)):
@@ -73,12 +75,12 @@ def _print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
 
 
 def change_form(change: Change) -> dict[str, Any]:
-    """A change as JSON data: version, time in seconds, author, and what became different as text."""
+    """Return a change as JSON data: version, time in seconds, author, and the content as text."""
     return {"version": change.version, "time": change.time, "author": change.author, **delta_form(change.delta)}
 
 
 def delta_form(delta: Delta) -> dict[str, Any]:
-    """What became different, in the language."""
+    """Return the content of a change as JSON data, with facts in PDDL."""
     return {
         "objects": dict(delta.nodes),
         "removed_objects": list(delta.removed_nodes),
@@ -89,7 +91,7 @@ def delta_form(delta: Delta) -> dict[str, Any]:
 
 
 def delta_lines(delta: Delta) -> Iterator[str]:
-    """What became different, each with a sign in front: `+ (on cup1 table)`."""
+    """Yield the content of a change as lines, each after a sign: `+ (on cup1 table)`."""
     from knowledge_base.spelling import value_text
 
     yield from (f"- {value_text(name)} and all about it" for name in delta.removed_nodes)
@@ -101,15 +103,15 @@ def delta_lines(delta: Delta) -> Iterator[str]:
 
 
 def clock_time(seconds: float) -> str:
-    """Seconds since 1970 as people and computers read them: `2026-11-21T16:40:03.250Z`."""
+    """Return seconds since 1970 as ISO 8601: `2026-11-21T16:40:03.250Z`."""
     try:
         return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-    except (OverflowError, ValueError, OSError):  # a clock of its own, e.g. simulated time far ahead
+    except (OverflowError, ValueError, OSError):  # another clock, e.g. simulated time far ahead
         return f"{seconds:g} s"
 
 
 def explanation_lines(why: Explanation, depth: int = 0, *, deciding: bool = True) -> Iterator[str]:
-    """The tree of a condition, a line each; an arrow leads to what decides."""
+    """Yield the tree of a condition, a line for each part; arrows lead to the deciding one."""
     indent = "" if depth == 0 else "   " * (depth - 1) + ("-> " if deciding else "   ")
     detail = f"   [{why.detail}]" if why.detail else ""
     yield f"{indent}{'true ' if why.truth else 'false'}  {why.text}{detail}"

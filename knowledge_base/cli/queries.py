@@ -1,4 +1,4 @@
-"""Commands that look at a world as it is, or as it was."""
+"""Commands that query a present or past world."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Why = Annotated[bool, typer.Option("--why", help="Show each part with its truth,
 Limit = Annotated[int | None, typer.Option("--limit", min=1, help="Give so many answers at most, and look no further.")]
 Seconds = Annotated[float | None, typer.Option("--seconds", min=0.0, help="Give the question up after so long.")]
 NO = 1
-"""Exit status of an answer `no`; 2 is a mistake, as for every command."""
+"""Exit status of the answer `no`; 2 is a mistake, as for every command."""
 
 
 def query(
@@ -62,7 +62,7 @@ def ask(
     seconds: Seconds = None,
     json: Json = False,
 ) -> None:
-    """Say whether EXPR is true. Exit status: 0 yes, 1 no."""
+    """Answer whether EXPR is true. Exit status: 0 yes, 1 no."""
     from knowledge_base.cli.printing import explanation_lines
     from knowledge_base.language.question_bounds import Bounds
 
@@ -83,7 +83,7 @@ def show(
     domain: Domain = None,
     json: Json = False,
 ) -> None:
-    """Show a world's things, facts and what functions are worth, and a problem's goal; or all that is about THING."""
+    """Show a world's things, facts and function values, and a problem's goal; or everything about THING."""
     with opened(source, domain) as (kb, problem):
         _show(kb, problem, thing, as_json=json)
 
@@ -97,7 +97,7 @@ def at(
     seconds: Seconds = None,
     json: Json = False,
 ) -> None:
-    """Show a store's world of then, or ask it."""
+    """Show a past world of a store, or query it."""
     from knowledge_base.cli.versions import moment
 
     with opened_store(store) as kb:
@@ -117,7 +117,7 @@ def _answer(
     *,
     as_json: bool,
 ) -> None:
-    """Print the answers as they are found; nobody has them all in memory."""
+    """Print the answers as they are found, without a list of all in memory."""
     from itertools import chain, islice
 
     from knowledge_base.language.expression import variables_in_order
@@ -127,7 +127,7 @@ def _answer(
     answers = world.stream(condition, params, bounds=Bounds(seconds=seconds))
     answers = islice(answers, limit)
     names = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
-    first = list(islice(answers, 1))  # what is wrong with the question comes before anything is printed
+    first = list(islice(answers, 1))  # an error in the query is reported before any output
     answers = chain(first, answers)
     if as_json:
         print_json_list(answers, {"variables": names, "holds": bool(first)}, "answers")
@@ -171,7 +171,7 @@ def _parsed(expression: str) -> Expression:
 
 
 def _params(said: list[str] | None) -> dict[str, Value]:
-    """`x=VALUE` as bindings; values are written as in the language."""
+    """Return the bindings of `x=VALUE` options; values are written as in the language."""
     from knowledge_base.errors import InputError
     from knowledge_base.language.expression import Constant
     from knowledge_base.language.parser import parse_term

@@ -1,4 +1,4 @@
-"""Moments of a store's past, as people write them."""
+"""Versions and times of a store's past, in command arguments."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import TypedDict
 from knowledge_base.errors import InputError
 
 _MOST_DIGITS = 15
-"""Of a version: more than any store has, and no more than are read in no time."""
+"""Maximum number of digits of a version: more than any store needs, and few enough to parse immediately."""
 
 
 class Moment(TypedDict, total=False):
-    """What `KnowledgeBase.at` takes: one of the two."""
+    """The arguments of `KnowledgeBase.at`: either of the two."""
 
     version: int
     time: float
 
 
 def moment(text: str) -> Moment:
-    """A version (`12`) or a time (ISO 8601; without a time zone it is local).
+    """Return a version (`12`) or a time (ISO 8601; local without a time zone).
 
     Raises:
-        InputError: it is neither.
+        InputError: the text is neither.
     """
     if text.isdecimal() and len(text) <= _MOST_DIGITS:
         return {"version": int(text)}
