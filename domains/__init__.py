@@ -1,1 +1,1 @@
-"""Ready worlds: PDDL, plots, skills and a simulation each."""
+"""Ready worlds, each with a PDDL domain, plots, components and a simulation."""

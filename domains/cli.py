@@ -1,4 +1,4 @@
-"""The command `dsc`: each room brings its own commands, this one puts them together and runs ready worlds."""
+"""The command `dsc`: mounts the commands of each room, and runs ready worlds."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
 
 BAD_INPUT, NOT_WRITTEN, NOBODY_READS = 2, 74, 141
-"""Exit statuses of every command; the last two are EX_IOERR of sysexits.h and what a shell gives for a broken pipe."""
+"""Exit statuses of every command; the last two are EX_IOERR of sysexits.h and a shell's status for a broken pipe."""
 
 NO_FILE = frozenset({errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EACCES, errno.EPERM})
-"""Errors of names that lead to no file, or to one that is somebody else's."""
+"""Errors of paths that lead to no file, or to one without access."""
 
 
 class _Commands(TyperGroup):
-    """The commands, which end when nobody reads any more what they print."""
+    """The commands, which end when the reader of their output closes the pipe."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -68,14 +68,14 @@ WORLDS = ("clean-up-table",)
 
 
 class Durability(StrEnum):
-    """What a kept run outlives: the death of the process, or a power cut too."""
+    """The events that a kept run survives: the death of the process, or a power cut too."""
 
     process = "process"
     power = "power"
 
 
 def _scenario(path: Path) -> KnowledgeBase:
-    """What the robot knows when it starts into the scenario: `dsc kb` looks into it."""
+    """Return the robot's knowledge at the start of the scenario, for `dsc kb`."""
     from domains.clean_up_table.deployment import deploy
     from domains.clean_up_table.scenario import Scenario
 
@@ -167,8 +167,7 @@ def run(
 def _viewed(
     deployed: CleanUpTable, follow: partial[Report], port: int, *, opens: bool, control: bool, wait: bool
 ) -> Report:
-    """Run with a page in the browser, which stays when the run has ended."""
-    from dsc.cli.view import page, until_interrupt, viewer_installed
+    """Run with a page in the browser, which stays open after the run."""
     from dsc.trace import header
 
     viewer_installed()
@@ -194,7 +193,7 @@ def _followed(
     trace: Output | None,
     prepare: Callable[[Sequencer], None] | None = None,
 ) -> Report:
-    """Run, showing progress unless `quiet`, and writing the trace."""
+    """Run, with progress unless `quiet`, and write the trace."""
     from contextlib import ExitStack
 
     from rich.console import Console
@@ -229,9 +228,9 @@ def _print(report: Report, *, as_json: bool) -> None:
 
 
 def main() -> None:
-    """The entry point: what people got wrong becomes one message and exit status 2, never a traceback."""
+    """The entry point: bad input becomes one message and exit status 2, never a traceback."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # a terminal may not have the letters that a file has
+        if isinstance(stream, TextIOWrapper):  # a terminal may lack characters that a file has
             stream.reconfigure(errors="backslashreplace")
     try:
         _command()
@@ -252,7 +251,7 @@ def main() -> None:
 def _command() -> None:
     as_json = "--json" in sys.argv
     try:
-        status = app(standalone_mode=not as_json)  # by itself, it tells people what is wrong with their words
+        status = app(standalone_mode=not as_json)  # without --json, Typer reports wrong words itself
     except Exception as error:
         from knowledge_base.errors import InputError
 
@@ -265,18 +264,18 @@ def _command() -> None:
 
 
 def _unusable(error: Exception) -> InputError | None:
-    """What is wrong with a file that a word of the command names, if the operating system refused that."""
+    """Return an error for a path in the command's words that the operating system refused, or `None`."""
     from knowledge_base.errors import InputError
 
     if isinstance(error, RuntimeError) and isinstance(error.__context__, OSError):
-        error = error.__context__  # Python 3.11 says so where links lead to each other
+        error = error.__context__  # Python 3.11 raises this for circular links
     if not isinstance(error, OSError) or error.errno not in NO_FILE or error.filename is None:
         return None
     return InputError(f"cannot use '{error.filename}': {error.strerror}", found=str(error.filename))
 
 
 def _misused(error: Exception) -> Exception:
-    """What is wrong with the words of a command, for programs; any other error as it is."""
+    """Return an error for wrong words of a command, for programs; other errors unchanged."""
     from knowledge_base.errors import InputError
 
     message = getattr(error, "format_message", None)
@@ -288,7 +287,7 @@ def _misused(error: Exception) -> Exception:
 
 
 def _tell(error: InputError, *, as_json: bool) -> None:
-    """On standard error for people, on standard output for programs, which look for their answer there."""
+    """Print the error on standard error, or with --json on standard output."""
     import json
 
     from knowledge_base.errors import Place
@@ -303,9 +302,9 @@ def _tell(error: InputError, *, as_json: bool) -> None:
 
 
 def _drop_unwritten() -> None:
-    """What could not be written is not tried again when Python ends, which would complain once more."""
+    """Discard unwritten output, so that Python does not report a second error at its end."""
     try:
-        if sys.stdout is not None:  # as it is when started without one
+        if sys.stdout is not None:  # it is `None` when started without one
             sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

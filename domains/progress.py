@@ -1,4 +1,4 @@
-"""A run as people follow it: lines of text anywhere, and on a terminal a line that shows what is going on."""
+"""Progress of a run for people: lines of text anywhere, and a status line on a terminal."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _STEP = re.compile(r"step_\d+")
 
 
 def _working(scope: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The states in which something is done: those with a plot inside, here, in composites and in regions."""
+    """Return the states with a plot as content, inside composites and regions too."""
     found: dict[str, dict[str, Any]] = {}
     for name, state in scope["states"].items():
         inner = [state] if "states" in state else state.get("regions", {}).values()
@@ -41,7 +41,7 @@ def _working(scope: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 class PlainProgress:
-    """A listener that writes one line for each thing worth knowing."""
+    """A listener that writes one line for each notable record."""
 
     def __init__(self, write: Callable[[str], None]) -> None:
         self._write = write
@@ -49,7 +49,7 @@ class PlainProgress:
         self._stages: set[str] = set()
 
     def __call__(self, record: Record) -> None:
-        """Take one record."""
+        """Write the lines of one record."""
         if record.type == "plot":
             self._learn_steps(record.data["plot"])
         for line in self.lines(record):
@@ -62,7 +62,7 @@ class PlainProgress:
             self._steps = {name: state["about"] for name, state in working.items() if _STEP.fullmatch(name)}
 
     def lines(self, record: Record) -> list[str]:
-        """What a record has to say to people, if anything."""
+        """Return the lines for a record; empty for most types."""
         if record.type in _SAYS:
             return [_SAYS[record.type](record.data)]
         if record.type == "end" and record.data["problem"]:
@@ -87,8 +87,8 @@ class LiveProgress(PlainProgress):
 
     Args:
         console: the terminal.
-        left: how much is still to be done.
-        tally: counts the run's plans; must hear each record before this listener does.
+        left: returns the number of items left.
+        tally: counts the run's plans; it must receive each record before this listener does.
     """
 
     def __init__(self, console: Console, left: Callable[[], int], tally: Tally) -> None:
@@ -104,11 +104,11 @@ class LiveProgress(PlainProgress):
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take it away."""
+        """Remove the status line."""
         self._live.stop()
 
     def __call__(self, record: Record) -> None:
-        """Take one record."""
+        """Write the lines of one record, and update the status line."""
         super().__call__(record)
         if record.type == "plan.asked":
             self._doing = "planning"

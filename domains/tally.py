@@ -1,4 +1,4 @@
-"""Counts what happens in a run, from its records alone."""
+"""Counts of a run, from its records alone."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Tally:
     Attributes:
         outcomes: events that skills ended with.
         recoveries: rules that answered, by their label.
-        candidates: plots that dynamic states chose; planning is not among them.
-        plans: plans that were found; `replans`: how often a plan under way was given up for a new one.
-        excluded: steps that plans did without for a while, since they had failed.
+        candidates: plots that dynamic states chose, without planning.
+        plans: plans that were found; `replans`: plans that replaced a running one.
+        excluded: steps that plans avoided for a while after a failure.
         seconds: run time of the last record.
     """
 

@@ -97,8 +97,6 @@ WORDS = {
 PENDING = {
     "knowledge_base/exchange", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
-    "dsc", "dsc/components", "dsc/sequencer", "planning/execution",
-    "domains", "domains/clean_up_table",
     "benchmarks", "benchmarks/knowledge", "benchmarks/peers",
 }  # fmt: skip
 """Rooms that are not rewritten yet: pages, and folders without the folders inside. The list only shrinks."""
