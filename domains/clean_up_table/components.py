@@ -1,7 +1,7 @@
-"""The robot of clean-up-table as components over one world: base, arm, camera, voice (S0.7, S0.8).
+"""The robot's components over one world: base, arm, camera, voice (S0.7, S0.8).
 
-A skill takes its time first and acts on the world after it, in one go: a call that is cancelled on the way
-changes nothing. It hands over what the robot observes, never the world's truth.
+A skill first waits for its duration and then acts on the world in one call, so that a cancelled call changes nothing.
+Its outcome carries the robot's observations, never the true state of the world.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["Arm", "Base", "Camera", "Voice", "initial_knowledge"]
 
 
 def seconds(default: float) -> Parameter:
-    """How long something takes; the integrator knows the robot, plots cannot make it faster."""
+    """Return a duration parameter in seconds, set by the integrator's profile and not by plots."""
     return Parameter("number", default=default, least=0.1, most=60.0, changed_by="profile")
 
 
@@ -34,7 +34,7 @@ ITEM_IN = {"item": "item", "carrier": "item", "surface": "surface"}
 CARRIER_AT = {"carrier": "item", "surface": "surface"}
 NOT_POSSIBLE: dict[str, str | None] = {"reason": None}
 ONCE: AfterCrash = "same_id"
-"""The world does each id once."""
+"""The world executes each action id once."""
 
 drives = skill(
     outcomes={
@@ -46,7 +46,7 @@ drives = skill(
     types={"to": "place"},
     after_crash=ONCE,
 )
-"""What every base says of driving."""
+"""The declaration of every base's `drive`."""
 
 picks_up = skill(
     outcomes={
@@ -59,7 +59,7 @@ picks_up = skill(
     types=ITEM_AT,
     after_crash=ONCE,
 )
-"""What every arm says of picking up."""
+"""The declaration of every arm's `pick_up`."""
 
 takes_out = skill(
     outcomes={
@@ -72,7 +72,7 @@ takes_out = skill(
     types=ITEM_IN,
     after_crash=ONCE,
 )
-"""What every arm says of taking out."""
+"""The declaration of every arm's `take_out`."""
 
 recognises = skill(
     outcomes={
@@ -83,15 +83,15 @@ recognises = skill(
     types={"surface": "surface"},
     after_crash=ONCE,
 )
-"""What every camera says of recognising."""
+"""The declaration of every camera's `recognise`."""
 
 
 class TablePart(Component):
-    """A part of the robot, which acts on the world.
+    """A component of the robot that acts on the world.
 
     Args:
-        world: remembers what was done in it.
-        name: how charts address the part.
+        world: keeps the results of its actions.
+        name: the component's name in charts.
     """
 
     def __init__(self, world: TableWorld, name: str | None = None) -> None:
@@ -99,7 +99,7 @@ class TablePart(Component):
         self.world = world
 
     async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
-        """Nothing goes on by itself here; what was done is done."""
+        """Return the outcome of an executed action, or `None`: no action runs on in the world."""
         self.world.catch_up()
         results = [self.world.done.get(one) for one in (again(action_id), action_id)]
         return next((Ended(outcome_of(result)) for result in results if result is not None), None)
@@ -183,14 +183,14 @@ class Arm(TablePart):
 
 
 class Camera(TablePart):
-    """The camera, which reports what it sees; what it should have seen is the plots' business."""
+    """The camera; it reports visible items only, and plots compare these with their expectations."""
 
     name = "camera"
     declares: ClassVar[Mapping[str, Parameter]] = {"recognising": seconds(2.0), "looking": seconds(1.5)}
 
     @recognises
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
-        """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
+        """Recognise the items on a surface; `count` is their number, without items inside others."""
         await call.clock.sleep(self.parameters["recognising"])
         return outcome_of(self.world.recognise(call.action_id, surface))
 
@@ -200,7 +200,7 @@ class Camera(TablePart):
         after_crash=ONCE,
     )
     async def look_into(self, call: SkillCall, carrier: str, surface: str) -> Outcome:
-        """Look into a carrier on a surface, giving up one unit of its room; `gone` names the carrier."""
+        """Look into a carrier on a surface, which closes one unit of its room; `gone` names the carrier."""
         await call.clock.sleep(self.parameters["looking"])
         return outcome_of(self.world.look_into(call.action_id, carrier, surface))
 
@@ -221,11 +221,11 @@ class Voice(TablePart):
 
 
 def again(action_id: str) -> str:
-    """The id of a second attempt within one call: what happens to it is another draw."""
+    """Return the id of a second attempt within one call, for which faults are drawn again."""
     return f"{action_id}/again"
 
 
 def outcome_of(result: Result) -> Outcome:
-    """What a skill ends with when the world has answered."""
+    """Return the outcome of a skill for the world's result."""
     attributes = {k: list(v) if isinstance(v, tuple) else v for k, v in result.attributes.items()}
     return Outcome(result.outcome, attributes, learned(result))

@@ -1,4 +1,4 @@
-"""The clean-up-table robot, wired: simulated world, skills, knowledge, plots, planner."""
+"""The clean-up-table robot, wired: simulated world, components, knowledge, plots, planner."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ MAIN_PLOT = "clean_up_table"
 
 @dataclass(slots=True)
 class CleanUpTable:
-    """A table to be cleared, with everything that is needed to clear it.
+    """A table to be cleared, with the robot program that clears it.
 
     Attributes:
         world: the simulated truth.
         executive: the robot program over it.
-        tally: counts what happens.
-        resumes: whether there is a run to go on with.
-        profile: what the robot was made after; `None` is the usual one.
+        tally: counts the records of the run.
+        resumes: whether `run` resumes an interrupted run.
+        profile: the robot's settings profile; `None` is the default robot.
     """
 
     world: TableWorld
@@ -59,29 +59,29 @@ class CleanUpTable:
     profile: Profile | None = None
 
     def __enter__(self) -> Self:
-        """Itself; `close` at the end."""
+        """Return the deployment; `close` runs at the end of the block."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """`close`."""
+        """Call `close`."""
         self.close()
 
     def close(self) -> None:
-        """End the planner's process, if there is one of its own, and give back the files."""
+        """Close the executive and the world's file."""
         self.executive.close()
         if isinstance(self.world, DurableWorld):
             self.world.close()
 
     def run(self, *, simulated: bool = True, prepare: Callable[[Sequencer], None] | None = None) -> Report:
-        """Clear the table and report; the report says so if the operator ends the run (Ctrl-C).
+        """Clear the table and return the report, also if the operator ends the run (Ctrl-C).
 
         Args:
-            simulated: whether time jumps from event to event; a run that is resumed goes on as it began.
+            simulated: time jumps from event to event; a resumed run keeps its kind of time.
             prepare: called with the sequencer before the run starts.
 
         Raises:
             StoreError: the store cannot be read or written.
-            ChangedError: a run is to be resumed with other plots, or another domain.
+            ChangedError: plots or domain differ from those of the run to resume.
         """
         started = time.perf_counter()
 
@@ -103,12 +103,12 @@ class CleanUpTable:
             more(sequencer)
 
     def _kept(self) -> dict[str, Any]:
-        """The header, and what a robot is made after, for who resumes the run."""
+        """Return the header with the profile, from which a resumed run is deployed."""
         settings = {} if self.profile is None else {"settings": self.profile.model_dump(by_alias=True)}
         return {**self.header(), **settings}
 
     def header(self) -> dict[str, Any]:
-        """What determines a run, for the first line of its trace."""
+        """Return the inputs that determine a run, for the first line of its trace."""
         plots = "".join(sorted(plot.digest for plot in self.executive.library))
         return {
             "run": NAME,
@@ -130,27 +130,27 @@ def deploy(
     durability: Durability = "process",
     profile: Profile | None = None,
 ) -> CleanUpTable:
-    """Wire everything for one run; close it when done.
+    """Wire everything for one run; the caller closes it.
 
     Args:
-        scenario: what stands on the table; the default one if left out.
-        seed: which faults happen; the scenario's own if left out.
-        faults: chance of a fault per skill call in [0, 1]; the scenario's own if left out.
-        planner: finds plans; pyperplan in a process of its own if left out.
-        listener: is told every record of the run.
-        store: a file to keep the run in, with the world beside it; one that has no run yet.
-        durability: what the run outlives, see `Executive`.
-        profile: which of `ROBOTS` does it, and what its parameters are worth; the one on wheels if left out.
+        scenario: the items on the table; by default `Scenario.default`.
+        seed: seed of the faults; by default the scenario's.
+        faults: chance of a fault per skill call in [0, 1]; by default the scenario's.
+        planner: finds plans; by default pyperplan in a separate process.
+        listener: called with every record of the run.
+        store: a file without a run, to keep the run in; a sidecar file keeps the world.
+        durability: the events that the run survives, see `Executive`.
+        profile: one of `ROBOTS` and the values of its parameters; by default the one on wheels.
 
     Raises:
         InputError: the scenario or the profile is wrong, or the store has a run already.
-        StoreError: the store cannot be opened, or the world not be written.
+        StoreError: the store cannot be opened, or the world cannot be written.
     """
     world = (scenario or Scenario.default()).world(seed, faults)
     if store is None:
         return _wired(world, planner, listener, profile)
     if has_run(store):
-        raise InputError(f"'{store}' has a run already; go on with it by --resume, or take another file")
+        raise InputError(f"'{store}' has a run already; resume it by --resume, or take another file")
     require_free(beside(store))
     lasting = DurableWorld.from_state(world.state())
     deployed = _wired(lasting, planner, listener, profile, store, durability)
@@ -168,15 +168,15 @@ def resumed(
     listener: Listener | None = None,
     durability: Durability = "process",
 ) -> CleanUpTable:
-    """Wire everything to go on with the run in a store; arguments as for `deploy`.
+    """Wire everything to resume the run in a store; arguments as for `deploy`.
 
     Raises:
-        StoreError: the store or its world is not there, or cannot be read; or the run in it is another program's.
+        StoreError: the store or its world is missing or unreadable, or the run belongs to another program.
     """
     with archive(store) as runs:
         run = unfinished(runs)
     if run.header.get("run") != NAME:
-        whose = f"the run of '{run.plot}' in this store is another program's, which goes on with it: Executive.resume()"
+        whose = f"the run of '{run.plot}' in this store is another program's, which resumes it: Executive.resume()"
         raise StoreError(whose, place=Place(str(store)))
     said = run.header.get("settings")
     profile = None if said is None else Profile.model_validate(said)
@@ -208,22 +208,26 @@ def _wired(
 
 
 def on_wheels(world: TableWorld) -> list[Component]:
-    """A base on wheels, an arm with a hand."""
+    """Return the components with a base on wheels and an arm with a hand."""
     return [Base(world), Arm(world), Camera(world), Voice(world)]
 
 
 def on_tracks(world: TableWorld) -> list[Component]:
-    """A base on tracks, an arm that holds by suction; see `second_robot`."""
+    """Return the components with a base on tracks and a suction arm; see `second_robot`."""
     return [Tracks(world), SuctionArm(world), PatientCamera(world), Voice(world)]
 
 
 ROBOTS = {"on_wheels": on_wheels, "on_tracks": on_tracks}
-"""The robots that can do it, by the names that profiles have for them."""
+"""The robots for this task, by their names in profiles."""
 PROFILES = HOME / "profiles"
 
 
 def robot(profile: Profile | None) -> Callable[[TableWorld], list[Component]]:
-    """What makes the components of the robot that a profile names; raises `UnknownNameError`."""
+    """Return the factory of components for the robot of a profile.
+
+    Raises:
+        UnknownNameError: there is no such robot.
+    """
     name = "on_wheels" if profile is None or profile.robot is None else profile.robot
     if name not in ROBOTS:
         place = None if profile is None else profile.place("robot")
@@ -233,29 +237,29 @@ def robot(profile: Profile | None) -> Callable[[TableWorld], list[Component]]:
 
 @cache
 def plots() -> tuple[ActionPlot, ...]:
-    """The plots of this domain; read once, since plots never change."""
+    """Return the plots of this domain, cached, since plots are immutable."""
     return tuple(load_library(HOME / "plots"))
 
 
 @cache
 def library() -> Library:
-    """The plots as no profile changes them; what is worked out for one run serves the next."""
+    """Return the library of the unadapted plots, cached with its derived tables for all runs."""
     return Library([*plots(), achieve_plot()])
 
 
 @cache
 def domain() -> PlanningDomain:
-    """The planning domain; read once, too."""
+    """Return the planning domain, cached."""
     return PlanningDomain.from_pddl(HOME / "domain.pddl")
 
 
 def bundle() -> Bundle:
-    """The task for others to build upon: plots and planning domain, for a base, an arm, a camera and a voice."""
+    """Return the bundle of plots and planning domain, for a base, an arm, a camera and a voice."""
     return Bundle(NAME, plots(), domain=domain(), about="clear a table: cups to the sink, cans to the bin")
 
 
 class _SceneWriter:
-    """Writes a `scene` record whenever a component's answer has changed what there is to draw."""
+    """Writes a `scene` record after each outcome that changed the drawing."""
 
     def __init__(self, world: TableWorld, sequencer: Sequencer) -> None:
         self._world = world

@@ -1,6 +1,6 @@
-"""A world that goes on when the robot's program dies: each executed action is in a file before anybody hears of it.
+"""A world that survives the death of the robot's program: each action is in a file before its outcome is reported.
 
-There is one world, however many programs believe that the robot is theirs: what another one did in it is read first.
+Several programs may act on the same world; each reads the actions of the others first.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from domains.clean_up_table.results import Result
 
 KIND = Kind("simulated world", 0x64736377, 2)
-"""The first format had no number, and nothing that says whose file it is."""
+"""Format 1 had no number and no application id."""
 PATIENCE_MS = 5000
-"""How long an action waits for those of another program."""
+"""Milliseconds that an action waits for another program's transaction."""
 _TABLES = (
     "CREATE TABLE world (state TEXT NOT NULL)",
     "CREATE TABLE done (action_id TEXT PRIMARY KEY, result TEXT NOT NULL)",
@@ -33,13 +33,17 @@ _TABLES = (
 
 
 def beside(store: Path) -> Path:
-    """Where the world of the run in that store is kept; raises `StoreError` as `located`."""
+    """Return the path of the world of a run in that store.
+
+    Raises:
+        StoreError: as `located`.
+    """
     place = located(store)
     return place.with_name(place.name + WORLD)
 
 
 def require_free(path: Path) -> None:
-    """Raise `StoreError` unless a world can be kept there: no file is there, or that of another world."""
+    """Raise `StoreError` unless the path is free or holds another world."""
     with _reported(path, "read"):
         if is_there(path):
             require_own(path, KIND)
@@ -47,13 +51,17 @@ def require_free(path: Path) -> None:
 
 
 class DurableWorld(TableWorld):
-    """A world in a file, from when `create` or `open` is called until `close`."""
+    """A world in a file, from `create` or `open` until `close`."""
 
     _file: sqlite3.Connection | None = None
     _seen = 0
 
     def create(self, path: Path) -> None:
-        """Keep this world in a file from now on, in the place of the world that is there; raises `StoreError`."""
+        """Write this world to a file and keep it there, instead of any world in that file.
+
+        Raises:
+            StoreError: the file is of another kind, or cannot be written.
+        """
         require_free(path)
         with _reported(path, "write"):
             if not is_there(path):
@@ -70,15 +78,19 @@ class DurableWorld(TableWorld):
 
     @classmethod
     def open(cls, path: Path) -> Self:
-        """The world as it was left; raises `StoreError`."""
+        """Return the world in a file.
+
+        Raises:
+            StoreError: the file is missing, of another kind, or unreadable.
+        """
         if not is_there(path):
-            raise StoreError("the world of the run is not there", place=Place(str(path)))
+            raise StoreError("the world of the run is missing", place=Place(str(path)))
         require_free(path)
         with _reported(path, "read"):
             file = _opened(path)
             try:
                 lasting = cls.from_state(_state(file))
-                lasting._file = file  # noqa: SLF001  of its own class
+                lasting._file = file  # noqa: SLF001  an instance of the same class
                 lasting._seen = lasting._version()  # noqa: SLF001
             except BaseException:
                 file.close()
@@ -86,13 +98,13 @@ class DurableWorld(TableWorld):
         return lasting
 
     def catch_up(self) -> None:
-        """Take in what was done through another program."""
+        """Read the actions of other programs."""
         if self._file is not None and self._version() != self._seen:
             self._seen = self._version()
             self.become(_state(self._file))
 
     def executed(self, action_id: str, result: Result) -> None:
-        """Write what became of the action, and the world after it, as one; no action is written twice."""
+        """Write the result of the action and the world after it in one transaction; each action is written once."""
         super().executed(action_id, result)
         assert self._file is not None  # noqa: S101  it was created or opened
         self._file.execute("BEGIN")
@@ -101,18 +113,18 @@ class DurableWorld(TableWorld):
         self._file.execute("COMMIT")
 
     def close(self) -> None:
-        """Give back the file."""
+        """Close the file."""
         if self._file is not None:
             self._file.close()
 
     def _version(self) -> int:
-        """It is another one after somebody else has written the file."""
+        """Return SQLite's data version, which another program's commit changes."""
         assert self._file is not None  # noqa: S101  as above
         (version,) = self._file.execute("PRAGMA data_version").fetchone()
         return int(version)
 
     def _present(self) -> str:
-        """Everything but what was done, of which there is ever more."""
+        """Return the state without `done`, which grows with each action."""
         return json.dumps({name: value for name, value in self.state().items() if name != "done"})
 
 

@@ -1,4 +1,4 @@
-"""What stands on the table: cups, cans and crisp cans, what goes into what, and where each one is."""
+"""The items: cups, cans and crisp cans, with their places, carriers and destinations."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KINDS = (CUP, CAN, CRISP_CAN)
 
 DESTINATION_OF = {CUP: "sink", CAN: "bin", CRISP_CAN: "bin"}
 SIZES = {"small": 1, "large": 2}
-"""How many cans a crisp can takes, by its size."""
+"""Number of cans that fit into a crisp can, by its size."""
 
 ROOMS = ("none", "one", "two")
 """The planning domain's names for 0, 1 and 2 units of free room."""
@@ -54,24 +54,24 @@ def check_behind(name: str, fronts: Mapping[str, str | None]) -> None:
         if front not in fronts:
             raise UnknownNameError(f"'{name}' is behind '{front}', which does not exist", found=front, valid=fronts)
         if front in passed:
-            raise InputError(f"'{name}' is behind items that stand behind each other", found=front)
+            raise InputError(f"'{name}' is behind items that hide each other", found=front)
         passed.add(front)
         front = fronts[front]
 
 
 @dataclass(slots=True)
 class Item:
-    """One item and where it is.
+    """An item and its place.
 
     Attributes:
         name: unique; never a place.
         kind: one of `KINDS`.
-        capacity: how many items it takes directly.
+        capacity: number of items that fit directly into it.
         where: exactly one of: a surface, the carrier's name, `HAND`, or the destination it was thrown into.
-        behind: the item that hides it while both stand on the same surface.
-        on_table: whether it ever stood on the table, and so counts for the goal.
+        behind: the item that hides it while both are on the same surface.
+        on_table: whether it was ever on the table, and so counts for the goal.
         seen: whether the camera ever reported it.
-        closed: units of room given up by looking in (`check-room`); only a fall opens them again.
+        closed: units of room that `check-room` has closed; only a fall opens them again.
     """
 
     name: str
@@ -85,21 +85,21 @@ class Item:
 
     @property
     def destination(self) -> str:
-        """Where it has to be thrown."""
+        """The destination of its kind."""
         return DESTINATION_OF[self.kind]
 
     @property
     def disposed(self) -> bool:
-        """Whether it is where it has to be thrown."""
+        """Whether it is in its destination."""
         return self.where == self.destination
 
     def fits(self, carrier: Item) -> bool:
-        """Whether it goes into such a carrier, room permitting."""
+        """Return whether its kind fits into the carrier's, regardless of free room."""
         return self is not carrier and (self.kind, carrier.kind) in {(CUP, CUP), (CAN, CRISP_CAN)}
 
 
 def new_item(kind: str, name: str, *, surface: str = "table", size: str = "small", behind: str | None = None) -> Item:
-    """An item standing on a surface; `size` matters for a crisp can only.
+    """Return an item on a surface; `size` matters for a crisp can only.
 
     Raises:
         UnknownNameError: no such kind, size or surface.
@@ -114,7 +114,7 @@ def new_item(kind: str, name: str, *, surface: str = "table", size: str = "small
 
 
 class Inventory:
-    """All items, in the order they came.
+    """All items, in the order in which they were added.
 
     Raises:
         InputError: two items of one name, or an item behind one that does not exist or is behind it.
@@ -136,11 +136,15 @@ class Inventory:
         return self._items[name]
 
     def get(self, name: str) -> Item | None:
-        """The item of that name, if there is one."""
+        """Return the item of that name, or `None`."""
         return self._items.get(name)
 
     def add(self, item: Item) -> None:
-        """Put a new item where it says it is; a name that is taken is an `InputError`."""
+        """Add a new item at its place.
+
+        Raises:
+            InputError: the name is taken.
+        """
         check_behind(item.name, {**{known.name: known.behind for known in self}, item.name: item.behind})
         self._put(item)
 
@@ -155,7 +159,7 @@ class Inventory:
             check_behind(name, fronts)
 
     def free_name(self, kind: str) -> str:
-        """The first of cup1, cup2, … (can1, …, crisp_can1, …) that nothing is called."""
+        """Return the first unused name of cup1, cup2, … (can1, …, crisp_can1, …)."""
         stem, number = kind.replace("-", "_"), 1
         while f"{stem}{number}" in self._items:
             number += 1
@@ -163,41 +167,41 @@ class Inventory:
 
     @property
     def held(self) -> Item | None:
-        """The item in the hand itself, without what is in it."""
+        """The item in the hand itself, without items inside it."""
         return next((item for item in self if item.where == HAND), None)
 
     def lying(self, surface: str) -> list[Item]:
-        """The items directly on a surface, hidden ones too."""
+        """Return the items directly on a surface, hidden ones too."""
         return [item for item in self if item.where == surface]
 
     def contents(self, carrier: Item) -> list[Item]:
-        """The items directly inside a carrier."""
+        """Return the items directly inside a carrier."""
         return [item for item in self if item.where == carrier.name]
 
     def stack(self, item: Item) -> list[Item]:
-        """The item and everything in it, carriers before their contents."""
+        """Return the item and everything in it, carriers before their contents."""
         return [item, *(deep for inner in self.contents(item) for deep in self.stack(inner))]
 
     def outermost(self, item: Item) -> Item:
-        """The carrier that an item is in, or is in the carrier of, …; the item itself when it is in none."""
+        """Return the outermost carrier of an item; the item itself if it is in none."""
         carrier = self._items.get(item.where)
         return item if carrier is None else self.outermost(carrier)
 
     def free_room(self, carrier: Item) -> int:
-        """How many more items physically go directly into a carrier."""
+        """Return the number of items that still fit directly into a carrier."""
         return carrier.capacity - len(self.contents(carrier))
 
     def room(self, carrier: Item) -> str:
-        """The room the robot still means to use, as the planning domain names it."""
+        """Return the free room without closed units, as the planning domain names it."""
         return ROOMS[max(0, self.free_room(carrier) - carrier.closed)]
 
     def hidden(self, item: Item) -> bool:
-        """Whether the item it is behind stands on the same surface."""
+        """Return whether the item in front of it is on the same surface."""
         front = self._items.get(item.behind) if item.behind else None
         return front is not None and item.where in SURFACES and front.where == item.where
 
     def move(self, item: Item, where: str) -> None:
-        """Put an item, with everything in it, somewhere else."""
+        """Move an item, with everything in it."""
         item.where = where
         if self.outermost(item).where == "table":
             for moved in self.stack(item):

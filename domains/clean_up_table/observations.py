@@ -1,7 +1,7 @@
-"""What the robot learns from a verb's result, as a change of its knowledge.
+"""Observations of the robot: the change of its knowledge by a verb's result.
 
-A success says what the effect of the planning action of the same name says, in the domain's predicates; a
-failure says what the robot notices of it. Facts are retracted without asking whether they were known.
+A success reports the effect of the planning action of the same name, in the domain's predicates. A failure reports the
+robot's observations of it. Facts are retracted whether they were known or not.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class _Notes:
-    """A change being written down; an addition wins over a removal, as everywhere."""
+    """A change under construction; an addition wins over a removal."""
 
     def __init__(self) -> None:
         self.nodes: dict[str, str] = {}
@@ -36,14 +36,14 @@ class _Notes:
         self.removed.append(fact(predicate, *args))
 
     def holds_only(self, predicate: str, *args: str, of: Iterable[str]) -> None:
-        """It holds with this last argument and with no other of the choice."""
+        """Add the fact with this last argument, and retract it for all others in `of`."""
         for other in of:
             if other != args[-1]:
                 self.holds_not(predicate, *args[:-1], other)
         self.holds(predicate, *args)
 
     def known(self, item: str) -> None:
-        """The robot sees or handles it, so it is not missing."""
+        """Retract that the item is missing, since the robot sees or handles it."""
         self.holds_not("missing", item)
 
     def counts(self, function: str, argument: str, number: int) -> None:
@@ -54,7 +54,7 @@ class _Notes:
 
 
 def initial_knowledge(world: TableWorld) -> Delta:
-    """What the robot knows before it has looked: the places, itself, and how room is counted."""
+    """Return the robot's knowledge before the first look: places, its own position, and the order of rooms."""
     notes = _Notes()
     notes.nodes.update(TYPES)
     notes.holds("robot-at", world.robot_at)
@@ -67,7 +67,7 @@ def initial_knowledge(world: TableWorld) -> Delta:
 
 
 def learned(result: Result) -> Delta:
-    """What the robot learns from the result of any verb."""
+    """Return the change of knowledge by the result of any verb."""
     notes = _Notes()
     if result.outcome in _LEARNED:
         _LEARNED[result.outcome](notes, result)
@@ -177,11 +177,11 @@ def _sighted(notes: _Notes, sighting: Sighting) -> None:
     else:
         for surface in SURFACES:
             notes.holds_not("lies-at", item, surface)
-        # Whether it is tidy there is the robot's judgement: in a carrier that cannot be grasped it is not.
+        # The plots decide whether it is tidy there: in a carrier that cannot be grasped it is not.
         notes.holds("inside", item, sighting.where)
     if sighting.new:
         notes.holds("goes-to", item, DESTINATION_OF[sighting.kind])
-        # Only once: the robot's rules retract it after too many failures, and a second look knows no better.
+        # Once only: rules retract it after too many failures, and a second look must not restore it.
         notes.holds("graspable", item)
 
 

@@ -1,4 +1,4 @@
-"""Looking ahead: a plan tried out on a copy of the world as the robot believes it to be, without faults (S1.10)."""
+"""Foresight: a plan simulated on a copy of the world as the robot believes it, without faults (S1.10)."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ _VERBS: dict[str, Callable[[TableWorld, str, tuple[str, ...]], Result]] = {
     "check-room": lambda world, name, args: world.look_into(name, args[0], args[3]),
     "throw-away": lambda world, name, args: world.throw_away(name, args[0], args[1]),
 }
-"""What carries out a planning action, with the step's arguments in the order of `domain.pddl`."""
+"""The verb of each planning action, with the step's arguments in the order of `domain.pddl`."""
 
 _HOPED_FOR = frozenset({"arrived", "picked_up", "put_down", "stacked", "taken_out", "looked", "thrown_away"})
 
 
 class Physics:
-    """A `Foresight` that knows what really fits into what, and what is in the way."""
+    """A `Foresight` with the true rules of carriers, room and obstacles."""
 
     def foresee(self, plan: Plan, world: Belief) -> Validation:
-        """Whether every step would succeed if nothing went wrong by chance; `world` is left as it is."""
+        """Return whether every step succeeds without faults; `world` stays unchanged."""
         ahead = believed(world)
         for number, step in enumerate(plan.steps):
             result = self._tried(ahead, f"step {number}", step)
@@ -49,7 +49,7 @@ class Physics:
 
 
 def believed(belief: Belief) -> TableWorld:
-    """The world in which everything is so that the robot is right; items that are nowhere are left out."""
+    """Return the world in which all beliefs are true; items without a known place are omitted."""
     at = [str(place) for (place,) in belief.match("robot-at", (None,))]
     return TableWorld(_items(belief), robot_at=at[0] if at else OPERATOR)
 
@@ -63,7 +63,7 @@ def _items(belief: Belief) -> Iterator[Item]:
 
 
 def _item(name: str, kind: str, where: str, belief: Belief) -> Item:
-    """What is in it and what still goes into it is all that it takes; no more than such an item takes can be right."""
+    """Return an item with the smallest capacity that fits the believed content and free room."""
     inside = len(list(belief.match("inside", (None, name))))
     room = max((ROOMS.index(str(room)) for _, room in belief.match("free-room", (name, None))), default=0)
     item = new_item(kind, name, size="large" if kind == CRISP_CAN and inside + room > 1 else "small")

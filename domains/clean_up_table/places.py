@@ -1,4 +1,4 @@
-"""Where things are in the clean-up-table world: the places, their types and their positions in metres."""
+"""The places of the clean-up-table world, their types, and their positions in metres."""
 
 from __future__ import annotations
 
@@ -38,5 +38,5 @@ SIZES = {
 
 
 def distance(start: str, end: str) -> float:
-    """Metres from one place to another, straight on."""
+    """Return the distance between two places in metres, in a straight line."""
     return math.dist(POSITIONS[start], POSITIONS[end])

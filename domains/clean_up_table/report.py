@@ -1,4 +1,4 @@
-"""The honest report: judged by the world's truth, explained by what the robot knows."""
+"""The report of a run: the true state of the world, with explanations from the robot's knowledge."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ FAILURES = frozenset({
     "nothing_found", "grasp_failed", "no_ik", "no_path", "slipped", "stack_fell", "gone", "not_possible",
     "timed_out", "skill_error",
 })  # fmt: skip
-"""Outcomes of skills that were not what a plan hopes for."""
+"""Outcomes of skills that count as failures of a plan step."""
 STOPPED = "stopped"
-"""What the plot emits when it has ended because the operator said stop."""
+"""The event that the plot emits when the operator stops the run."""
 
 
 @dataclass(frozen=True, slots=True)
 class LeftItem:
-    """An item that was not cleared away: where it really is, and why as far as the robot knows."""
+    """An item that was not cleared away: its true place, and the reason if the robot knows it."""
 
     item: str
     where: str
@@ -31,7 +31,7 @@ class LeftItem:
 
 @dataclass(frozen=True, slots=True)
 class ReportedFault:
-    """A fault that the simulation let happen: its kind, whether it passes, and the items it hit."""
+    """A fault of the simulation: its kind, whether it is permanent, and the items it hit."""
 
     kind: str
     permanent: bool
@@ -40,23 +40,23 @@ class ReportedFault:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What a run came to.
+    """The result of a run.
 
     Attributes:
-        goal_reached: every item that ever stood on the table, seen or not, is where it belongs, and the run
-            came to its end without a problem.
-        items: how many stood on the table.
-        left: those that are not where they belong.
-        trips: times something was thrown away.
-        plans, replans: plans found, and plans given up for a new one.
-        skill_failures: outcomes of skills that were not hoped for, and how often.
-        recoveries: rules that answered, and how often.
-        candidates_chosen: plots that dynamic states chose, and how often.
-        excluded: steps that plans did without for a while since they had failed, and how often.
-        faults: what the simulation did to the robot, in order.
-        touched: the items that a permanent fault keeps from where they belong.
+        goal_reached: every item that was ever on the table, seen or not, is in its destination, and the run ended
+            without a problem.
+        items: number of items that were on the table.
+        left: items that are not in their destinations.
+        trips: number of throws.
+        plans, replans: plans found, and plans replaced by a new one.
+        skill_failures: number of each failure outcome of skills.
+        recoveries: number of answers of each rule.
+        candidates_chosen: number of choices of each plot by dynamic states.
+        excluded: number of exclusions of each step that plans avoided for a while after a failure.
+        faults: the simulation's faults, in order.
+        touched: items that a permanent fault keeps from their destinations.
         simulated_s, wall_s: seconds of run time and of real time.
-        problem: why the run ended early, if it did.
+        problem: the reason if the run ended early.
     """
 
     goal_reached: bool
@@ -76,11 +76,11 @@ class Report:
     problem: str | None = field(default=None)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return asdict(self)
 
     def lines(self) -> list[str]:
-        """The report for people."""
+        """Return the report as lines for people."""
         done = self.items - len(self.left)
         what = "The table is clear" if self.goal_reached else "Not everything could be cleared"
         lines = [
@@ -100,7 +100,7 @@ class Report:
 
 
 def summarise(world: TableWorld, knowledge: KnowledgeBase, tally: Tally, end: RunEnd, wall_s: float) -> Report:
-    """The report of a run that has ended."""
+    """Return the report of a run that has ended."""
     left = tuple(LeftItem(one.item, one.where, reason_for(one.item, knowledge, end)) for one in world.left())
     return Report(
         goal_reached=not left and end.problem is None,
@@ -122,7 +122,7 @@ def summarise(world: TableWorld, knowledge: KnowledgeBase, tally: Tally, end: Ru
 
 
 def reason_for(item: str, knowledge: KnowledgeBase, end: RunEnd) -> str:
-    """Why an item is left, as far as the robot knows."""
+    """Return why an item is left, from the robot's knowledge."""
     about = {"item": item}
     if knowledge.type_of(item) is None:
         return "it was never seen"

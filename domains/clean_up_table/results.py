@@ -1,4 +1,4 @@
-"""How a verb of the world ended: plain values, with all the robot could notice, that go to JSON and back."""
+"""Results of the world's verbs with the robot's observations: plain values, convertible to JSON."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Attribute = str | int | tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """One item as the robot sees it.
+    """An item in the robot's view.
 
     Attributes:
         item: its name.
         kind: its kind.
         where: the surface it lies on or the carrier it is directly in.
         room: its free room in the planning domain's terms (`none`, `one`, `two`).
-        new: seen for the first time ever.
+        new: whether it was never seen before.
     """
 
     item: str
@@ -32,15 +32,15 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """The outcome of one verb.
+    """The result of one verb.
 
     Attributes:
         outcome: the outcome event's name.
         attributes: the event's attributes.
-        sightings: the items whose place or room was noticed.
-        apart: (item, carrier) pairs that hold no longer.
+        sightings: items with an observed place or room.
+        apart: (item, carrier) pairs that no longer hold.
         fits: (item, carrier) pairs that were recognised as fitting for the first time.
-        failures: how often in a row this has failed, this time included.
+        failures: number of consecutive failures, this one included.
     """
 
     outcome: str
@@ -51,7 +51,7 @@ class Result:
     failures: int = field(default=0)
 
     def to_json(self) -> dict[str, Any]:
-        """As plain JSON data."""
+        """Return plain JSON data."""
         return {
             "outcome": self.outcome,
             "attributes": {k: list(v) if isinstance(v, tuple) else v for k, v in self.attributes.items()},
@@ -63,7 +63,7 @@ class Result:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Result:
-        """The inverse of `to_json`."""
+        """Return the result of a form; the inverse of `to_json`."""
         return cls(
             data["outcome"],
             {k: tuple(v) if isinstance(v, list) else v for k, v in data["attributes"].items()},
@@ -75,10 +75,10 @@ class Result:
 
 
 def not_possible(reason: str) -> Result:
-    """The verb could not even be tried; nothing happened."""
+    """Return the result of a verb that could not be tried; the world is unchanged."""
     return Result("not_possible", {"reason": reason})
 
 
 def gone(item: str, surface: str) -> Result:
-    """The item is not where the robot reached for it."""
+    """Return the result of a verb whose item is not at the expected place."""
     return Result("gone", {"item": item, "surface": surface})

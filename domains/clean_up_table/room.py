@@ -1,6 +1,6 @@
-"""The room the robot works in: its state, what else may happen there, and the truth about it.
+"""The simulated room: its state, interference by other people, and the truth about it.
 
-Pure data and rules: no clock, no asyncio. The robot's verbs are in `world`.
+It is pure data and rules, without clock or asyncio. The robot's verbs are in `table_world`.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ _MOVES = {"table": "shelf", "shelf": "table"}
 
 
 class Room:
-    """Places, items, the robot's place, the faults so far and the actions done.
+    """Places, items, the robot's place, the faults so far and the executed actions.
 
     Attributes:
-        items: every item and where it is; `items.held` is in the robot's one hand.
-        faults: decides on faults and remembers them.
-        robot_at: the place the robot is at.
-        trips: how often something was thrown away.
-        said: what the robot said, in order.
+        items: every item and its place; `items.held` is in the robot's one hand.
+        faults: draws faults and keeps them.
+        robot_at: the place of the robot.
+        trips: number of throws.
+        said: the robot's sentences, in order.
         done: the first result of every action executed, by action id.
-        departure: the last drive, and the place it began at.
+        departure: the last drive, and its start.
     """
 
     def __init__(
@@ -52,18 +52,18 @@ class Room:
         self.departure = "", robot_at
 
     def catch_up(self) -> None:
-        """Take in what happened to this world elsewhere, if that can be."""
+        """Read the actions of other programs, if the world is shared."""
 
     def executed(self, action_id: str, result: Result) -> None:
-        """An action was done, and this came of it."""
+        """Keep the result of an executed action."""
         self.done[action_id] = result
 
     def place_before(self, action_id: str) -> str:
-        """Where a drive begins; where it began, if it has been done already: asked again, it takes as long."""
+        """Return the start of a drive; an executed drive keeps its start, so that it takes the same time again."""
         drive, place = self.departure
         return place if drive == action_id else self.robot_at
 
-    # Somebody else
+    # Interference by other people
 
     def add_item(
         self,
@@ -74,12 +74,12 @@ class Room:
         size: str = "small",
         behind: str | None = None,
     ) -> str:
-        """Somebody puts a new item on a surface; its name.
+        """Add a new item on a surface, as another person would; return its name.
 
         Args:
             kind: `cup`, `can` or `crisp-can`.
-            name: a name of its own; the next free number of its kind when left out.
-            surface: where it stands.
+            name: a unique name; by default the next free one of its kind.
+            surface: its surface.
             size: `small` or `large`, for a crisp can.
             behind: the item that hides it.
 
@@ -91,7 +91,7 @@ class Room:
         return name
 
     def move_item(self, name: str, surface: str) -> None:
-        """Somebody moves an item, with everything in it, to another surface.
+        """Move an item, with everything in it, to another surface, as another person would.
 
         Raises:
             InputError: no such item or surface, or the item does not lie on a surface itself.
@@ -107,7 +107,7 @@ class Room:
         self.items.move(item, surface)
 
     def _interferences(self, keep: str | None) -> dict[str, bool]:
-        """What somebody else may do during a call, `keep` left alone; none of it is permanent."""
+        """Return the possible interferences during a call, none of them permanent; `keep` is not moved."""
         kinds = []
         if self._movable(keep) and self.faults.left_for(ITEM_MOVED):
             kinds.append(ITEM_MOVED)
@@ -136,31 +136,31 @@ class Room:
         return self.faults.fired
 
     def touched(self) -> set[str]:
-        """The items that a permanent fault keeps from their destination.
+        """Return the items that a permanent fault keeps from their destination.
 
-        These are the ones that can never be grasped or recognised, those with no path to their destination
-        (added later or not), those that stand hidden behind one of these, and those in a carrier that is
-        stuck in another one; none that was thrown away all the same, e.g. inside its carrier.
+        These items can never be grasped or recognised, or have no path to their destination (added later or not). Items
+        hidden behind one of these count too, and items in a carrier that is stuck in another one. Items that were
+        thrown away, e.g. inside their carrier, do not count.
         """
         return {item.name for item in self.items if truth.blame(item, self.items, self.faults)}
 
     def left(self) -> list[truth.Left]:
-        """Every item that ever stood on the table and is not in its destination, in the order they came."""
+        """Return the items that were ever on the table and are not in their destination, in order of addition."""
         return truth.left(self.items, self.faults)
 
     @property
     def goal_reached(self) -> bool:
-        """Whether every item that ever stood on the table, seen or not, is where it has to be thrown."""
+        """Whether every item that was ever on the table, seen or not, is in its destination."""
         return not self.left()
 
     def scene(self) -> list[dict[str, Any]]:
-        """The world drawn from above, see `scene.scene`."""
+        """Return the world drawn from above, see `scene.scene`."""
         return scene(self.items, self.robot_at)
 
     # As data
 
     def state(self) -> dict[str, Any]:
-        """Everything, as JSON data; `from_state` makes the same world of it."""
+        """Return the whole state as JSON data; `from_state` restores it."""
         return {
             "robot_at": self.robot_at,
             "items": [asdict(item) for item in self.items],
@@ -173,7 +173,7 @@ class Room:
 
     @classmethod
     def from_state(cls, state: Mapping[str, Any]) -> Self:
-        """The inverse of `state`.
+        """Return the room of a state; the inverse of `state`.
 
         Raises:
             InputError: this is not the state of a world.
@@ -183,7 +183,7 @@ class Room:
         return room
 
     def become(self, state: Mapping[str, Any]) -> None:
-        """Be as the room whose `state` this is.
+        """Replace this room's state.
 
         Raises:
             InputError: this is not the state of a world.

@@ -1,22 +1,22 @@
-"""What stands on the table at the start, as a YAML file that a user writes.
+"""The scenario: a YAML file with the items on the table at the start.
 
 By number, named cup1, cup2, …, can1, …, crisp_can1, …:
 
     table: {cups: 4, cans: 3, crisp_cans: [small, large]}
 
-or by name, alone or beside the numbered ones:
+or by name, alone or with numbered ones:
 
     table:
       items:
         red_cup: cup
         pringles: {kind: crisp_can, size: large}
-        coke: {kind: can, behind: pringles}      # not visible while pringles stands there too
+        coke: {kind: can, behind: pringles}      # hidden while pringles is on the table too
     seed: 7             # optional: of the faults; the command line wins
     faults: 0.2         # optional: chance of a fault per skill call
     robot_at: operator  # optional: table, shelf, floor, sink, bin or operator
 
-Kinds are `cup`, `can` and `crisp_can`; a crisp can is `small` (takes one can) unless it is `large` (two).
-A name is a PDDL name in lower case. At most 200 items.
+Kinds are `cup`, `can` and `crisp_can`; a crisp can is `small` (takes one can) unless it is `large` (two). A name is a
+PDDL name in lower case. At most 200 items.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class NamedItem(_Form):
 
 
 class Table(_Form):
-    """What stands on the table."""
+    """The items on the table."""
 
     cups: Count = 0
     cans: Count = 0
@@ -84,7 +84,7 @@ class Table(_Form):
 
 
 class Scenario(_Form):
-    """The start of a run: what stands on the table, where the robot is, and what may go wrong."""
+    """The start of a run: the items on the table, the robot's place, and the faults."""
 
     table: Table
     seed: Annotated[int, Field(strict=True)] | None = None
@@ -96,7 +96,7 @@ class Scenario(_Form):
         """Read a scenario file.
 
         Raises:
-            InputError: anything wrong with it, with file, line, what was found and the nearest valid name.
+            InputError: the file has a mistake; with its place, the word found and the nearest valid name.
         """
         return cls.parse(read_file(path), str(path))
 
@@ -110,18 +110,18 @@ class Scenario(_Form):
 
     @classmethod
     def default(cls) -> Self:
-        """Four cups, three cans, a small and a large crisp can."""
+        """Return four cups, three cans, a small and a large crisp can."""
         return cls(table=Table(cups=4, cans=3, crisp_cans=("small", "large")))
 
     def world(self, seed: int | None = None, faults: float | None = None) -> TableWorld:
-        """A new world as the scenario describes it.
+        """Return a new world of the scenario.
 
         Args:
-            seed: of the faults; the scenario's own, or 0, when left out.
-            faults: chance of a fault per skill call in [0, 1]; the scenario's own, or 0, when left out.
+            seed: seed of the faults; by default the scenario's, or 0.
+            faults: chance of a fault per skill call in [0, 1]; by default the scenario's, or 0.
 
         Raises:
-            InputError: the scenario was made in Python with a name or word that is not valid.
+            InputError: the scenario was made in Python with an invalid name or word.
         """
         self.check()
         seed = self.seed if seed is None else seed
@@ -129,7 +129,7 @@ class Scenario(_Form):
         return TableWorld(self._items(), seed=seed or 0, faults=faults or 0.0, robot_at=self.robot_at)
 
     def check(self, place_of: PlaceOf = lambda _path: None) -> None:
-        """Raise `InputError` for a name or word that is not valid, located by `place_of` its path of keys."""
+        """Raise `InputError` for an invalid name or word; `place_of` returns the place of its path of keys."""
         _check_word("place", self.robot_at, PLACES, place_of(("robot_at",)))
         for position, size in enumerate(self.table.crisp_cans):
             _check_word("size", size, SIZES, place_of(("table", "crisp_cans", position)))
@@ -152,7 +152,7 @@ class Scenario(_Form):
     def _items(self) -> list[Item]:
         table = self.table
         items = Inventory()
-        # Named items come first, but one may stand behind a numbered one: who is behind whom is set last.
+        # A named item may be hidden by a numbered one, which is added later: `behind` is set last.
         for name, named in table.items.items():
             items.add(new_item(_KINDS[named.kind], name, size=named.size or _DEFAULT_SIZE))
         for kind, sizes in (

@@ -1,4 +1,4 @@
-"""The world drawn from above: what a `scene` record of the trace holds."""
+"""The world drawn from above: the content of a `scene` record in the trace."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from domains.clean_up_table.items import HAND, Inventory, Item
 from domains.clean_up_table.places import PLACES, POSITIONS, SIZES
 
 _COLUMNS = 10
-_LOWER_EDGE = 0.45  # metres in front of a place's centre where the robot stands
+_LOWER_EDGE = 0.45  # metres from a place's centre to the robot in front of it
 
 
 def scene(items: Inventory, robot_at: str) -> list[dict[str, Any]]:
-    """Every place, the robot and every item: `id, shape, x, y, label` in metres.
+    """Return every place, the robot and every item: `id, shape, x, y, label` in metres.
 
-    Places also have `width` and `depth`; an item inside another or in the hand has `in`, the id of what
-    holds it. An item keeps its spot on a surface while others come and go.
+    Places also have `width` and `depth`. An item inside another or in the hand has `in`, the id of its holder. An item
+    keeps its spot on a surface while others come and go.
     """
     places = [_place(name) for name in PLACES]
     x, y = POSITIONS[robot_at]
@@ -39,7 +39,7 @@ def _item(item: Item, slot: int, items: Inventory, robot_at: str) -> dict[str, A
 
 
 def _spot(where: str, slot: int, count: int, robot_at: str) -> tuple[float, float]:
-    """Where on its place the item of that number is drawn: on a grid that all items fit on."""
+    """Return the position of the item with that number, on a grid for all items."""
     if where == HAND:
         x, y = POSITIONS[robot_at]
         return x, y - _LOWER_EDGE

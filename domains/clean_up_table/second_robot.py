@@ -1,6 +1,6 @@
-"""Another robot for the same table: a base on tracks, an arm that holds by suction, a camera that looks twice.
+"""A second robot for the same table: a base on tracks, a suction arm, a camera that looks twice.
 
-Its skills have the names and outcomes that the plots know, and get there in other ways; one skill is its own.
+Its skills have the names and outcomes that the plots use, with other implementations; `vent` is its own.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class Tracks(Base):
-    """A base on tracks: slow, turns on the spot first, and waits for a blocked way itself before it says so."""
+    """A base on tracks: slow, turns on the spot first, and waits at a blocked path before it reports it."""
 
     declares: ClassVar[Mapping[str, Parameter]] = {
         **Base.declares,
@@ -41,7 +41,7 @@ class Tracks(Base):
 
     @drives
     async def drive(self, call: SkillCall, to: str) -> Outcome:
-        """Turn, drive to a place, and if the way is blocked wait and try once more."""
+        """Turn, drive to a place, and try a second time if the path is blocked."""
         metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
         await call.clock.sleep(self.parameters["turning"] + metres / self.parameters["speed"])
         result = self.world.drive(call.action_id, to)
@@ -52,11 +52,11 @@ class Tracks(Base):
 
 
 class SuctionArm(Arm):
-    """An arm that holds by suction: it pumps first, and when nothing holds puts its cup elsewhere on the item once."""
+    """A suction arm: it pumps before a grasp, and tries a failed grasp a second time."""
 
     declares: ClassVar[Mapping[str, Parameter]] = {
         **Arm.declares,
-        "vacuum": Parameter("number", least=20.0, most=80.0, changed_by="profile"),  # kPa below the air around
+        "vacuum": Parameter("number", least=20.0, most=80.0, changed_by="profile"),  # kPa below the air pressure
         "lifts": Parameter("number", default=1.0, least=0.1, most=2.0, changed_by="profile"),  # kilograms
     }
     relations = ("(<= ?lifts (* 0.025 ?vacuum))",)
@@ -73,7 +73,7 @@ class SuctionArm(Arm):
 
     @skill(outcomes={"vented": {}}, after_crash="repeat")
     async def vent(self, call: SkillCall) -> Outcome:
-        """Let air into the cup, which empties the pump; nothing is held then."""
+        """Let air into the suction cup, which empties the pump; nothing is held then."""
         await call.clock.sleep(0.5)
         return Outcome("vented")
 
@@ -88,11 +88,11 @@ class SuctionArm(Arm):
 
 
 class PatientCamera(Camera):
-    """A camera that looks a second time before it says that nothing is there."""
+    """A camera that looks a second time before it reports an empty surface."""
 
     @recognises
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
-        """Recognise what stands on a surface; `count` is how many items do, without what is in them."""
+        """Recognise the items on a surface; `count` is their number, without items inside others."""
         await call.clock.sleep(self.parameters["recognising"])
         result = self.world.recognise(call.action_id, surface)
         if result.outcome == "nothing_found":

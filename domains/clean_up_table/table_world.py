@@ -1,8 +1,8 @@
-"""The simulated world of clean-up-table: what each of the robot's verbs really does (S0.15).
+"""The simulated world of clean-up-table, with one verb for each of the robot's skills (S0.15).
 
-Every verb takes the id of the action it executes. An id that was executed before gets its first result
-again and nothing happens twice, so that a run can be resumed after a crash. A call that is physically
-impossible ends in `not_possible` or `gone`; no verb raises and none claims what did not happen.
+Every verb takes the id of the action it executes. A repeated id returns its first result and changes nothing, so that a
+run can be resumed after a crash. A physically impossible call returns `not_possible` or `gone`. No verb raises an
+error, and no result contradicts the world.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _World = TypeVar("_World", bound="TableWorld")
 def _verb(
     body: Callable[Concatenate[_World, str, _Arguments], Result],
 ) -> Callable[Concatenate[_World, str, _Arguments], Result]:
-    """Do an action once: the same id again gets the first result."""
+    """Execute an action once: a repeated id returns the first result."""
 
     @functools.wraps(body)
     def once(world: _World, action_id: str, /, *args: _Arguments.args, **named: _Arguments.kwargs) -> Result:
@@ -109,7 +109,7 @@ class TableWorld(RobotBody):
 
     @_verb
     def look_into(self, action_id: str, carrier: str, surface: str) -> Result:
-        """Look into a carrier, which gives up one unit of its free room: `looked` or `gone`."""
+        """Look into a carrier, which closes one unit of its free room: `looked` or `gone`."""
         refusal = self._not_at(surface, SURFACES) or self._absent(carrier, surface)
         if refusal:
             return refusal

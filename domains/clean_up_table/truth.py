@@ -1,4 +1,4 @@
-"""The truth that a run's claims are judged by: what is left, and which permanent fault is to blame."""
+"""The truth about a run, for its validation: the remaining items, and the permanent faults that explain them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _REASONS = {GRASP_FAILED: "every grasp of it fails", NO_INVERSE_KINEMATICS: "the
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """An item that stood on the table and was not thrown away where it belongs.
+    """An item that was on the table and is not in its destination.
 
     Attributes:
         item: its name.
         where: the surface it lies on, `hand`, or `in CARRIER`.
-        reason: the permanent fault that keeps it from its destination; `None` when none does.
+        reason: the permanent fault that keeps it from its destination; `None` without one.
     """
 
     item: str
@@ -29,7 +29,7 @@ class Left:
 
 
 def blame(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
-    """The permanent fault that keeps an item from its destination, in words; `None` when none does."""
+    """Return the permanent fault that keeps an item from its destination, in words, or `None`."""
     if item.disposed:
         return None
     if item.name in faults.ungraspable:
@@ -44,7 +44,7 @@ def blame(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
 
 
 def _stuck(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
-    """The arm takes items out of carriers on a surface only; a carrier stuck inside another keeps its own."""
+    """Return why a carrier cannot release an item: the arm unloads carriers on a surface only."""
     carrier = items.get(item.where)
     outer = items.get(carrier.where) if carrier else None
     if carrier and outer and blame(carrier, items, faults) and blame(outer, items, faults):
@@ -53,7 +53,7 @@ def _stuck(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
 
 
 def left(items: Inventory, faults: WorldFaults) -> list[Left]:
-    """Every item that ever stood on the table and is not in its destination, in the order they came."""
+    """Return the items that were ever on the table and are not in their destination, in order of addition."""
     return [
         Left(item.name, _where(item, items), blame(item, items, faults))
         for item in items

@@ -1,8 +1,8 @@
-"""What goes wrong in the clean-up-table world, and when: seeded, bounded, remembered (S0.15).
+"""Faults of the clean-up-table world: seeded, bounded, recorded (S0.15).
 
-Whether a fault fires in a call is a function of (seed, action id); which one it is depends also on what can
-happen in that call now. A passing fault passes: the same subject fails at most `IN_A_ROW` times in a row,
-so that one more failure proves the fault permanent.
+Seed and action id decide whether a fault happens in a call; the possible faults of the call also decide which one. A
+transient fault hits the same subject at most `IN_A_ROW` times in a row, so that one more failure proves a permanent
+fault.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ KINDS = (
 )
 
 IN_A_ROW = 3
-"""How often in a row a passing fault can hit the same subject."""
+"""Maximum number of consecutive transient faults of the same subject."""
 PERMANENT_SHARE = 0.12
 """The share of permanent faults where a permanent form exists."""
 PER_RUN = {ITEM_MOVED: 3, ITEM_ADDED: 2}
-"""How often somebody else interferes in a run, at most."""
+"""Maximum number of interferences by other people in a run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +49,9 @@ class FiredFault:
 
     Attributes:
         kind: one of `KINDS`.
-        permanent: whether it will never pass.
-        action_id: the call it happened in.
-        items: the items it happened to; for a permanent `no_path` those it keeps from being thrown away.
+        permanent: whether it is permanent.
+        action_id: the call with the fault.
+        items: the items it hit; for a permanent `no_path` those it keeps from being thrown away.
     """
 
     kind: str
@@ -69,13 +69,13 @@ class Draw:
 
 
 class WorldFaults:
-    """Decides on faults and remembers them.
+    """Draws faults and records them.
 
     Attributes:
         fired: every fault that happened, in order.
         ungraspable: items that can never be grasped, with the kind of fault.
-        unrecognisable: items that no perception finds any more.
-        unreachable: destinations that no path leads to any more.
+        unrecognisable: items that the camera no longer finds.
+        unreachable: destinations without a path from now on.
     """
 
     def __init__(self, seed: int = 0, chance: float = 0.0) -> None:
@@ -90,11 +90,11 @@ class WorldFaults:
         self._in_a_row: dict[str, int] = {}
 
     def draw(self, action_id: str, possible: Mapping[str, bool]) -> Draw | None:
-        """The fault that happens in this call, if one does.
+        """Return the fault of this call, or `None`.
 
         Args:
             action_id: the call.
-            possible: the kinds that can happen in it now, each with whether it could be permanent.
+            possible: the kinds that can happen in it now; true for a kind that may be permanent.
         """
         if not possible or uniform(self.seed, action_id, "fault") >= self.chance:
             return None
@@ -103,29 +103,29 @@ class WorldFaults:
         return Draw(kind, permanent=possible[kind] and lasting)
 
     def fire(self, draw: Draw, action_id: str, *items: str) -> None:
-        """Remember that a drawn fault happened."""
+        """Record that a drawn fault happened."""
         self.fired.append(FiredFault(draw.kind, draw.permanent, action_id, items))
 
     def left_for(self, kind: str) -> bool:
-        """Whether somebody else may interfere in this way once more in this run."""
+        """Return whether this interference may happen again in this run."""
         return sum(fault.kind == kind for fault in self.fired) < PER_RUN[kind]
 
     def may_fail(self, effort: str, subject: str) -> bool:
-        """Whether a passing fault may hit this effort (e.g. `grasp` of `cup1`) once more in a row."""
+        """Return whether another transient fault may hit this effort (e.g. `grasp` of `cup1`)."""
         return self._in_a_row.get(f"{effort} {subject}", 0) < IN_A_ROW
 
     def failed(self, effort: str, subject: str) -> int:
-        """Count a failure; how many there have been in a row."""
+        """Count a failure; return the number of consecutive failures."""
         key = f"{effort} {subject}"
         self._in_a_row[key] = self._in_a_row.get(key, 0) + 1
         return self._in_a_row[key]
 
     def passed(self, effort: str, subject: str) -> None:
-        """Count a success: the row of failures ends."""
+        """Count a success, which ends a sequence of failures."""
         self._in_a_row.pop(f"{effort} {subject}", None)
 
     def to_json(self) -> dict[str, Any]:
-        """As plain JSON data."""
+        """Return plain JSON data."""
         return {
             "seed": self.seed,
             "chance": self.chance,
@@ -138,7 +138,7 @@ class WorldFaults:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> WorldFaults:
-        """The inverse of `to_json`."""
+        """Return the faults of a form; the inverse of `to_json`."""
         faults = cls(data["seed"], data["chance"])
         faults.fired = [FiredFault(**{**fault, "items": tuple(fault["items"])}) for fault in data["fired"]]
         faults.ungraspable = dict(data["ungraspable"])

@@ -99,7 +99,7 @@ def test_a_world_in_a_file_is_the_world_with_all_it_has_done(tmp_path):
 
 
 def test_a_world_that_is_not_there_or_none_is_said_so(tmp_path):
-    with pytest.raises(StoreError, match="the world of the run is not there"):
+    with pytest.raises(StoreError, match="the world of the run is missing"):
         DurableWorld.open(tmp_path / "none")
     (tmp_path / "text").write_text("this is no database, and long enough to be seen as none" * 20)
     with pytest.raises(StoreError, match="cannot read the world"):
@@ -157,7 +157,7 @@ def test_the_world_of_a_store_that_was_deleted_makes_place_for_the_next(tmp_path
 
 
 def test_a_store_that_has_a_run_is_not_begun_anew(whole, planner):
-    with pytest.raises(InputError, match="has a run already; go on with it by --resume"):
+    with pytest.raises(InputError, match="has a run already; resume it by --resume"):
         deploy(None, 3, 0.2, planner, store=whole[0])
 
 
