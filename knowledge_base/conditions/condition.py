@@ -10,9 +10,9 @@ from threading import Lock
 from types import TracebackType
 from typing import Literal, Protocol, Self
 
-from knowledge_base.conditions.alpha_index import ConditionRow
 from knowledge_base.conditions.condition_shape import Args
 from knowledge_base.conditions.damping import Hold
+from knowledge_base.conditions.join import ConditionRow
 from knowledge_base.conditions.waiters import Waiters
 from knowledge_base.errors import ConditionCancelledError, InputError
 from knowledge_base.facts import Value
@@ -150,7 +150,7 @@ class Condition:
     def error(self) -> InputError | None:
         """Why it cannot be computed at present, e.g. a division by zero; it then counts as false."""
         with self._owner.lock:
-            return next((e for row in self.rows if (e := row.relation.error(row)) is not None), None)
+            return next((e for row in self.rows if (e := row.error) is not None), None)
 
     @property
     def fired(self) -> int:

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from knowledge_base.conditions.alpha_index import AlphaIndex, ConditionRow
+from knowledge_base.conditions.alpha_index import AlphaIndex
 from knowledge_base.conditions.condition import FIRE, Condition, Fire, Terms
 from knowledge_base.conditions.condition_shape import Args, Lifted, Shape, lifted
 from knowledge_base.conditions.damping import Hold, TimerClock, relaxed
 from knowledge_base.conditions.dependencies import BOTH, Kind, Occurrence
-from knowledge_base.conditions.join import Join
+from knowledge_base.conditions.join import ConditionIndex, ConditionRow, Join
 from knowledge_base.conditions.notification import Notifier
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact, Value
@@ -59,7 +59,7 @@ class Installed:
         self._world = world
         self._announcer = announcer
         self._relations: dict[Shape, Join] = {}
-        self._readers: dict[tuple[Kind, str], AlphaIndex] = {}
+        self._readers: dict[tuple[Kind, str], ConditionIndex] = {}
         self._told: dict[ConditionRow, dict[Condition, None]] = {}
         self._changed: dict[ConditionRow, None] = {}
         self._numbers = 0
@@ -150,8 +150,8 @@ class Installed:
         self._changed.clear()
         suspects = dict.fromkeys(s for readers, args, sign in reached for s in readers.broken(args, sign))
         renewed = [row for row, witness in suspects if row.relation.loses(row, witness)]
-        failing = dict.fromkeys(relation for readers, _, _ in reached for relation in readers.failing)
-        for row in dict.fromkeys((*renewed, *(row for relation in failing for row in relation.failed))):
+        failing = (row for readers, _, _ in reached for row in readers.failing)
+        for row in dict.fromkeys((*renewed, *failing)):
             row.relation.renew(row)
         for readers, args, sign in reached:
             for trigger, rows in tuple(readers.made(args, sign)):
@@ -168,5 +168,5 @@ class Installed:
             self._relations[found.shape] = relation
         return relation.row(found.key)
 
-    def _readers_of(self, occurrence: Occurrence) -> AlphaIndex:
+    def _readers_of(self, occurrence: Occurrence) -> ConditionIndex:
         return self._readers.setdefault((occurrence.kind, occurrence.name), AlphaIndex())

@@ -5,19 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, lru_cache
 
-from knowledge_base.conditions.alpha_index import (
-    ROWS,
-    AlphaIndex,
-    ConditionRow,
-    RowsWorld,
-    picker,
-    row_fact,
-    schema_with_rows,
-)
+from knowledge_base.conditions.alpha_index import AlphaIndex, picker
 from knowledge_base.conditions.condition_shape import Args, Shape
 from knowledge_base.conditions.dependencies import Occurrence, occurrences
+from knowledge_base.conditions.open_rows import ROWS, RowsWorld, schema_with_rows
 from knowledge_base.errors import InputError
-from knowledge_base.facts import Value
+from knowledge_base.facts import Fact, Value
 from knowledge_base.language.compiler import compile_query, compile_test
 from knowledge_base.language.expression import And, Atom, Expression, Variable, free_variables
 from knowledge_base.language.generated_code import test_source
@@ -28,21 +21,61 @@ from knowledge_base.world.index import FactIndex
 from knowledge_base.world.state import WorldState
 
 _source = lru_cache(maxsize=1024)(test_source)
-"""Written once for conditions that are installed again and again."""
+"""Cached for conditions that are installed repeatedly."""
+
+
+class ConditionRow:
+    """All installed conditions of one shape with the same values.
+
+    Attributes:
+        relation: the join of that shape.
+        key: the values of the shape's parameters.
+        bindings: the same, by name.
+        witnesses: choices for the shape's answers that make it true: one is kept, or all (`wants_all`).
+        wants_all: whether each change of the set of witnesses counts.
+        is_listed: whether changes find it among the open rows.
+        error: the error that leaves it without a truth value, if any.
+    """
+
+    __slots__ = ("bindings", "error", "is_listed", "key", "relation", "wants_all", "witnesses")
+
+    def __init__(self, relation: Join, key: Args) -> None:
+        self.relation = relation
+        self.key = key
+        self.bindings: dict[str, Value] = dict(zip(relation.shape.params, key, strict=True))
+        self.is_listed = False
+        self.error: InputError | None = None
+        self.witnesses: dict[Args, None] = {}
+        self.wants_all = False
+
+    @property
+    def truth(self) -> bool:
+        """Whether there is a witness."""
+        return bool(self.witnesses)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether another witness would make a difference."""
+        return self.wants_all or not self.witnesses
+
+    @property
+    def witness(self) -> Args | None:
+        """A choice for the shape's answers that makes it true."""
+        return next(iter(self.witnesses), None)
 
 
 class DeltaJoin:
-    """An occurrence in a shape; it puts the shape's rows and witnesses where a change finds them.
+    """An occurrence in a shape; it puts the rows and witnesses of the shape into the alpha index.
 
     Attributes:
-        relation: the shape with its rows.
-        readers: all who read what it is about.
+        relation: the join of the shape.
+        readers: the index of the name that it reads.
         covers: whether a change determines all parameters.
         finds: whether a change determines some of the answers.
-        leaves_open: whether it leaves some of them open.
+        leaves_open: whether some of them stay undetermined.
     """
 
-    def __init__(self, occurrence: Occurrence, relation: Join, readers: AlphaIndex) -> None:
+    def __init__(self, occurrence: Occurrence, relation: Join, readers: ConditionIndex) -> None:
         shape = relation.shape
         positions = dict(occurrence.bound)
         columns = {name: i for i, name in enumerate((*shape.params, *shape.answers))}
@@ -64,11 +97,11 @@ class DeltaJoin:
         return {name: args[i] for name, i in self._occurrence.bound}
 
     def lean(self, row: ConditionRow, witness: Args) -> None:
-        """The witness is kept and has to be looked at when what it relies on changes."""
+        """Keep the witness where a change of its facts finds it."""
         self._relying.setdefault(self._relied_on((*row.key, *witness)), {})[row, witness] = None
 
     def let_go(self, row: ConditionRow, witness: Args) -> None:
-        """The witness is not kept any more."""
+        """Forget the witness."""
         values = self._relied_on((*row.key, *witness))
         leaning = self._relying.get(values)
         if leaning is not None:  # two occurrences may rely on the same fact
@@ -77,11 +110,11 @@ class DeltaJoin:
                 del self._relying[values]
 
     def open(self, row: ConditionRow) -> None:
-        """Another witness of the row would make a difference."""
+        """Keep the row where a change that gives it a witness finds it."""
         self._open.setdefault(self._known(row.key), {}).setdefault(self, {})[row] = None
 
     def close(self, row: ConditionRow) -> None:
-        """It would make none any more."""
+        """Forget the open row."""
         values = self._known(row.key)
         rows = self._open[values][self]
         del rows[row]
@@ -94,7 +127,7 @@ class DeltaJoin:
     def admits(self) -> Callable[..., bool]:
         """Whether a change with these arguments fits, and what it alone settles of the condition is true.
 
-        Most changes end here. What cannot be computed is left to who looks at the whole condition.
+        Most changes end here. An error counts as true: the evaluation of the whole condition reports it.
         """
         names = {position: name for name, position in self._occurrence.bound}
         said = Atom(self._occurrence.name, tuple(Variable(names[i]) for i in sorted(names)))  # true by the change
@@ -142,16 +175,16 @@ class Join:
 
     Args:
         shape: the conditions without their values.
-        world: what they are about; it has a change already when it is told here.
-        readers: all who read what an occurrence is about.
-        changed: gets the rows whose witnesses become others.
+        world: their world; a change is made there before the join receives it.
+        readers: finds the index of the name that an occurrence reads.
+        changed: receives the rows with other witnesses than before.
     """
 
     def __init__(
         self,
         shape: Shape,
         world: WorldState,
-        readers: Callable[[Occurrence], AlphaIndex],
+        readers: Callable[[Occurrence], ConditionIndex],
         changed: dict[ConditionRow, None],
     ) -> None:
         schema = world.schema
@@ -164,7 +197,6 @@ class Join:
         self._joins = not all(t.covers for t in self._triggers)
         self._open = FactIndex()
         self._rows_world = RowsWorld(world, self._open)
-        self._failed: dict[ConditionRow, InputError] = {}
         self._changed = changed
 
     def row(self, key: Args) -> ConditionRow:
@@ -176,7 +208,7 @@ class Join:
         return row
 
     def want_all(self, row: ConditionRow) -> None:
-        """From now on every change of the row's set of witnesses counts."""
+        """Keep all witnesses of the row from now on."""
         if not row.wants_all:
             row.wants_all = True
             self.renew(row)
@@ -189,17 +221,8 @@ class Join:
         self._list(row, is_open=False)
         del self.rows[row.key]
 
-    def error(self, row: ConditionRow) -> InputError | None:
-        """Why the row cannot be computed, if so."""
-        return self._failed.get(row)
-
-    @property
-    def failed(self) -> list[ConditionRow]:
-        """The rows that cannot be computed."""
-        return list(self._failed)
-
     def loses(self, row: ConditionRow, witness: Args) -> bool:
-        """Drop a witness that is none any more; whether the row has to be searched then."""
+        """Drop the witness if it no longer holds; return whether the row needs a search then."""
         try:
             if self._test(self.world, {**row.bindings, **dict(zip(self.shape.answers, witness, strict=True))}):
                 return False
@@ -223,7 +246,7 @@ class Join:
                 self.renew(row)
 
     def renew(self, row: ConditionRow) -> None:
-        """Search the row as if it were new."""
+        """Evaluate the row again."""
         try:
             found = dict.fromkeys(self._witness(b) for b in self._few(row, self._search(self.world, row.bindings)))
             self._mend(row)
@@ -237,7 +260,7 @@ class Join:
         self._list(row, is_open=row.is_open)
 
     def _complete(self, row: ConditionRow, trigger: DeltaJoin, bindings: Bindings) -> None:
-        """Find what the change makes a witness of the row."""
+        """Find the witnesses of the row that the change makes."""
         together = {**row.bindings, **bindings}
         if not trigger.leaves_open:
             if self._test(self.world, together):
@@ -256,7 +279,7 @@ class Join:
         return tuple([bindings[name] for name in self.shape.answers])
 
     def _add(self, row: ConditionRow, witness: Args) -> None:
-        if witness in row.witnesses or not row.is_open or row in self._failed:
+        if witness in row.witnesses or not row.is_open or row.error is not None:
             return
         row.witnesses[witness] = None
         for trigger in self._triggers:
@@ -274,7 +297,7 @@ class Join:
         self._list(row, is_open=row.is_open)
 
     def _list(self, row: ConditionRow, *, is_open: bool) -> None:
-        """Only open rows are found by what can make them true and take part in joins."""
+        """Put an open row into index and relation, where changes find it; take a closed row out."""
         if row.is_listed is is_open:
             return
         row.is_listed = is_open
@@ -284,16 +307,21 @@ class Join:
             else:
                 trigger.close(row)
         if self._joins and is_open:
-            self._open.add(row_fact(row))
+            self._open.add(Fact(ROWS, row.key))
         elif self._joins:
-            self._open.discard(row_fact(row))
+            self._open.discard(Fact(ROWS, row.key))
 
     def _fail(self, row: ConditionRow, error: InputError) -> None:
-        self._failed[row] = error
+        row.error = error
         for trigger in self._triggers:
-            trigger.readers.failing[self] = None
+            trigger.readers.failing[row] = None
 
     def _mend(self, row: ConditionRow) -> None:
-        if self._failed.pop(row, None) is not None and not self._failed:
+        if row.error is not None:
+            row.error = None
             for trigger in self._triggers:
-                trigger.readers.failing.pop(self, None)
+                trigger.readers.failing.pop(row, None)
+
+
+ConditionIndex = AlphaIndex[ConditionRow, DeltaJoin]
+"""The rows of all joins that read one name."""
