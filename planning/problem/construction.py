@@ -23,12 +23,12 @@ from knowledge_base.language.expression import Expression, Term
 from knowledge_base.language.identity_cache import IdentityCache
 from knowledge_base.language.printer import to_text
 from planning.cancellable_work import WorkLimit
+from planning.problem.assembly import Assembly
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, Some
 from planning.problem.constructs import refuse_unforeseeable
 from planning.problem.costs import ignored, metric_of
 from planning.problem.derived import derivation
 from planning.problem.grounding import Variant
-from planning.problem.numbering import Assembly
 from planning.problem.operators import OperatorCache, OperatorIndex, numbered, things_of
 from planning.problem.reduction import Task, pruned
 from planning.problem.relaxed_reachability import reachable
