@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self, get_args
 
 from knowledge_base.errors import ConflictError, HistoryError, InputError
-from knowledge_base.exchange.world_json import read_json
+from knowledge_base.exchange import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
 from knowledge_base.group_commit import GroupCommit
 from knowledge_base.journal.archive import Archive
@@ -121,7 +121,7 @@ class KnowledgeBase(Observable):
         `source` names a text in messages.
 
         Raises:
-            InputError: as `exchange.json.read_json`.
+            InputError: as `exchange.read_json`.
         """
         state, version = read_json(text_or_path, schema, source)
         return cls(state.schema, clock, MemoryHistory(Version(state, version, clock())))

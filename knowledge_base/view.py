@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 
 from knowledge_base.errors import ConflictError, InputError
-from knowledge_base.exchange.world_json import to_json
+from knowledge_base.exchange import to_json
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.evaluation import Explanation, explain
 from knowledge_base.language.expression import TRUE, Expression

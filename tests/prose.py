@@ -95,7 +95,6 @@ WORDS = {
 """Private or archaic words (patterns), and the words to use instead."""
 
 PENDING = {
-    "knowledge_base/exchange", "knowledge_base/language", "knowledge_base/pddl",
     "knowledge_base/world",
     "benchmarks", "benchmarks/knowledge", "benchmarks/peers",
 }  # fmt: skip

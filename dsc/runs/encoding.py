@@ -27,7 +27,7 @@ from dsc.messages import (
 )
 from dsc.runs.archive import RunRow
 from dsc.trace import Record
-from knowledge_base.exchange.json_forms import delta_form, delta_of
+from knowledge_base.exchange import delta_form, delta_of
 
 Form = dict[str, Any]
 Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage

@@ -14,7 +14,7 @@ from dsc.runs.design_changes import plots_of
 from dsc.runs.encoding import full, message_of
 from dsc.sequencer.reactor import Reactor
 from dsc.trace import Trace
-from knowledge_base.exchange.json_forms import delta_form
+from knowledge_base.exchange import delta_form
 from knowledge_base.facts import Delta
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.history import Version

@@ -23,7 +23,7 @@ from dsc.engine.steps import (
 from dsc.events import Event
 from dsc.messages import ParameterMessage
 from dsc.trace import Trace
-from knowledge_base.exchange.json_forms import delta_form, schema_form, world_form
+from knowledge_base.exchange import delta_form, schema_form, world_form
 from knowledge_base.facts import Change
 from knowledge_base.store import KnowledgeBase
 

@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from dsc.viewer.records import RecordLog
 from knowledge_base.errors import InputError, OutOfBoundsError, UnknownNameError
-from knowledge_base.exchange.json_forms import delta_of, schema_of, world_of
+from knowledge_base.exchange import delta_of, schema_of, world_of
 from knowledge_base.facts import Fact
 from knowledge_base.language.explanation import Explanation
 from knowledge_base.language.expression import Expression, variables_in_order

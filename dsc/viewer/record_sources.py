@@ -13,7 +13,7 @@ from dsc.runs.archive import archive, has_run
 from dsc.trace import Record, header
 from dsc.viewer.records import RecordLog, read_trace
 from knowledge_base.errors import HistoryError, Place, StoreError
-from knowledge_base.exchange.json_forms import delta_form, schema_form, world_form
+from knowledge_base.exchange import delta_form, schema_form, world_form
 from knowledge_base.journal.sidecar_files import is_database
 from knowledge_base.store import KnowledgeBase
 

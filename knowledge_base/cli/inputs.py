@@ -82,7 +82,7 @@ def domain_of(problem: Path) -> Path:
 
 
 def _opened(source: Path, domain: Path | None) -> Opened:
-    from knowledge_base.exchange.world_json import MAX_WORLD_BYTES
+    from knowledge_base.exchange import MAX_WORLD_BYTES
     from knowledge_base.journal.sidecar_files import is_database
     from knowledge_base.pddl.files import MAX_BYTES, decoded, read_bytes, require_size
     from knowledge_base.store import KnowledgeBase

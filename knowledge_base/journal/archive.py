@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from knowledge_base.errors import ConflictError, Place, StoreError
-from knowledge_base.exchange.json_forms import FORM_ERRORS, delta_of, schema_of, world_of
+from knowledge_base.exchange import FORM_ERRORS, delta_of, schema_of, world_of
 from knowledge_base.facts import Change
 from knowledge_base.journal.atomic_files import TABLES
 from knowledge_base.journal.file import reading

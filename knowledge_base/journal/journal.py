@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 from knowledge_base.errors import ConflictError, InputError, Place, StoreError
-from knowledge_base.exchange.json_forms import compact, delta_form, schema_form, schema_hash, world_form
+from knowledge_base.exchange import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
 from knowledge_base.journal.archive import Archive, schema_at
 from knowledge_base.journal.atomic_files import making

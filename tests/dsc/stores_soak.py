@@ -32,7 +32,7 @@ from dsc.runs.archive import archive, has_run
 from dsc.sequencer.replay import replay
 from dsc.viewer.record_sources import records_of
 from knowledge_base.errors import DamagedStoreError, InputError
-from knowledge_base.exchange.json_forms import schema_form, world_form
+from knowledge_base.exchange import schema_form, world_form
 from knowledge_base.facts import Delta, fact
 from knowledge_base.journal import journal
 from knowledge_base.store import KnowledgeBase

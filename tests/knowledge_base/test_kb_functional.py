@@ -16,9 +16,9 @@ from knowledge_base import (
     SchemaError,
     SchemaMismatchError,
     UnknownNameError,
+    exchange,
     fact,
 )
-from knowledge_base.exchange import json_forms
 
 TEXT = """(define (domain house) (:types item place)
   (:predicates (robot-at ?p - place) (at ?i - item ?p - place) (between ?i - item ?a ?b - place) (quiet)))"""
@@ -155,7 +155,7 @@ def test_that_a_predicate_is_functional_lasts(tmp_path):
     with pytest.raises(SchemaMismatchError, match=r"the predicate 'at' was functional, now it is not; .*'robot-at'"):
         KnowledgeBase.open(OPEN, path)
     assert OPEN.merged(HOUSE).functional == {"at", "robot-at"}
-    assert json_forms.schema_hash(OPEN) != json_forms.schema_hash(HOUSE)
+    assert exchange.schema_hash(OPEN) != exchange.schema_hash(HOUSE)
 
 
 def test_a_world_that_says_two_things_is_not_made_functional(tmp_path):

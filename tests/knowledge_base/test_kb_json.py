@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from kb_strategies import SCHEMA, THINGS, deltas, removals
 from kb_worlds import PROPERTY, everything
 
-from knowledge_base import Delta, Fact, InputError, KnowledgeBase, Schema, fact
-from knowledge_base.exchange import json_forms
+from knowledge_base import Delta, Fact, InputError, KnowledgeBase, Schema, exchange, fact
 
 
 @PROPERTY
@@ -24,13 +23,13 @@ def test_a_world_survives_json(changes):
     again = KnowledgeBase.from_json(kb.to_json())
     assert everything(again) == everything(kb)
     assert again.to_json() == kb.to_json()
-    assert json_forms.schema_hash(again.schema) == json_forms.schema_hash(SCHEMA)
+    assert exchange.schema_hash(again.schema) == exchange.schema_hash(SCHEMA)
 
 
 @PROPERTY
 @given(deltas() | removals())
 def test_a_change_survives_json(change):
-    assert repr(json_forms.delta_of(json.loads(json_forms.compact(json_forms.delta_form(change))))) == repr(change)
+    assert repr(exchange.delta_of(json.loads(exchange.compact(exchange.delta_form(change))))) == repr(change)
 
 
 def test_kinds_of_values_are_told_apart():

@@ -46,7 +46,7 @@ def steps_of(work) -> int:
 @pytest.mark.parametrize("read", [Schema.from_pddl, KnowledgeBase.from_json])
 def test_a_device_without_end_is_refused_at_the_bound(read, monkeypatch):
     monkeypatch.setattr(files, "MAX_BYTES", 1000)
-    monkeypatch.setattr("knowledge_base.exchange.world_json.MAX_WORLD_BYTES", 1000)
+    monkeypatch.setattr("knowledge_base.exchange.MAX_WORLD_BYTES", 1000)
     with pytest.raises(InputError, match="/dev/zero: the text has 1001 bytes; at most 1000 are read"):
         read(Path("/dev/zero"))
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 
-from knowledge_base.exchange.json_forms import delta_of
+from knowledge_base.exchange import delta_of
 from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation import holds
 from knowledge_base.language.expression import And, Not, substitute

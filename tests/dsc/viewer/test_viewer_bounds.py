@@ -21,7 +21,7 @@ from dsc.viewer.queries import PageQueries
 from dsc.viewer.records import RecordLog, read_trace
 from dsc.viewer.server import Viewer
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema
-from knowledge_base.exchange.json_forms import schema_form, world_form
+from knowledge_base.exchange import schema_form, world_form
 
 DOMAIN = """(define (domain d) (:types item - object)
     (:predicates (clean ?x - item)) (:functions (weight ?x - item)))"""

@@ -55,7 +55,7 @@ class FakeHands:
 @pytest.fixture(scope="module")
 def viewer():
     from knowledge_base import Schema
-    from knowledge_base.exchange.json_forms import schema_form
+    from knowledge_base.exchange import schema_form
 
     schema = schema_form(
         Schema.parse("(define (domain d) (:types item place) (:predicates (on ?a - item ?b - place)))")

@@ -1,7 +1,13 @@
-"""A world as one JSON text: schema, version, things, facts and values, lossless both ways."""
+"""Worlds, changes and schemas as JSON, for stores and other programs; lossless, in order.
+
+A fact is `["on", "cup1", "table"]`, a value `["weight", "cup1", 0.2]`, in which a geometry is a list. JSON
+distinguishes `1`, `1.0` and `true`, so values keep their Python types. Functions that read forms trust their input: a
+wrong form raises one of `FORM_ERRORS`; `read_json` checks it.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -10,30 +16,127 @@ from pathlib import Path
 from typing import Any
 
 from knowledge_base.errors import InputError, ParseError, Place, SchemaError
-from knowledge_base.exchange.json_forms import (
-    FORM_ERRORS,
-    Form,
-    schema_form,
-    schema_hash,
-    schema_of,
-    world_form,
-    world_of,
-)
-from knowledge_base.facts import Delta
+from knowledge_base.facts import Content, Delta, Fact
+from knowledge_base.language.expression import TypedVariable
+from knowledge_base.language.vocabulary import Signature
 from knowledge_base.pddl.files import read_text
 from knowledge_base.world.change_checks import check_delta
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.schema_compatibility import missing_constants, require_extension
 from knowledge_base.world.state import WorldState
 
+Form = dict[str, Any]
+FORM_ERRORS = (AttributeError, IndexError, KeyError, TypeError, ValueError, RecursionError)
+"""Errors from reading a wrong form, JSON's errors included."""
 FORMAT = "dsc-knowledge/2"
 MAX_WORLD_BYTES = 64 * 1024 * 1024
-"""Of a world in JSON: a million facts. Reading takes about ten bytes of memory for each."""
+"""Bytes of a world in JSON: a million facts. Reading takes about ten bytes of memory for each byte."""
 _PARTS = ("format", "version", "schema_hash", "schema", "nodes", "facts", "values")
 
 
+def compact(form: Form) -> str:
+    """JSON text without spaces, in ASCII: the shortest that every reader agrees about."""
+    return json.dumps(form, separators=(",", ":"), allow_nan=False)
+
+
+def delta_form(delta: Delta) -> Form:
+    """A change, without its empty parts."""
+    form: Form = {
+        "nodes": dict(delta.nodes),
+        "removed_nodes": list(delta.removed_nodes),
+        "removed": _fact_forms(delta.removed),
+        "added": _fact_forms(delta.added),
+        "values": _value_forms(delta.values),
+        "replaced": _fact_forms(delta.replaced),
+    }
+    return {part: said for part, said in form.items() if said}
+
+
+def delta_of(form: Form) -> Delta:
+    """The inverse of `delta_form`."""
+    return Delta(
+        nodes=form.get("nodes", {}),
+        removed=tuple(_facts(form.get("removed", ()))),
+        added=tuple(_facts(form.get("added", ()))),
+        values=_values(form.get("values", ())),
+        removed_nodes=tuple(form.get("removed_nodes", ())),
+        replaced=tuple(_facts(form.get("replaced", ()))),
+    )
+
+
+def world_form(state: WorldState) -> Form:
+    """All objects (constants too), facts and values."""
+    return {"nodes": dict(state.nodes), "facts": _fact_forms(state.facts), "values": _value_forms(state.values)}
+
+
+def world_of(form: Form, schema: Schema) -> WorldState:
+    """The inverse of `world_form`; `schema` is that of the form, or an extension."""
+    return WorldState.of(schema, form["nodes"], _facts(form["facts"]), _values(form["values"]))
+
+
+def schema_form(schema: Schema) -> Form:
+    """All declarations, without their places."""
+    return {
+        "types": dict(schema.types),
+        "constants": dict(schema.constants),
+        "predicates": {name: _parameters(signature) for name, signature in schema.predicates.items()},
+        "functions": {name: [f.result, *_parameters(f)] for name, f in schema.functions.items()},
+        "functional": sorted(schema.functional),
+    }
+
+
+def schema_of(form: Form) -> Schema:
+    """The inverse of `schema_form`.
+
+    Raises:
+        SchemaError: the declarations contradict each other.
+    """
+    return Schema(
+        types=form["types"],
+        constants=form["constants"],
+        predicates={name: _signature(name, parameters) for name, parameters in form["predicates"].items()},
+        functions={name: _signature(name, rest, result) for name, (result, *rest) in form["functions"].items()},
+        functional=frozenset(form["functional"]),
+    )
+
+
+def schema_hash(schema: Schema) -> str:
+    """SHA-256 of the declarations; their order does not count."""
+    text = json.dumps(schema_form(schema), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _fact_forms(facts: Iterable[Fact]) -> list[list[Any]]:
+    return [[f.predicate, *f.args] for f in facts]
+
+
+def _facts(forms: Iterable[list[Any]]) -> Iterable[Fact]:
+    return (Fact(form[0], tuple(form[1:])) for form in forms)
+
+
+def _value_forms(values: Mapping[Fact, Content]) -> list[list[Any]]:
+    return [[f.predicate, *f.args, content] for f, content in values.items()]
+
+
+def _values(forms: Iterable[list[Any]]) -> dict[Fact, Content]:
+    return {Fact(form[0], tuple(form[1:-1])): _content(form[-1]) for form in forms}
+
+
+def _content(form: Any) -> Content:
+    """JSON has no tuples: a geometry is a list there."""
+    return tuple(form) if isinstance(form, list) else form
+
+
+def _parameters(signature: Signature) -> list[list[Any]]:
+    return [[p.name, *p.types] for p in signature.parameters]
+
+
+def _signature(name: str, parameters: list[list[Any]], result: str | None = None) -> Signature:
+    return Signature(name, tuple(TypedVariable(p[0], tuple(p[1:])) for p in parameters), result)
+
+
 def to_json(state: WorldState, version: int) -> str:
-    """The world as JSON text; `exchange.json_forms` describes facts and values."""
+    """The world as JSON text; the module describes facts and values."""
     said = {
         "format": FORMAT,
         "version": version,
@@ -52,16 +155,16 @@ def read_json(
     """The world and its version, from JSON text or a file (a `Path`).
 
     Args:
-        text_or_path: what `to_json` wrote, or somebody by hand.
-        schema: what it is read with, when that is more than what it was written with.
+        text_or_path: text of the form that `to_json` writes.
+        schema: an extension of the text's schema; by default that itself.
         source: the name of the text in messages.
 
     Raises:
         InputError: the file cannot be read, has more than `MAX_WORLD_BYTES`, or it holds a number that is not finite.
         ParseError: it does not have this form.
-        SchemaMismatchError: `schema` is no extension of the text's own.
+        SchemaMismatchError: `schema` does not extend the text's schema.
         SchemaError: the facts contradict the schema, or it itself.
-        UnknownNameError: a name that is not declared, or a thing that is not there.
+        UnknownNameError: an undeclared name, or an unknown object.
     """
     if isinstance(text_or_path, Path):
         text, place = read_text(text_or_path, most=MAX_WORLD_BYTES), Place(source or str(text_or_path))
@@ -134,7 +237,7 @@ def _is_item(item: Any, least: int, *, content: bool) -> bool:
 
 
 def _require_admissible(state: WorldState) -> None:
-    """What was read is judged like a change that makes it all."""
+    """Check the world like a change from an empty one."""
     check_delta(Delta(state.nodes, (), tuple(state.facts), state.values), WorldState.of(state.schema, {}, (), {}))
 
 

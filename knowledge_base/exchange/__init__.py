@@ -1,1 +1,0 @@
-"""Worlds, changes and schemas as JSON, for stores and for other programs."""
