@@ -17,16 +17,13 @@ import inspect
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast
+from typing import Any, Literal, Protocol, TypeVar, cast
 
 from dsc.blocking import in_process, in_thread
 from dsc.calls import Outcome, SkillCall
 from dsc.events import EXECUTIVES
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import shown
-
-if TYPE_CHECKING:
-    from dsc.components.event_activations import EventActivations
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
 """What may be done about an action of which nothing is known: do it again, since twice is as once; do it with the
@@ -63,15 +60,13 @@ class SkillSignature:
 
 
 class Skilled(Protocol):
-    """What carries out skills: decorators need know no more of a component.
+    """The owner of a skill's body, as decorators see it.
 
     Attributes:
         name: how charts address it.
-        activations: who has activated its events.
     """
 
     name: str
-    activations: EventActivations
 
 
 CarryOut = Callable[[Skilled, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]

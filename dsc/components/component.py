@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, ClassVar, cast
 
 from dsc.calls import Ended, Outcome, SkillCall, Status
-from dsc.components.component_dependencies import ALWAYS
 from dsc.components.event_activations import EventActivations
 from dsc.components.hooks import contained
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
@@ -27,6 +26,8 @@ from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import UnknownNameError, described
 
+ALWAYS = ""
+"""Stands for every mode in `Component.needs`."""
 TAKES = "__dsc_takes__"
 """Where `takes` notes what it declares."""
 

@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 from dsc.components.component import Component
-from dsc.components.component_registry import require_instances
+from dsc.components.component_checks import require_instances
 from dsc.components.hooks import contained
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, UnknownNameError, described

@@ -22,7 +22,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from dsc.calls import Outcome, SkillCall
-from dsc.components.component import TAKES
+from dsc.components.component import TAKES, Component
 from dsc.components.hooks import contained
 from dsc.skills import Declared, SkillBody, Skilled, require_names
 
@@ -75,6 +75,7 @@ async def _ask(_: Skilled, body: SkillBody, __: SkillCall, arguments: Mapping[st
 
 async def _activate(component: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     """Test each value until we are cancelled, or the test fails."""
+    assert isinstance(component, Component)  # noqa: S101  # events are methods of components
     held = False
     forever: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
 

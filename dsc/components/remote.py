@@ -18,9 +18,9 @@ from dataclasses import asdict
 from typing import Any
 
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
-from dsc.components.activation import Heartbeat
 from dsc.components.component import Component
 from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError
+from dsc.components.heartbeat import Heartbeat
 from dsc.components.hosted import HostedActions, outcome_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import RENEWED, Publisher, Subscription

@@ -6,22 +6,27 @@ import asyncio
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Protocol, Self
 
 from dsc.components.endpoint import NoAnswerError, encoded
-from dsc.components.life_cycle import Life
+from dsc.components.life_cycle import Life, LifeCycle
 from dsc.model.ranges import Range
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.inputs import shown
-
-if TYPE_CHECKING:
-    from dsc.components.component import Component
-
 
 Values = Mapping[str, str | None]
 """What is pushed, by name with types: `number`, `boolean`, a word of any other type, or `None`: any plain data."""
 Hears = Callable[[dict[str, Any]], None]
 """Is given what was pushed, a copy of its own."""
+
+
+class Ported(Protocol):
+    """A component, as its ports and their wiring see it."""
+
+    name: str
+    life: LifeCycle
+    pushes: dict[str, Push]
+    streams: dict[str, Stream]
 
 
 class Push:
@@ -40,7 +45,7 @@ class Push:
     """
 
     def __init__(
-        self, values: Values, period: float | None = None, component: Component | None = None, name: str = ""
+        self, values: Values, period: float | None = None, component: Ported | None = None, name: str = ""
     ) -> None:
         self.values = _checked(values, "a push port")
         if period is not None and not (isinstance(period, int | float) and 0 < period < math.inf):
@@ -56,7 +61,7 @@ class Push:
         """What goes to another process: who listens here does not."""
         return {**self.__dict__, "_listeners": {}, "_timer": None}
 
-    def of(self, component: Component, name: str) -> Self:
+    def of(self, component: Ported, name: str) -> Self:
         """The port that this declares, for one component."""
         return type(self)(self.values, self.period, component, name)
 
@@ -216,13 +221,13 @@ class Wiring:
         SchemaError: a value is of another type than the stream wants.
     """
 
-    def __init__(self, components: Mapping[str, Component]) -> None:
+    def __init__(self, components: Mapping[str, Ported]) -> None:
         self._components = components
         self._connected: dict[Stream, Push] = {}
         for component in components.values():
             self._connect(component)
 
-    def deployed(self, component: Component) -> None:
+    def deployed(self, component: Ported) -> None:
         """A component is there, maybe in place of another one."""
         for stream, port in list(self._connected.items()):
             if stream.publisher == component.name:
@@ -237,7 +242,7 @@ class Wiring:
             port.leave(stream.hear)
         self._connected = {}
 
-    def _connect(self, component: Component) -> None:
+    def _connect(self, component: Ported) -> None:
         for stream in component.streams.values():
             publisher = self._components.get(stream.publisher)
             if publisher is not None and stream not in self._connected:
@@ -245,7 +250,7 @@ class Wiring:
                 port.listen(stream.hear)
 
 
-def port_for(stream: Stream, publisher: Component) -> Push:
+def port_for(stream: Stream, publisher: Ported) -> Push:
     """The port that a stream names, if it fits; raises `UnknownNameError` and `SchemaError` as `Wiring`."""
     if stream.port not in publisher.pushes:
         message = f"component '{publisher.name}' has no push port '{stream.port}'"
@@ -254,7 +259,7 @@ def port_for(stream: Stream, publisher: Component) -> Push:
     return publisher.pushes[stream.port]
 
 
-def require_wired(components: Iterable[Component]) -> None:
+def require_wired(components: Iterable[Ported]) -> None:
     """Raise an error unless all streams of these components have the ports that they name.
 
     Raises:

@@ -18,12 +18,10 @@ from typing import Any
 from dsc.blocking import DeadlineError
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.abandonment import GRACE, give_up
-from dsc.components.activation import ComponentActivation
 from dsc.components.component import Component
-from dsc.components.component_registry import ComponentRegistry, require_instances
+from dsc.components.component_checks import require_instances
 from dsc.components.hooks import contained, is_own
 from dsc.components.reports import Reports
-from dsc.components.skill_dependencies import SkillDependencies
 from dsc.components.streams import Wiring
 from dsc.engine.steps import (
     Cancel,
@@ -45,6 +43,9 @@ from dsc.sequencer.outcome_checks import Declared, broken, declared, encoded, la
 from dsc.sequencer.resumed_skills import InterruptedSkill, PastClock, asked_after
 from dsc.sequencer.timers import Timers
 from dsc.skills import Pattern
+from dsc.supervision.activation import ComponentActivation
+from dsc.supervision.component_registry import ComponentRegistry
+from dsc.supervision.skill_dependencies import SkillDependencies
 from knowledge_base.errors import InputError, UnknownNameError, described
 
 DEFAULT_WITHIN = 300.0

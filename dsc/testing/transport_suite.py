@@ -20,19 +20,20 @@ from typing import Any, ClassVar
 import pytest
 
 from dsc.calls import Outcome, SkillCall
-from dsc.components.activation import BEAT, SILENCE, ComponentActivation, Heartbeat
 from dsc.components.component import Component
-from dsc.components.component_registry import ComponentRegistry, NotAliveError
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
+from dsc.components.heartbeat import BEAT, SILENCE, Heartbeat
 from dsc.components.life_cycle import Life
 from dsc.components.ports import event, query, takes
 from dsc.components.publication import Publisher, Subscription
 from dsc.components.remote import Host, RemoteComponent
-from dsc.components.skill_dependencies import SkillDependencies
 from dsc.components.streams import Push, Stream, Wiring
 from dsc.components.transport import Transport
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
+from dsc.supervision.activation import ComponentActivation
+from dsc.supervision.component_registry import ComponentRegistry, NotAliveError
+from dsc.supervision.skill_dependencies import SkillDependencies
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 

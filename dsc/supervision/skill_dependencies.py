@@ -5,15 +5,13 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable
 from contextlib import suppress
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-from dsc.components.activation import ComponentActivation
-from dsc.components.component_registry import ComponentRegistry, NotAliveError
+from dsc.components.component import Component
 from dsc.components.life_cycle import Life
+from dsc.supervision.activation import ComponentActivation
+from dsc.supervision.component_registry import ComponentRegistry, NotAliveError
 from knowledge_base.errors import InputError
-
-if TYPE_CHECKING:
-    from dsc.components.component import Component
 
 _Result = TypeVar("_Result")
 

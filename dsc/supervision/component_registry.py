@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable, MutableMapping
+from collections.abc import MutableMapping
 
 from dsc.components.component import Component
-from dsc.components.component_dependencies import require_declared
 from dsc.components.hooks import contained
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.inputs import require_several, shown
+from knowledge_base.errors import UnknownNameError
 
 
 class NotAliveError(Exception):
@@ -70,25 +68,3 @@ class ComponentRegistry:
 async def _reached(needing: Component, name: str) -> Component:
     with contained():
         return await needing.reach(name)
-
-
-def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
-    """All of them, if these are components, each with a name of its own.
-
-    Raises:
-        InputError: it is no list of them, something in it is none, e.g. a class instead of its instance, or what one
-            needs is not said rightly.
-        SchemaError: two have one name.
-    """
-    require_several(components, "components")
-    components = tuple(components)
-    names = set()
-    for one in components:
-        if not isinstance(one, Component):
-            hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
-            raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
-        if one.name in names:
-            raise SchemaError(f"two components are named '{one.name}'", found=one.name)
-        require_declared(one)
-        names.add(one.name)
-    return components

@@ -1,22 +1,38 @@
-"""Whom components need, as they declare it: judged before anything runs."""
+"""Checks of deployed components before a run: instances, unique names, declared needs."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from typing import TYPE_CHECKING
 
+from dsc.components.component import ALWAYS, Component
 from dsc.components.life_cycle import NEUTRAL
-from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.inputs import shown
-
-if TYPE_CHECKING:
-    from dsc.components.component import Component
-
-ALWAYS = ""
-"""Stands for every mode in `Component.needs`."""
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.inputs import require_several, shown
 
 
-def require_declared(component: Component) -> None:
+def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
+    """All of them, if these are components, each with a name of its own.
+
+    Raises:
+        InputError: it is no list of them, something in it is none, e.g. a class instead of its instance, or what one
+            needs is not said rightly.
+        SchemaError: two have one name.
+    """
+    require_several(components, "components")
+    components = tuple(components)
+    names = set()
+    for one in components:
+        if not isinstance(one, Component):
+            hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
+            raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
+        if one.name in names:
+            raise SchemaError(f"two components are named '{one.name}'", found=one.name)
+        _require_needs(one)
+        names.add(one.name)
+    return components
+
+
+def _require_needs(component: Component) -> None:
     """Raise an error unless a component's `needs` are names, for modes that it has.
 
     Raises:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Collection
 from contextlib import suppress
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from dsc.components.abandonment import GRACE
+from dsc.components.component import Component
 from dsc.components.life_cycle import Life
-
-if TYPE_CHECKING:
-    from dsc.components.component import Component
 
 PAUSE = 1.0
 """Seconds after which a component that could not start is started anew; twice as many each time it cannot."""

@@ -1,0 +1,98 @@
+"""Heartbeats carry the activation tree over a transport: active components say whom they need (S1.9, S4.1)."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable, Collection
+from contextlib import suppress
+from typing import Any
+
+from dsc.components.endpoint import Endpoint
+
+BEAT = 0.5
+"""Seconds between heartbeats."""
+SILENCE = 3.0
+"""Seconds without a heartbeat after which a component counts as gone: some may be lost."""
+
+Changed = Callable[[bool], Awaitable[None]]
+"""Is told that the component has become active, or inactive: to take its resources and to free them."""
+
+
+class Heartbeat:
+    """One component's part in the activation tree.
+
+    Args:
+        endpoint: its address.
+        needs: names of the components it needs at present; asked at each beat, so it may depend on its state.
+        changed: is told when it becomes active or inactive.
+        root: active without anybody needing it, as the sequencer is.
+    """
+
+    def __init__(
+        self, endpoint: Endpoint, needs: Callable[[], Collection[str]], changed: Changed, *, root: bool = False
+    ) -> None:
+        self._endpoint = endpoint
+        self._needs = needs
+        self._changed = changed
+        self._root = root
+        self._heard_at: dict[str, float] = {}
+        self._activators: set[str] = set()
+        self._stirred = asyncio.Event()
+        self.active = False
+        endpoint.hear("heartbeat", self._heard)
+
+    def alive(self, name: str) -> bool:
+        """Whether a component is active and was heard of lately."""
+        return _now() - self._heard_at.get(name, -math.inf) < SILENCE
+
+    @property
+    def activators(self) -> frozenset[str]:
+        """Who needs it at present."""
+        return frozenset(self._activators)
+
+    def stir(self) -> None:
+        """Beat at once: its needs have changed."""
+        self._stirred.set()
+
+    async def run(self) -> None:
+        """Beat until cancelled; then the component is inactive, and says so."""
+        try:
+            while True:
+                await self._beat()
+                self._stirred.clear()
+                with suppress(TimeoutError):
+                    async with asyncio.timeout(BEAT):
+                        await self._stirred.wait()
+        finally:
+            await self._become(active=False)
+
+    async def _beat(self) -> None:
+        self._heard_at = {name: at for name, at in self._heard_at.items() if _now() - at < SILENCE}
+        self._activators = {name for name in self._activators if self.alive(name)}
+        await self._become(active=self._root or bool(self._activators))
+        if self.active:
+            self._endpoint.broadcast("heartbeat", {"needs": sorted(self._needs())})
+
+    async def _become(self, *, active: bool) -> None:
+        if active == self.active:
+            return
+        self.active = active
+        if not active:  # who depends on us need not wait for our silence
+            self._endpoint.broadcast("heartbeat", {"needs": []})
+        await self._changed(active)
+
+    def need(self, sender: str) -> None:
+        """Somebody says, otherwise than by a heartbeat, that it is active and needs this component."""
+        self._heard(sender, {"needs": [self._endpoint.address]})
+
+    def _heard(self, sender: str, said: Any) -> None:
+        needed = self._endpoint.address in said["needs"]
+        self._heard_at[sender] = _now()
+        if needed != (sender in self._activators):
+            (self._activators.add if needed else self._activators.discard)(sender)
+            self.stir()
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()
