@@ -168,6 +168,7 @@ def _viewed(
     deployed: CleanUpTable, follow: partial[Report], port: int, *, opens: bool, control: bool, wait: bool
 ) -> Report:
     """Run with a page in the browser, which stays open after the run."""
+    from dsc.cli.view import page, until_interrupt, viewer_installed
     from dsc.trace import header
 
     viewer_installed()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dsc.calls import Outcome
@@ -20,6 +21,7 @@ class SkillMessage:
         final: whether the skill has ended with it.
         goes_on: whether the skill only counts as ended, and is to be cancelled.
         conflated: number of older reports of the same event that it replaces, see `dsc.components.reports`.
+        declared: the declared types of the outcome's attributes; `None` if there are none to validate.
     """
 
     start: Start
@@ -27,6 +29,7 @@ class SkillMessage:
     final: bool
     goes_on: bool = False
     conflated: int = 0
+    declared: Mapping[str, str | None] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,93 +12,83 @@ from dsc.sequencer.clock import LoopClock
 
 
 class PendingCleanups:
-    """What was cancelled, until it has stopped or was given up after `GRACE` seconds: nobody waits for longer.
+    """Cancelled tasks until they have stopped; a task that ignores its cancellation is abandoned after `GRACE` seconds.
 
     Args:
-        say: is told the component of which something has stopped, or was given up.
+        say: receives the component of a task that has stopped, or was abandoned.
+
+    Attributes:
+        pending: components with cancelled tasks that have not stopped.
     """
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
-        self._ending: dict[str, dict[asyncio.Task[None], asyncio.Future[None]]] = {}
+        self.pending: dict[str, dict[asyncio.Task[None], asyncio.Future[None]]] = {}
 
     def add(self, component: str, task: asyncio.Task[None], say: Callable[[], None]) -> None:
-        """Bound a task of a component that was just cancelled; `say` is called if it is given up."""
+        """Bound a cancelled task of a component; call `say` if it is abandoned."""
         over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        of_component = self._ending.setdefault(component, {})
+        of_component = self.pending.setdefault(component, {})
         of_component[task] = over
 
         def end(_: asyncio.Task[None]) -> None:
             if of_component.pop(task, None) is not None:
+                if not of_component:
+                    del self.pending[component]
                 over.set_result(None)
                 self._say(component)
 
-        def give_up() -> None:
+        def abandon() -> None:
             end(task)
             say()
 
         task.add_done_callback(end)
-        give_up_after(task, GRACE, give_up)
-
-    def components(self) -> Iterable[str]:
-        """Those of which something is still ending."""
-        return [component for component, ending in self._ending.items() if ending]
-
-    def of(self, component: str) -> bool:
-        """Whether anything of the component is still ending."""
-        return bool(self._ending.get(component))
+        give_up_after(task, GRACE, abandon)
 
     async def over(self, component: str) -> None:
-        """Wait until nothing of the component is ending any more."""
-        while ending := self._ending.get(component):
+        """Wait until no cancelled task of the component is left."""
+        while ending := self.pending.get(component):
             await asyncio.wait(ending.values())
 
     def tasks(self) -> Iterable[asyncio.Task[None]]:
-        """What is to be waited for at the end."""
-        return [task for of_component in self._ending.values() for task in of_component]
+        """The tasks that have not stopped."""
+        return [task for of_component in self.pending.values() for task in of_component]
 
 
 class TimeLimit:
-    """Bounds a task; `asyncio.timeout` and a bound for who swallows it, with one timer for both.
+    """Cancels a task at a second of run time, and abandons it if it ignores that: one timer for both.
 
     Args:
-        say: called when nobody waits for the task any more: it went on for `GRACE` seconds after it was cancelled, or
-            has ended and left its limit standing.
+        task: to be bounded.
+        say: called when the task is abandoned: it continued for `GRACE` seconds after its cancellation, or it has
+            ended and left its limit standing.
         clock: tells the time.
-        due: second of run time at which the task is cancelled, unless it is `math.inf`.
+        due: second of run time at which the task is cancelled; `math.inf` means never.
     """
 
-    def __init__(self, say: Callable[[], None], clock: LoopClock, due: float) -> None:
+    def __init__(self, task: asyncio.Task[Any], say: Callable[[], None], clock: LoopClock, due: float) -> None:
         self._expired = False
+        self._task = task
         self._say = say
         self._clock = clock
         self._due = due
-        self._timer: asyncio.TimerHandle | None = None
-        self._task: asyncio.Task[Any] | None = None
+        self._timer = clock.call_at(due, self._expire) if math.isfinite(due) else None
 
     @property
     def passed(self) -> bool:
         """Whether the time is over, maybe unnoticed as the task kept its loop from turning (never if simulated)."""
-        return self._expired or (self._clock.now() > self._due and not self._clock.simulated)
-
-    def begin(self, task: asyncio.Task[Any]) -> None:
-        """Cancel the task when it is due."""
-        self._task = task
-        if math.isfinite(self._due):
-            self._timer = self._clock.call_at(self._due, self._expire)
+        return self._expired or (not self._clock.simulated and self._clock.now() > self._due)
 
     def end(self) -> None:
-        """The task is over, or somebody else sees to its end."""
+        """The task has ended, or another owner bounds it."""
         if self._timer is not None:
             self._timer.cancel()
 
     def has_cancelled(self) -> bool:
-        """Whether the limit has cancelled the task, and nobody else has; the task itself asks, once."""
-        assert self._task is not None  # noqa: S101
+        """Whether the limit alone has cancelled the task; the task itself asks, one time."""
         return self._expired and self._task.uncancel() <= 0
 
     def _expire(self) -> None:
-        assert self._task is not None  # noqa: S101
         self._expired = True
         if self._task.done():
             self._say()
@@ -107,6 +97,5 @@ class TimeLimit:
         self._timer = asyncio.get_running_loop().call_later(GRACE, self._overdue)
 
     def _overdue(self) -> None:
-        assert self._task is not None  # noqa: S101
         give_up(self._task)
         self._say()

@@ -1,4 +1,4 @@
-"""Runs that go round and round without any time passing: in simulated time nothing else would ever come."""
+"""Livelock: messages of the run itself come without end while simulated time stands still."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ from dsc.messages import Message, SkillMessage, TimerMessage
 from dsc.sequencer.clock import LoopClock
 
 MOST = 10_000
-"""Answers, timers and events of its own that a run may take at one moment; a few thousand for a long plan of skills
-that take no time, never so many for a run that comes to an end."""
+"""Answers, timers and own events that a run may take at one moment.
+
+A long plan of skills that take no time needs a few thousand.
+"""
 _SHOWN = 8
 
 
 class LivelockGuard:
-    """Counts what a run brings about itself while its simulated time stands still.
+    """Counts the messages that a run causes itself at one moment of simulated time.
 
-    Real time passes anyhow; whoever watches a robot go round can stop it.
+    Real time passes anyway, and an operator can stop a robot in a livelock.
     """
 
     def __init__(self, clock: LoopClock) -> None:
@@ -27,9 +29,7 @@ class LivelockGuard:
         self._latest: deque[str] = deque(maxlen=_SHOWN)
 
     def problem(self, message: Message) -> str | None:
-        """Why the run cannot go on with this message; `None` as long as it can."""
-        if (now := self._clock.now()) != self._moment:
-            self._moment, self._count = now, 0
+        """The reason to end the run at this message, or `None`."""
         match message:
             case SkillMessage():
                 event = message.outcome.event
@@ -39,6 +39,8 @@ class LivelockGuard:
                 event = message.event.name
             case _:  # from outside
                 return None
+        if (now := self._clock.now()) != self._moment:
+            self._moment, self._count = now, 0
         self._count += 1
         self._latest.append(event)
         if self._count <= MOST:

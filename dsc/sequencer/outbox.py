@@ -1,4 +1,4 @@
-"""What components are told without an answer: parameters, modes and messages, to each in the order they leave in."""
+"""Outbox: parameters, modes and messages on their way to components, to each in the order of dispatch."""
 
 from __future__ import annotations
 
@@ -19,44 +19,48 @@ from knowledge_base.errors import described
 CLOSING = GRACE
 """Seconds for components to take what they were last told, and for cancelled skills to stop."""
 _MOST_REFUSED = 1000
-"""Of a run that is not kept nobody asks what was refused."""
+"""Refusals to remember; a run without a store never asks for them."""
 
 
 class Outbox:
-    """What is on its way to components, or was refused and has not been said to anybody."""
+    """One-way outputs that components have not taken yet, and those that they refused.
+
+    Attributes:
+        untaken: by component, the task that delivers the latest output; removed when a skill has waited for it.
+    """
 
     def __init__(self) -> None:
-        self._untaken: dict[str, asyncio.Task[None]] = {}
+        self.untaken: dict[str, asyncio.Task[None]] = {}
         self._under_way: dict[int, Told] = {}
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
         self._last = 0
 
     @property
     def under_way(self) -> Collection[Told]:
-        """What has been told and not been taken yet, nor refused."""
+        """Outputs that were neither taken nor refused yet."""
         return self._under_way.values()
 
     def refused(self) -> Collection[Told]:
-        """What components have not taken since this was last asked, nor will."""
+        """Outputs that components have refused since the last call."""
         if not self._refused:  # asked with each macrostep that is kept
             return ()
         refused = tuple(self._refused)
         self._refused.clear()
         return refused
 
-    def tell(self, component: Component, told: Told) -> None:
-        """Let the component take it after what it was told before."""
+    def send(self, component: Component, told: Told) -> None:
+        """Deliver an output after the earlier ones to the same component."""
         self._begin(component, (told,), lambda: _take(component, told))
 
-    def tell_again(self, component: Component, in_force: Sequence[SetParameter | SwitchMode]) -> None:
-        """Let the component have what was in force before a restart: its parameters as one set, and then its modes."""
-        parameters = [one for one in in_force if isinstance(one, SetParameter)]
+    def restore(self, component: Component, effective: Sequence[SetParameter | SwitchMode]) -> None:
+        """Deliver the effective settings of before a restart: the parameters as one set, then the modes."""
+        parameters = [one for one in effective if isinstance(one, SetParameter)]
         if parameters:
             values = {one.parameter: one.value for one in parameters}
             self._begin(component, parameters, lambda: component.configure_all(encoded(values)))
-        for one in in_force:
+        for one in effective:
             if isinstance(one, SwitchMode):
-                self._begin(component, (one,), partial(_switch_again, component, one.mode))
+                self._begin(component, (one,), partial(_restore_mode, component, one.mode))
 
     def _begin(self, component: Component, told: Iterable[Told], take: Callable[[], Awaitable[None]]) -> None:
         numbers = {self._last + n: one for n, one in enumerate(told, start=1)}
@@ -77,42 +81,40 @@ class Outbox:
         self._in_turn(component.name, taking)
 
     async def taken(self, component: Component) -> None:
-        """Wait until the component has taken what it was told; raises what it raised, once."""
-        pending = self._untaken.get(component.name)
-        if pending is None:
-            return
+        """Wait until the component has taken its `untaken` outputs; raises its error, one time."""
+        pending = self.untaken[component.name]
         await asyncio.wait([pending])  # unlike `await pending`, this does not cancel it when a skill is cancelled
-        if self._untaken.get(component.name) is pending:
-            del self._untaken[component.name]
+        if self.untaken.get(component.name) is pending:
+            del self.untaken[component.name]
         why = failure(pending)
         if why is not None:
             raise why
 
     async def all_taken(self) -> None:
-        """Wait until all components have taken, or refused, what they were told; not for ever."""
-        if self._untaken:
-            await asyncio.wait(self._untaken.values(), timeout=CLOSING)
+        """Wait until all components have taken or refused their outputs, for `CLOSING` seconds at most."""
+        if self.untaken:
+            await asyncio.wait(self.untaken.values(), timeout=CLOSING)
 
     def tasks(self) -> Iterable[asyncio.Task[None]]:
-        """What is to be waited for at the end."""
-        return self._untaken.values()
+        """The deliveries to wait for at the end."""
+        return self.untaken.values()
 
-    def untaken(self) -> list[str]:
-        """What components could not take, as far as no skill has failed because of it."""
-        return [_untaken(name, task) for name, task in self._untaken.items() if not _succeeded(task)]
+    def failures(self) -> list[str]:
+        """The failed deliveries that failed no skill."""
+        return [_untaken(name, task) for name, task in self.untaken.items() if not _succeeded(task)]
 
     def _in_turn(self, name: str, take: Callable[[], Awaitable[None]]) -> None:
-        before = self._untaken.get(name)
+        before = self.untaken.get(name)
 
         async def in_order() -> None:
             if before is not None:
                 await asyncio.wait([before])
             await take()
             why = None if before is None else failure(before)
-            if why is not None:  # still to be told to the next skill
+            if why is not None:  # the next skill fails with it
                 raise why
 
-        self._untaken[name] = asyncio.get_running_loop().create_task(in_order())
+        self.untaken[name] = asyncio.get_running_loop().create_task(in_order())
 
 
 async def _take(component: Component, told: Told) -> None:
@@ -125,13 +127,13 @@ async def _take(component: Component, told: Told) -> None:
             await component.take(told.port, encoded(told.arguments))
 
 
-async def _switch_again(component: Component, mode: str) -> None:
-    """One that was to start anew has done so."""
+async def _restore_mode(component: Component, mode: str) -> None:
+    """A component that was to start again has done so."""
     await (component.come_alive() if mode == Life.INIT else component.change_mode(mode))
 
 
 def failure(task: asyncio.Task[None]) -> BaseException | None:
-    """What a task that is over raised, if anything."""
+    """The error of a task that is done, or `None`."""
     return None if task.cancelled() else task.exception()
 
 

@@ -12,17 +12,15 @@ from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.machine_state import MachineState
-from dsc.engine.steps import Cancel, Output, SendLater, SetParameter, Start, StartTimer, Step
+from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.runs.encoding import Kept
-from dsc.sequencer.outcome_checks import Declared, broken, require_things
 from dsc.sequencer.step_tracing import StepTracer
 from dsc.trace import Trace
-from knowledge_base.errors import InputError, described
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
-from knowledge_base.language.world import World
 from knowledge_base.store import KnowledgeBase
 
 MOST_CANCELLED = 1_000
@@ -83,7 +81,7 @@ class Reactor:
         """
         self.machine.state = MachineState(serials=serials)
         try:
-            step = self.machine.start(plot, arguments, self._situation())
+            step = self.machine.start(plot, arguments, KnowledgeSituation(self.knowledge, self.library))
         except RunawayError as error:
             self.problem = str(error)
             return ()
@@ -98,12 +96,13 @@ class Reactor:
         try:
             event = self._received(message)
             before = self.machine.state
-            step = self.machine.send(event, self._situation())
+            step = self.machine.send(event, KnowledgeSituation(self.knowledge, self.library))
             said = message.message if isinstance(message, LateMessage) else message
             if isinstance(said, ParameterMessage) and not said.of_plot:
                 step = step._replace(output=(SetParameter(said.owner, said.name, said.value), *step.output))
             in_vain = isinstance(message, TimerMessage) and step.state == before and _is_vain(step)
-            self._note_periods(message, in_vain=in_vain)
+            if in_vain or self.in_vain:
+                self._note_periods(message, in_vain=in_vain)
             output = self._commit(step)
             if event is not None and not step.handled:
                 self._unhandled(message, event)
@@ -112,39 +111,15 @@ class Reactor:
             return ()
         return output
 
-    def believed(self, message: Message, declared: Declared) -> Message:
-        """A skill that says what cannot be has failed, and nothing of it is believed; else the message itself.
-
-        Args:
-            message: whatever came.
-            declared: the attributes of the outcome, if it is a skill's.
-        """
-        if not isinstance(message, SkillMessage) or not (message.outcome.observed or declared):
-            return message
-        said = message.outcome
-        try:
-            worlds: list[World] = [self.knowledge]
-            if said.observed:
-                worlds.insert(0, after := self.knowledge.overlay())
-                after.apply(said.observed)
-            require_things(said.event, said.attributes, declared, *worlds)
-        except Exception as error:  # noqa: BLE001  # what a skill hands over may be anything, e.g. not hashable
-            outcome = broken(message.start, described(error, named=not isinstance(error, InputError)))
-            return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)
-        return message
-
     def leave(self) -> tuple[Output, ...]:
         """Wherever the run ends, exit actions put the components at rest; a finished machine has nothing to leave."""
         if self.machine.state.root is None:
             return ()
         try:
-            return self._commit(self.machine.leave(self._situation()))
+            return self._commit(self.machine.leave(KnowledgeSituation(self.knowledge, self.library)))
         except InputError as error:
             self.problem = self.problem or str(error)
             return ()
-
-    def _situation(self) -> KnowledgeSituation:
-        return KnowledgeSituation(self.knowledge, self.library)
 
     def _received(self, message: Message) -> Event | None:
         """Apply what the message observed; the event the machine shall see, if any."""
@@ -198,7 +173,8 @@ class Reactor:
         event = Event(name, outcome.attributes, to=start.activation)
         skill = f"{start.component}.{start.skill}"
         self.trace.cause = self.tracer.event(event, skill, outcome.event, message.conflated)
-        self._apply(outcome.observed, start.component)
+        if outcome.observed is not NO_CHANGE:
+            self._apply(outcome.observed, start.component)
         return event
 
     def _apply(self, delta: Delta, author: str) -> None:
@@ -212,8 +188,10 @@ class Reactor:
                 for listener in self.listeners:
                     listener(step)
         self.tracer.step(step)
-        self.tracer.decisions(step)
-        self._apply(step.knowledge, CHART)
+        if step.decisions:
+            self.tracer.decisions(step)
+        if step.knowledge is not NO_CHANGE:
+            self._apply(step.knowledge, CHART)
         for output in step.output:
             if isinstance(output, Cancel):
                 self._forget_causes(output.activation)

@@ -1,4 +1,4 @@
-"""After a restart: everything is awaited again that was awaited when the run was broken off."""
+"""Recovery after a restart: re-arms every pending action, timer and scheduled input of an interrupted run."""
 
 from __future__ import annotations
 
@@ -20,53 +20,53 @@ def require_components(kept: Kept, dispatcher: Dispatcher) -> None:
         dispatcher.component(needed)
 
 
-async def take_up(kept: Kept, dispatcher: Dispatcher, coming: ScheduledInput) -> None:
-    """Let components be as they were, and let go on what was going on.
+async def recover(kept: Kept, dispatcher: Dispatcher, scheduled: ScheduledInput) -> None:
+    """Restore components, and re-arm the pending actions, timers and inputs.
 
-    What the last macrostep asked for may never have left, so it leaves (again) when all else is as it was.
+    Outputs of the last macrostep may never have left, so they leave (again) after everything else is restored.
 
     Raises:
-        InputError: a component cannot stop what was cancelled, or one is not deployed.
+        InputError: a component cannot stop a cancelled skill, or one is not deployed.
     """
     for name, memory in kept.memory.items():
         dispatcher.component(name).recall(memory)
     for one in kept.pending:
         if one.cancelled and isinstance(one.what, Start):
             await dispatcher.abandon(one.what)
-    awaited = [one for one in kept.pending if not one.cancelled]
-    older = [one for one in awaited if one.step < kept.number]
-    in_force, others = _told_apart(older)
-    for component, told in in_force.items():
-        dispatcher.tell_again(component, told)
+    pending = [one for one in kept.pending if not one.cancelled]
+    older = [one for one in pending if one.step < kept.number]
+    effective, others = _divided(older)
+    for component, settings in effective.items():
+        dispatcher.restore(component, settings)
     await dispatcher.outbox.all_taken()
     for one in others:
-        _await_again(one, dispatcher, coming)
+        _rearm(one, dispatcher, scheduled)
     await asyncio.sleep(0)  # until these have begun
-    for one in awaited[len(older) :]:
-        _await_again(one, dispatcher, coming)
+    for one in pending[len(older) :]:
+        _rearm(one, dispatcher, scheduled)
 
 
-def _told_apart(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | SwitchMode]], list[Pending]]:
-    """What components have taken, which is in force, by their names; and what is awaited or still under way to them."""
-    in_force: dict[str, list[SetParameter | SwitchMode]] = {}
+def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | SwitchMode]], list[Pending]]:
+    """The effective settings by component, and the other pending outputs."""
+    effective: dict[str, list[SetParameter | SwitchMode]] = {}
     others = []
     for one in older:
         if isinstance(one.what, SetParameter | SwitchMode) and one.reports:
-            in_force.setdefault(one.what.component, []).append(one.what)
+            effective.setdefault(one.what.component, []).append(one.what)
         else:
             others.append(one)
-    return in_force, others
+    return effective, others
 
 
-def _await_again(one: Pending, dispatcher: Dispatcher, coming: ScheduledInput) -> None:
+def _rearm(one: Pending, dispatcher: Dispatcher, scheduled: ScheduledInput) -> None:
     match one.what:
         case Start():
-            dispatcher.take_up(one.what, InterruptedSkill(one.at, one.reports))
+            dispatcher.resume(one.what, InterruptedSkill(one.at, one.reports))
         case StartTimer():
             dispatcher.timers.start(one.what, one.at)
         case SendLater():
             dispatcher.timers.send(one.what, one.at)
         case LateMessage():
-            coming.wait_for(one.what, one.at)
+            scheduled.schedule(one.what, one.at)
         case _:
             dispatcher.dispatch(one.what)

@@ -1,4 +1,4 @@
-"""Skills that were under way when a run was broken off: asked after, and gone on with as if nothing had been."""
+"""Skills that a crash interrupted: the component reports their status, and they resume in their own time."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from dsc.components.component import Component
 from dsc.engine.steps import Start
 from dsc.errors import UncertainActionError
 from dsc.sequencer.clock import LoopClock
+from dsc.skills import SkillSignature
 
 
 @dataclass(frozen=True, slots=True)
 class InterruptedSkill:
-    """What is known of an action from before the restart.
+    """The record of an action from before the restart.
 
     Attributes:
         began: second of run time at which it was started.
-        reports: how many intermediate events of it have been taken.
+        reports: how many of its intermediate events were taken.
     """
 
     began: float
@@ -27,13 +28,13 @@ class InterruptedSkill:
 
 
 class PastClock:
-    """An action's own time after a restart: it begins when the action did, and what is past is not waited for.
+    """An action's clock after a restart: it begins at the start of the action, and passes the past without waiting.
 
-    What an action does side by side, in tasks, passes through the past side by side, too.
+    Each task of an action passes through the past on its own.
 
     Args:
-        clock: the run's.
-        began: when the action began.
+        clock: run time.
+        began: second of run time at which the action began.
     """
 
     def __init__(self, clock: LoopClock, began: float) -> None:
@@ -42,7 +43,7 @@ class PastClock:
         self._own: ContextVar[float] = ContextVar("own", default=began)
 
     def now(self) -> float:
-        """Seconds of run time as the action lives it."""
+        """Seconds of run time, as the action sees it."""
         own = self._own.get()
         return own if own < self._restart else self._clock.now()
 
@@ -57,14 +58,15 @@ class PastClock:
         return self._clock.hold()
 
 
-async def asked_after(component: Component, start: Start, action_id: str) -> Status | Ended:
-    """What became of the action; unless it has ended, it is to be executed, with the same id.
+async def required_status(
+    component: Component, signature: SkillSignature | None, start: Start, action_id: str
+) -> Status | Ended:
+    """Query the status of an interrupted action; unless it has ended, it is executed again with the same id.
 
     Raises:
-        UncertainActionError: it may have happened, nobody knows, and it must not happen twice.
+        UncertainActionError: its status is unknown, and it must not happen twice.
     """
     status = await component.status(action_id, start.skill, start.arguments)
-    signature = component.skills().get(start.skill)
     if status is Status.UNKNOWN and signature is not None and signature.after_crash == "sense":
         raise UncertainActionError(f"the run was broken off, and whether {start.action_id} happened is not known")
     return status

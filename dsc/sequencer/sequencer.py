@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,17 +15,21 @@ from dsc.events import GAVE_UP, NO_PLAN, Event
 from dsc.messages import FromOutside, LateMessage, Message, SkillMessage
 from dsc.runs.encoding import Kept
 from dsc.runs.store import RunStore
-from dsc.sequencer import commit_grouping, input_checks
+from dsc.sequencer import input_checks
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import Inbox, ScheduledInput
 from dsc.sequencer.livelock import LivelockGuard
+from dsc.sequencer.outcome_checks import validated_in_world
 from dsc.sequencer.reactor import Reactor, StepListener
-from dsc.sequencer.recovery import require_components, take_up
+from dsc.sequencer.recovery import recover, require_components
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
+
+_MOST_GROUPED = 100
+"""Macrosteps that may share a commit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +95,7 @@ class Sequencer:
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, part_of)
         self._open_ended = open_ended
-        self._coming = ScheduledInput(clock, self._inbox.put)
+        self._scheduled = ScheduledInput(clock, self._inbox.put)
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
@@ -127,8 +131,8 @@ class Sequencer:
             "active": list(self.machine.state.configuration()),
             "working": [f"{start.component}.{start.skill}" for start in self.dispatcher.started()],
             "in_use": sorted(self.dispatcher.in_use),
-            "switched_on": sorted(self.dispatcher.activity.on),
-            "waiting": len(self._inbox),
+            "switched_on": sorted(self.dispatcher.activation.on),
+            "waiting": len(self._inbox.waiting),
             "knowledge_version": self.knowledge.version,
         }
 
@@ -206,24 +210,24 @@ class Sequencer:
             UnknownNameError: a component that the run needs is not deployed; nothing has happened.
         """
         require_components(kept, self.dispatcher)
-        return await self._until_end(lambda: self._take_up(kept))
+        return await self._until_end(lambda: self._recover(kept))
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
-        reactor = self._reactor
-        # Before anybody who is started by the run subscribes: what follows from a change is recorded after it.
+        reactor, machine, inbox = self._reactor, self._reactor.machine, self._inbox
+        # The tracer subscribes before skills do: consequences of a change are recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
         try:
             await begin()
-            while not self.machine.state.finished and reactor.problem is None:
-                if self._idle():
-                    reactor.problem = "nothing is going on and nothing can happen any more"
-                    break
-                if not self._inbox:
-                    await self._inbox.filled()
+            while not machine.state.finished and reactor.problem is None:
+                if not inbox.waiting:
+                    if self._is_deadlock():
+                        reactor.problem = "nothing is going on and nothing can happen any more"
+                        break
+                    await inbox.arrival()
                 for wait in self._before_events:
                     await wait()
-                message = self._inbox.take()
+                message = inbox.waiting.popleft()
                 if livelock is not None and (problem := livelock.problem(message)):
                     reactor.problem = problem
                     break
@@ -234,7 +238,7 @@ class Sequencer:
             self._keep_end()
             raise
         finally:
-            self._coming.close()
+            self._scheduled.close()
             try:
                 self._leave()
             finally:
@@ -252,10 +256,10 @@ class Sequencer:
             with self.store.writing:
                 self.store.end(finished=self.machine.state.finished, problem=self._reactor.problem)
 
-    async def _take_up(self, kept: Kept) -> None:
+    async def _recover(self, kept: Kept) -> None:
         self._reactor.restore(kept)
         try:
-            await take_up(kept, self.dispatcher, self._coming)
+            await recover(kept, self.dispatcher, self._scheduled)
         except InputError as error:
             self._reactor.problem = str(error)
 
@@ -270,23 +274,24 @@ class Sequencer:
         with store.writing:
             serials = store.begin(plot, arguments, self.library)
             reactor.tracer.world(self.knowledge)
-            for late, due in self._coming:
+            for late, due in self._scheduled:
                 store.late(late, due)
             output = reactor.start(plot, arguments, serials)
             self._keep_step(None, output)
         self._carry_out(output)
 
     def _take(self, message: Message) -> None:
-        message = self._reactor.believed(message, self.dispatcher.attributes_of(message))
+        if isinstance(message, SkillMessage):
+            message = validated_in_world(message, self.knowledge)
         if self.store is None:
             output = self._reactor.react(message)
         else:
             with self.store.writing:
                 output = self._react_and_keep(message)
-                for _ in range(commit_grouping.MOST - 1):
-                    if self._before_events or not commit_grouping.may_wait(message, output, self._reactor, self._inbox):
+                for _ in range(_MOST_GROUPED - 1):
+                    if not self._may_group(message, output):
                         break
-                    message = self._inbox.take()
+                    message = self._inbox.waiting.popleft()
                     output = self._react_and_keep(message)
         if isinstance(message, SkillMessage) and message.final:
             if message.goes_on:
@@ -297,6 +302,18 @@ class Sequencer:
         elif isinstance(message, SkillMessage):
             self.dispatcher.report_taken(message.start)
         self._carry_out(output)
+
+    def _may_group(self, message: Message, output: Collection[Output]) -> bool:
+        """Whether the next macrostep may share the commit of this one.
+
+        It does not if an output leaves between them, nor with answers of components, each of which is kept at once.
+        """
+        waiting = self._inbox.waiting
+        if output or self._before_events or not waiting:
+            return False
+        if isinstance(message, SkillMessage) or isinstance(waiting[0], SkillMessage):
+            return False
+        return not self.machine.state.finished and self._reactor.problem is None
 
     def _react_and_keep(self, message: Message) -> tuple[Output, ...]:
         output = self._reactor.react(message)
@@ -341,10 +358,10 @@ class Sequencer:
         if self.store is not None and self.store.begun:
             with self.store.writing:
                 self.store.late(late, due)
-        self._coming.wait_for(late, due)
+        self._scheduled.schedule(late, due)
 
-    def _idle(self) -> bool:
-        """Whether nothing can happen any more: periods that all have changed nothing will never change anything."""
-        if self._open_ended or self._inbox or self._coming or self.dispatcher.waiting:
+    def _is_deadlock(self) -> bool:
+        """Whether no message can come: periods that all have changed nothing will never change anything."""
+        if self._open_ended or self._scheduled or self.dispatcher.waiting:
             return False
         return self.dispatcher.timers.periods <= self._reactor.in_vain

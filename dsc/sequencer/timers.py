@@ -1,4 +1,4 @@
-"""What is due at a second of run time: timeouts and periods of states, and events that the chart sends itself later."""
+"""Timers of a run: timeouts and periods of states, and events that the chart sends to itself later."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dsc.sequencer.clock import LoopClock
 
 
 class Timers:
-    """All that is due later; `post` receives it when it is."""
+    """Pending timers; `post` receives each when it is due."""
 
     def __init__(self, clock: LoopClock, post: Callable[[TimerMessage | SendLater], None]) -> None:
         self._clock = clock
@@ -23,12 +23,12 @@ class Timers:
 
     @property
     def waiting(self) -> bool:
-        """Whether anything is still to come; periods, which always are, do not count."""
+        """Whether a timer is pending; periods, which are always pending, do not count."""
         return bool(self._sent) or any(event != EVERY for _, event, _ in self._timers)
 
     @property
     def periods(self) -> frozenset[tuple[int, int]]:
-        """Activation and number of every period that passes at present."""
+        """Activation and number of every pending period."""
         return frozenset((activation, number) for activation, event, number in self._timers if event == EVERY)
 
     def start(self, timer: StartTimer, due: float) -> None:
@@ -47,19 +47,20 @@ class Timers:
         self._sent[number] = (later, self._clock.call_at(due, arrive))
 
     def cancel(self, activation: int) -> None:
-        """The state was left: its timers do not count any more."""
-        for key in [key for key in self._timers if key[0] == activation]:
-            self._timers.pop(key).cancel()
+        """Cancel the timers of a state that was left."""
+        for key in tuple(self._timers):
+            if key[0] == activation:
+                self._timers.pop(key).cancel()
 
     def revoke(self, revoke: Revoke) -> None:
-        """Events of that id do not come."""
+        """Cancel the events of that id."""
         for number, (later, handle) in list(self._sent.items()):
             if (later.event.frame, later.id) == (revoke.frame, revoke.id):
                 handle.cancel()
                 del self._sent[number]
 
     def close(self) -> None:
-        """Nothing comes any more."""
+        """Cancel all timers."""
         for handle in (*self._timers.values(), *[handle for _, handle in self._sent.values()]):
             handle.cancel()
         self._timers.clear()

@@ -26,10 +26,10 @@ class ComponentActivation:
     def __init__(self, registry: ComponentRegistry, used: Callable[[], Iterable[str]]) -> None:
         self._registry = registry
         self._used = used
-        self._concerned: set[str] = set()
+        self.concerned: set[str] = set()
         self._in_mode: dict[str, None] = {}
-        self._kept: dict[str, Supervisor] = {}
-        self._let_go: dict[str, asyncio.Task[None]] = {}
+        self._supervisors: dict[str, Supervisor] = {}
+        self._released: dict[str, asyncio.Task[None]] = {}
         self._listeners: set[Callable[[], None]] = set()
         self._looking = False
         self._closed = False
@@ -39,30 +39,32 @@ class ComponentActivation:
     @property
     def on(self) -> frozenset[str]:
         """Names of those that are alive and switched on."""
-        return frozenset(supervisor.name for supervisor in self._kept.values() if supervisor.on)
-
-    def concerns(self, component: Component) -> bool:
-        """Whether it matters to anybody if this component is used."""
-        return component.name in self._concerned
+        return frozenset(supervisor.name for supervisor in self._supervisors.values() if supervisor.on)
 
     def deployed(self, component: Component) -> None:
         """A component is about to be there, maybe in place of another one."""
         before = self._registry.components.get(component.name, component)
         if before is not component:
-            before.life.leave(self._look)
-            if component.name in self._kept:
-                self._end(self._kept[component.name], ())
-                self._look()
+            before.life.leave(self.look)
+            if component.name in self._supervisors:
+                self._end(self._supervisors[component.name], ())
+                self.look()
         if component.takes_part:
-            self._concerned.add(component.name)
-            component.life.listen(self._look)
+            self.concerned.add(component.name)
+            component.life.listen(self.look)
         else:
-            self._concerned.discard(component.name)
+            self.concerned.discard(component.name)
 
-    def look(self, name: str) -> None:
-        """A component is used, or is not any more; who is needed is seen to soon, once for all of one moment."""
-        if name in self._concerned:
-            self._look()
+    def changed(self, name: str) -> None:
+        """A component is in use from now on, or no longer."""
+        if name in self.concerned:
+            self.look()
+
+    def look(self) -> None:
+        """Start and stop supervisors soon, one time for all changes of a moment."""
+        if not self._looking and not self._closed:
+            self._looking = True
+            asyncio.get_running_loop().call_soon(self._supervise)
 
     def switched(self, name: str, mode: str) -> None:
         """A state puts a component in a mode."""
@@ -70,16 +72,16 @@ class ComponentActivation:
             self._in_mode.pop(name, None)
         elif mode != Life.INIT:
             self._in_mode[name] = None
-        self.look(name)
+        self.changed(name)
 
     async def close(self) -> None:
         """Switch everything off, and wait for that, though not for ever."""
         self._closed = True
         for component in self._registry.components.values():
-            component.life.leave(self._look)
+            component.life.leave(self.look)
         self._keep_only({})
-        if self._let_go:
-            _, others = await asyncio.wait(self._let_go.values(), timeout=2 * GRACE)  # one after the other
+        if self._released:
+            _, others = await asyncio.wait(self._released.values(), timeout=2 * GRACE)  # one after the other
             for task in others:
                 task.cancel()
                 give_up(task)
@@ -88,9 +90,9 @@ class ComponentActivation:
 
     def supervisor(self, component: Component) -> Supervisor:
         """Who keeps a component going that is used; from now on, whom it needs is kept going, too."""
-        if self._looking or component.name not in self._kept:
-            self._see()
-        return self._kept[component.name]
+        if self._looking or component.name not in self._supervisors:
+            self._supervise()
+        return self._supervisors[component.name]
 
     def resting_on(self, component: Component) -> Iterator[Supervisor]:
         """The supervisors of all that a component needs in its present mode, what these need before them; then its own.
@@ -99,8 +101,8 @@ class ComponentActivation:
             InputError: components need each other in a circle.
         """
         for name in self._closure(component.name, {}, ()):
-            if name in self._kept:
-                yield self._kept[name]
+            if name in self._supervisors:
+                yield self._supervisors[name]
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call the listener whenever something about a component is different."""
@@ -112,7 +114,7 @@ class ComponentActivation:
 
     def announce(self) -> None:
         """Something about a component is different: who is needed is looked for, and who listens is told."""
-        self._look()
+        self.look()
         for listener in tuple(self._listeners):
             listener()
 
@@ -133,23 +135,20 @@ class ComponentActivation:
 
     async def supported(self, component: Component) -> None:
         """Wait until all that the component needs in its present mode is on."""
-        await self.until(lambda: all(name in self._kept and self._kept[name].on for name in component.needed()))
+        await self.until(
+            lambda: all(name in self._supervisors and self._supervisors[name].on for name in component.needed())
+        )
 
     # -- who is needed ------------------------------------------------------------------------------------
 
-    def _look(self) -> None:
-        if not self._looking and not self._closed:
-            self._looking = True
-            asyncio.get_running_loop().call_soon(self._see)
-
-    def _see(self) -> None:
+    def _supervise(self) -> None:
         self._looking = False
         if self._closed:
             return
         needed: dict[str, Component | None] = {}
         in_mode = [name for name in self._in_mode if self._registry.components[name].mode != NEUTRAL]
         for name in (*sorted(self._used()), *in_mode):
-            if name in self._concerned:
+            if name in self.concerned:
                 self._add_needed(name, None, needed)
         self._keep_only(needed)
 
@@ -172,21 +171,21 @@ class ComponentActivation:
 
     def _keep_only(self, needed: dict[str, Component | None]) -> None:
         ended: list[asyncio.Task[None]] = []
-        for supervisor in [one for one in self._kept.values() if one.name not in needed]:
+        for supervisor in [one for one in self._supervisors.values() if one.name not in needed]:
             ended.append(self._end(supervisor, tuple(ended)))
         for name, needing in needed.items():
-            if name not in self._kept:
-                self._kept[name] = Supervisor(name, needing, self)
-                self._kept[name].begin(self._let_go.get(name))
+            if name not in self._supervisors:
+                self._supervisors[name] = Supervisor(name, needing, self)
+                self._supervisors[name].begin(self._released.get(name))
 
     def _end(self, supervisor: Supervisor, after: Collection[asyncio.Task[None]]) -> asyncio.Task[None]:
-        del self._kept[supervisor.name]
-        supervisor.let_go(after)
+        del self._supervisors[supervisor.name]
+        supervisor.release(after)
         assert supervisor.task is not None  # noqa: S101
-        self._let_go[supervisor.name] = supervisor.task
+        self._released[supervisor.name] = supervisor.task
         supervisor.task.add_done_callback(lambda task: self._over(supervisor.name, task))
         return supervisor.task
 
     def _over(self, name: str, task: asyncio.Task[None]) -> None:
-        if self._let_go.get(name) is task:
-            del self._let_go[name]
+        if self._released.get(name) is task:
+            del self._released[name]

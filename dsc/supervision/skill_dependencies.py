@@ -19,11 +19,11 @@ _Result = TypeVar("_Result")
 class SkillDependencies:
     """For one skill of a component, which counts as used."""
 
-    def __init__(self, registry: ComponentRegistry, activity: ComponentActivation, component: Component) -> None:
+    def __init__(self, registry: ComponentRegistry, activation: ComponentActivation, component: Component) -> None:
         self._registry = registry
-        self._activity = activity
+        self._activation = activation
         self._component = component
-        self._concerned = activity.concerns(component)
+        self.concerned = component.name in activation.concerned
         self._waits = False
 
     @property
@@ -31,7 +31,7 @@ class SkillDependencies:
         """What is being waited for, in words; empty if nothing is."""
         if not self._waits:
             return ""
-        name = next((one.name for one in self._activity.resting_on(self._component) if not one.on), "")
+        name = next((one.name for one in self._activation.resting_on(self._component) if not one.on), "")
         return name and self._registry.state_of(name)
 
     async def ready(self) -> None:
@@ -43,7 +43,7 @@ class SkillDependencies:
             NotAliveError: the component itself cannot start, or is in Shutdown; what it needs is waited for instead.
             InputError: components need each other in a circle.
         """
-        if self._concerned:
+        if self.concerned:
             await self._kept()
         elif self._component.life.state is not Life.ALIVE:
             await self._component.come_alive()
@@ -51,18 +51,18 @@ class SkillDependencies:
             raise NotAliveError(self._registry.state_of(self._component.name))
 
     async def _kept(self) -> None:
-        supervisor = self._activity.supervisor(self._component)
+        supervisor = self._activation.supervisor(self._component)
         before = supervisor.failures
 
         def settled() -> bool:
-            supervisors = list(self._activity.resting_on(self._component))
+            supervisors = list(self._activation.resting_on(self._component))
             for one in supervisors:
                 if one.problem is not None:
                     raise one.problem
             return all(one.on for one in supervisors) or supervisor.failures > before
 
         self._waits = True
-        await self._activity.until(settled)
+        await self._activation.until(settled)
         self._waits = False
 
     async def carrying(self, work: Awaitable[_Result]) -> _Result:
@@ -82,9 +82,10 @@ class SkillDependencies:
                 me.cancel()
 
         self._component.life.listen(look)
-        if self._concerned:
-            self._activity.listen(look)
-        look()
+        if self.concerned:
+            self._activation.listen(look)
+        if self.concerned or self._component.life.state is not Life.ALIVE:
+            look()
         try:
             return await work
         except asyncio.CancelledError:
@@ -93,13 +94,14 @@ class SkillDependencies:
             raise NotAliveError(lost[0]) from None
         finally:
             self._component.life.leave(look)
-            self._activity.leave(look)
+            if self.concerned:
+                self._activation.leave(look)
 
     def _lost(self) -> str | None:
         if self._component.life.state is not Life.ALIVE:
             return self._component.name
-        if not self._concerned:
+        if not self.concerned:
             return None
         with suppress(InputError):  # of a mode that makes a circle, the next skill hears
-            return next((one.name for one in self._activity.resting_on(self._component) if one.lost), None)
+            return next((one.name for one in self._activation.resting_on(self._component) if one.lost), None)
         return None

@@ -34,7 +34,7 @@ class Surroundings(Protocol):
 
 
 class Supervisor:
-    """Keeps one component going until it is let go.
+    """Keeps one component alive and active until it is released.
 
     Attributes:
         name: of the component.
@@ -60,7 +60,7 @@ class Supervisor:
         """Keep it going from now on, once an earlier supervisor of it is done."""
         self.task = asyncio.get_running_loop().create_task(self._run(after))
 
-    def let_go(self, after: Collection[asyncio.Task[None]]) -> None:
+    def release(self, after: Collection[asyncio.Task[None]]) -> None:
         """Nobody needs it any more: it is switched off, after those that have needed it."""
         assert self.task is not None  # noqa: S101
         self._after = after
@@ -81,14 +81,14 @@ class Supervisor:
         try:
             if after is not None:
                 await asyncio.wait([after], timeout=GRACE)
-            await self._keep()
+            await self._supervise()
         except Exception as error:  # noqa: BLE001  # of who finds components; told to those who need it
             self.problem = error
             self._others.announce()
         finally:
             await self._switch_off()
 
-    async def _keep(self) -> None:
+    async def _supervise(self) -> None:
         self.component = component = await self._others.find(self.name, self._needing)
         component.life.listen(self._others.announce)
         self._others.announce()

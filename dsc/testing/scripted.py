@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 from dsc.calls import Outcome, SkillCall
@@ -75,6 +74,7 @@ class _ScriptedComponent(Component):
         self._script = script
         self._imitates = imitated is not None
         self._signatures = dict(imitated or {})
+        self._outcomes: dict[str, dict[str, dict[str, str | None]]] = {}  # of a free one; they grow with its answers
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return the imitated skills, or the known ones of the script."""
@@ -111,17 +111,16 @@ class _ScriptedComponent(Component):
             InputError: the skill does not have this answer.
         """
         name = skill.partition(".")[2]
-        if not self._imitates:
-            self._signatures.setdefault(name, SkillSignature(self.name, name, {}, {}, {}))
+        if not self._imitates and name not in self._signatures:
+            self._outcomes[name] = {}
+            self._signatures[name] = SkillSignature(self.name, name, {}, {}, self._outcomes[name])
         if name not in self._signatures:
             raise UnknownNameError(f"component '{self.name}' has no skill '{name}'", found=name, valid=self._signatures)
         for answer in (one for whole in answers for one in (*whole.reports, whole)):
             if self._imitates:
                 check_outcome(skill, self._signatures[name], answer)
             else:
-                signature = self._signatures[name]
-                outcomes = {**signature.outcomes, answer.event: dict.fromkeys(answer.attributes)}
-                self._signatures[name] = replace(signature, outcomes=outcomes)
+                self._outcomes[name][answer.event] = dict.fromkeys(answer.attributes)
 
     def _outcome(self, answer: Answer, call: Call) -> Outcome:
         try:

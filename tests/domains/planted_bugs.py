@@ -16,12 +16,12 @@ from dsc.sequencer.sequencer import Sequencer
 
 def a_new_id_on_retry(monkeypatch):
     """What was under way when the program died is asked for anew, and so done again."""
-    take_up = Dispatcher.take_up
+    resume = Dispatcher.resume
 
     def taken_up_anew(self, start, earlier):
-        take_up(self, replace(start, action_id=f"{start.action_id}-again"), earlier)
+        resume(self, replace(start, action_id=f"{start.action_id}-again"), earlier)
 
-    monkeypatch.setattr(Dispatcher, "take_up", taken_up_anew)
+    monkeypatch.setattr(Dispatcher, "resume", taken_up_anew)
 
 
 class _Later:

@@ -133,9 +133,9 @@ def test_a_mode_from_before_a_restart_counts():
     async def main():
         components = [Device("camera", log, mapping=("lamp",)), Device("lamp", log)]
         dispatcher = Sequencer(Library([plot(MAP)]), KnowledgeBase(Schema()), components, LoopClock()).dispatcher
-        dispatcher.tell_again("camera", [SwitchMode("camera", "mapping")])
+        dispatcher.restore("camera", [SwitchMode("camera", "mapping")])
         await asyncio.sleep(1)
-        on = dispatcher.activity.on
+        on = dispatcher.activation.on
         await dispatcher.close()
         return on
 

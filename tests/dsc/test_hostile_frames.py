@@ -300,7 +300,7 @@ def test_a_flood_of_reports_is_conflated_and_no_knowledge_is_lost(where, monkeyp
     most = []
 
     def watch(sequencer):
-        sequencer.listen(lambda _: most.append(len(sequencer._inbox)))
+        sequencer.listen(lambda _: most.append(len(sequencer._inbox.waiting)))
 
     ran = Ran(FLOODED.replace("SKILL", where), arm=Flooding(2_000), prepare=watch)
     (last,) = ran.end.emitted

@@ -241,7 +241,7 @@ def test_a_task_that_others_cancel_is_a_skill_error():
         assert "cancelled" in event["attributes"]["reason"]
 
 
-@pytest.mark.parametrize("broken_part", ["declared", "broken"])
+@pytest.mark.parametrize("broken_part", ["validated", "broken"])
 def test_the_time_limit_holds_even_if_the_handler_of_ends_fails(broken_part, monkeypatch):
     def fails(*_):
         raise RuntimeError("a fault of our own")

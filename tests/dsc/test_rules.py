@@ -118,10 +118,7 @@ def test_a_rule_that_answers_only_so_often_is_said_to(rule, often):
 def test_a_step_that_a_rule_always_replaces_is_said_to_be():
     ends = ("{on: failed, do: {then: continue}}", "{on: broken, do: {then: continue}}")
     said, _ = said_of("{before: do_it, do: {use: recover, then: continue}}", *ends)
-    assert (
-        "the rule 'before do_it: recover, continue' always replaces step 'do_it', which is never entered"
-        in said
-    )
+    assert "the rule 'before do_it: recover, continue' always replaces step 'do_it', which is never entered" in said
 
 
 def test_a_rule_before_a_plot_is_told_how_steps_are_named():
