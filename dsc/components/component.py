@@ -10,7 +10,6 @@ from typing import Any, ClassVar, cast
 
 from dsc.calls import Ended, Outcome, SkillCall, Status
 from dsc.components.event_activations import EventActivations
-from dsc.components.hooks import contained
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import (
     Parameter,
@@ -24,7 +23,7 @@ from dsc.components.parameters import (
 from dsc.components.streams import Push, Stream
 from dsc.model.ranges import Who, refuse_change
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
-from knowledge_base.errors import UnknownNameError, described
+from knowledge_base.errors import UnknownNameError
 
 ALWAYS = ""
 """Stands for every mode in `Component.needs`."""
@@ -70,8 +69,6 @@ class Component:
         self.parameters: dict[str, Any] = dict(unsaid(self.declares))
         self._judged = False  # the parameters that are being set are known to fit together
         self.life = LifeCycle()
-        self._starting = False
-        self._activators: set[int] = set()
         self.activations = EventActivations()
         self.pushes: dict[str, Push] = {}
         self.streams: dict[str, Stream] = {}
@@ -110,7 +107,8 @@ class Component:
                 f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
             )
         check_arguments(signature, arguments)
-        require_bound(self.name, self.declares, self.parameters)
+        if self.declares:
+            require_bound(self.name, self.declares, self.parameters)
         body = self.body(skill_name)
         declared: Declared = getattr(body, DECLARED)
         return declared.carry_out(self, body, call, arguments)
@@ -225,50 +223,6 @@ class Component:
         FatalError.
         """
 
-    async def come_alive(self) -> None:
-        """Start if it is in Init, or anew if it is in FatalError; who comes meanwhile waits for the same start."""
-        while self._starting:  # if its start is broken off, somebody else has to begin it
-            await self.life.until(lambda _: not self._starting)
-            if self.life.state is not Life.INIT:
-                return
-        if self.life.state is Life.FATAL_ERROR:
-            self.life.become(Life.INIT)
-        if self.life.state is not Life.INIT:
-            return
-        self._starting = True
-        try:
-            with contained():
-                await self.start()
-        except Exception as error:  # noqa: BLE001  # whatever it is, the component cannot work
-            became, reason = Life.FATAL_ERROR, described(error)
-        else:
-            became, reason = Life.ALIVE, ""
-        finally:
-            self._starting = False
-            self.life.announce()
-        if self.life.state is Life.INIT:  # else somebody has shut it down meanwhile, or it says itself how it is
-            self.life.become(became, reason)
-
-    async def become_active(self, activator: int, *, active: bool) -> None:
-        """One activator needs it from now on, or no more; `activate` is called when it is the first or the last."""
-        others = self._activators - {activator}
-        again = activator in self._activators
-        self._activators = others | {activator} if active else others
-        if others or not (active or again):
-            return
-        try:
-            with contained():
-                await self.activate(active)
-        except Exception as error:  # noqa: BLE001  # whatever it is, it has not what it needs
-            if self.life.state is not Life.SHUTDOWN:
-                self.life.become(Life.FATAL_ERROR, described(error))
-
-    @property
-    def takes_part(self) -> bool:
-        """Whether anything is to be done when it is used, and when it is not any more."""
-        kind = type(self)
-        return bool(self.needs) or kind.needed is not Component.needed or kind.activate is not Component.activate
-
     async def change_mode(self, mode: str) -> None:
         """What `switch` in a chart does: a mode, or `init` (start anew) and `shutdown`.
 
@@ -277,7 +231,7 @@ class Component:
         """
         if mode == Life.INIT:
             self.life.become(Life.INIT)
-            await self.come_alive()
+            await self.life.come_alive(self.start)
         elif mode == Life.SHUTDOWN:
             await self.stop()
             self.life.become(Life.SHUTDOWN)
@@ -290,11 +244,6 @@ class Component:
     def needed(self) -> tuple[str, ...]:
         """Names of the components it needs in its present mode."""
         return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
-
-    @property
-    def reaches_others(self) -> bool:
-        """Whether it can find components that are not deployed here."""
-        return type(self).reach is not Component.reach
 
     async def reach(self, name: str) -> Component:  # noqa: ARG002
         """Wait for a component that it needs and that is not deployed here; override where others can be found."""
@@ -333,11 +282,6 @@ class Component:
     def recall(self, memory: Any) -> None:
         """Be as when `memory` was kept; called before anything else after a restart."""
 
-    @property
-    def remembers(self) -> bool:
-        """Whether there is anything to remember: most components are not asked again and again."""
-        return type(self).remember is not Component.remember
-
     async def diagnose(self) -> dict[str, Any]:
         """The *diagnose* port: how it is, as plain data; override to add what only it knows."""
         return {
@@ -345,7 +289,7 @@ class Component:
             "life": str(self.life.state),
             "reason": self.life.reason,
             "mode": self.mode,
-            "active": bool(self._activators),
+            "active": self.life.active,
             "parameters": dict(self.parameters),
             "needs": list(self.needed()),
             "skills": sorted(self.skills()),

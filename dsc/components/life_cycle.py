@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 
-from knowledge_base.errors import InputError
+from dsc.components.hooks import contained
+from knowledge_base.errors import InputError, described
 
 
 class Life(StrEnum):
-    """Where a component is in its life; as a mode (`switch: arm`, `to: init`) it is a command."""
+    """States of a component; as a mode (`switch: arm`, `to: init`) each is a command."""
 
     INIT = "init"
     ALIVE = "alive"
@@ -30,26 +31,29 @@ _NEXT = {
 
 
 class LifeCycle:
-    """One component's life; to be used inside the loop's own thread.
+    """The life of one component; used inside the loop's own thread.
 
     Attributes:
-        state: where it is.
-        reason: why it is in FatalError, else empty.
+        state: one of `Life`.
+        reason: the cause of FatalError, else empty.
+        starting: whether the component's `start` runs.
     """
 
     def __init__(self) -> None:
         self.state = Life.INIT
         self.reason = ""
+        self.starting = False
+        self._activators: set[int] = set()
         self._mode = NEUTRAL
         self._listeners: set[Callable[[], None]] = set()
 
     def __getstate__(self) -> dict[str, object]:
-        """What goes to another process: who listens here does not."""
-        return {"state": self.state, "reason": self.reason, "_mode": self._mode, "_listeners": set()}
+        """The state that is pickled: listeners stay in this process."""
+        return {**self.__dict__, "_listeners": set()}
 
     @property
     def mode(self) -> str:
-        """The sub-state of Alive that it is in, or would be."""
+        """The sub-state of Alive, also while the component is not alive."""
         return self._mode
 
     @mode.setter
@@ -57,11 +61,65 @@ class LifeCycle:
         self._mode = mode
         self.announce()
 
+    @property
+    def active(self) -> bool:
+        """Whether an activator needs the component."""
+        return bool(self._activators)
+
+    async def come_alive(self, start: Callable[[], Awaitable[None]]) -> None:
+        """Start a component in Init or FatalError; concurrent callers wait for the same start.
+
+        Args:
+            start: the component's hook; its error leads to FatalError.
+        """
+        while self.starting:  # if that start is cancelled, another caller begins it
+            await self.until(lambda _: not self.starting)
+            if self.state is not Life.INIT:
+                return
+        if self.state is Life.FATAL_ERROR:
+            self.become(Life.INIT)
+        if self.state is not Life.INIT:
+            return
+        self.starting = True
+        try:
+            with contained():
+                await start()
+        except Exception as error:  # noqa: BLE001  # with any error the component cannot work
+            became, reason = Life.FATAL_ERROR, described(error)
+        else:
+            became, reason = Life.ALIVE, ""
+        finally:
+            self.starting = False
+            self.announce()
+        if self.state is Life.INIT:  # else it was shut down meanwhile, or has reported its state itself
+            self.become(became, reason)
+
+    async def become_active(self, activator: int, activate: Callable[[bool], Awaitable[None]], *, active: bool) -> None:
+        """Add or remove an activator.
+
+        Args:
+            activator: its number.
+            activate: the component's hook, called for the first and for the last activator; its error leads to
+                FatalError.
+            active: whether the activator needs the component from now on, or no longer.
+        """
+        others = self._activators - {activator}
+        again = activator in self._activators
+        self._activators = others | {activator} if active else others
+        if others or not (active or again):
+            return
+        try:
+            with contained():
+                await activate(active)
+        except Exception as error:  # noqa: BLE001  # with any error the component lacks its resources
+            if self.state is not Life.SHUTDOWN:
+                self.become(Life.FATAL_ERROR, described(error))
+
     def become(self, state: Life, reason: str = "") -> None:
-        """Enter a state; nothing happens if it is there.
+        """Enter a state, unless the component is in it already.
 
         Raises:
-            InputError: no way leads there from the present state.
+            InputError: the present state has no transition to it.
         """
         if state is not self.state and state not in _NEXT[self.state]:
             raise InputError(f"a component in '{self.state}' cannot become '{state}'", found=state)
@@ -70,7 +128,7 @@ class LifeCycle:
         self.announce()
 
     def announce(self) -> None:
-        """Call who listens: something is different that others rely on, e.g. whom it needs."""
+        """Call the listeners: the life, the mode or the needs have changed."""
         for listener in tuple(self._listeners):
             listener()
 
@@ -79,12 +137,12 @@ class LifeCycle:
         self._listeners.add(listener)
 
     def leave(self, listener: Callable[[], None]) -> None:
-        """Call it no longer."""
+        """Stop calling the listener."""
         self._listeners.discard(listener)
 
     @contextmanager
     def heard(self, listener: Callable[[], None]) -> Iterator[None]:
-        """Inside, the listener is called after each change."""
+        """Inside the block, call the listener after each change."""
         self.listen(listener)
         try:
             yield

@@ -85,10 +85,11 @@ class Host:
         return {"skills": skills, "pushes": ports_form(self._component), "condition": self._condition.newest}
 
     async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
-        before = self._component.life.state
-        await self._component.come_alive()
-        if before is not Life.ALIVE and self._is_active.is_set():  # it was started anew
-            await self._component.become_active(id(self), active=True)
+        life = self._component.life
+        before = life.state
+        await life.come_alive(self._component.start)
+        if before is not Life.ALIVE and self._is_active.is_set():  # it was restarted
+            await life.become_active(id(self), self._component.activate, active=True)
         return self._condition.newest
 
     async def _be_active(self, sender: str, _: Any) -> dict[str, Any]:
@@ -98,9 +99,10 @@ class Host:
         return self._condition.newest
 
     async def _activated(self, active: bool) -> None:  # noqa: FBT001
+        component = self._component
         if active:
-            await self._component.come_alive()
-        await self._component.become_active(id(self), active=active)
+            await component.life.come_alive(component.start)
+        await component.life.become_active(id(self), component.activate, active=active)
         (self._is_active.set if active else self._is_active.clear)()
 
     async def _switch(self, _: str, said: dict[str, Any]) -> dict[str, Any]:
@@ -223,7 +225,7 @@ class RemoteComponent(Component):
                     require_text(need, "the name of a component that is needed")
             case _:
                 raise InputError(f"'{self.name}' says of its condition what cannot be read: {text_of(said, repr)}")
-        if self._working and not self._starting:
+        if self._working and not self.life.starting:
             self._follow(Life(said["life"]), said["reason"])
         self.life.mode = said["mode"]
 

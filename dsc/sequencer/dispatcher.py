@@ -40,7 +40,7 @@ from dsc.messages import SkillMessage, TimerMessage
 from dsc.sequencer.cancellation import PendingCleanups, TimeLimit
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.outbox import CLOSING, Outbox, failure
-from dsc.sequencer.outcome_checks import Declared, broken, encoded, late, validated
+from dsc.sequencer.outcome_checks import broken, encoded, late, validated
 from dsc.sequencer.resumed_skills import InterruptedSkill, PastClock, required_status
 from dsc.sequencer.timers import Timers
 from dsc.skills import SkillSignature
@@ -51,6 +51,8 @@ from knowledge_base.errors import InputError, UnknownNameError, described
 
 DEFAULT_WITHIN = 300.0
 """Seconds a skill may take if the trigger does not say: every wait has a bound."""
+UNKNOWN_SKILL = SkillSignature("", "", {}, {}, {}, after_crash="repeat")
+"""Of a skill that the component does not have: its execution fails."""
 _MOST_FAULTS = 100
 """Faults that the end of a run reports."""
 
@@ -154,7 +156,7 @@ class Dispatcher:
     def memories(self) -> Iterator[tuple[str, Any]]:
         """Memories of components by their names; a component that fails keeps its last one."""
         for component in self._components.values():
-            if component.remembers:
+            if type(component).remember is not Component.remember:
                 try:
                     with contained():
                         memory = component.remember()
@@ -228,9 +230,9 @@ class Dispatcher:
         except Exception as error:  # an error of a component must not end the program
             raise InputError(f"{start.component}.{start.skill} may still go on: {described(error)}") from error
         if ended is not None:
-            signature = component.skills().get(start.skill)
+            signature = component.skills().get(start.skill, UNKNOWN_SKILL)
             outcome = validated(ended.outcome, start, signature)
-            self._post(SkillMessage(start, outcome, final=True, declared=_declared(signature, outcome)))
+            self._post(SkillMessage(start, outcome, final=True, declared=signature.outcomes.get(outcome.event)))
 
     async def close(self) -> list[str]:
         """Cancel skills and timers, and wait until skills have stopped and components have taken their outputs.
@@ -255,8 +257,8 @@ class Dispatcher:
 
     def _start(self, start: Start, interrupted: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)
-        signature = component.skills().get(start.skill)
-        within = start.within or (math.inf if _is_event(signature) else DEFAULT_WITHIN)
+        signature = component.skills().get(start.skill, UNKNOWN_SKILL)
+        within = start.within or (math.inf if signature.pattern == "event" else DEFAULT_WITHIN)
         due = within + (self._clock.now() if interrupted is None else interrupted.began)
         running = _Running(start, signature, within, due)
         running.task = asyncio.get_running_loop().create_task(self._execute(component, running, interrupted))
@@ -274,7 +276,7 @@ class Dispatcher:
         if report.event == SKILL_ERROR:
             self._post(SkillMessage(running.start, report, final=True, goes_on=True, conflated=conflated))
             return
-        declared = _declared(running.signature, report)
+        declared = running.signature.outcomes.get(report.event)
         self._post(SkillMessage(running.start, report, final=False, conflated=conflated, declared=declared))
 
     def _overdue(self, start: Start) -> None:
@@ -293,7 +295,7 @@ class Dispatcher:
         if not running.answered:
             if running.reports is not None:
                 running.reports.flush()
-            declared = _declared(running.signature, outcome) if outcome.attributes else None
+            declared = running.signature.outcomes.get(outcome.event) if outcome.attributes else None
             self._post(SkillMessage(running.start, outcome, final=True, declared=declared))
             running.answered = True
             running.limit.end()
@@ -323,7 +325,7 @@ class Dispatcher:
         clock: Clock = PastClock(self._clock, interrupted.began) if interrupted else self._clock
         call = SkillCall(self._part_of + start.action_id, clock, report, running.due, self._fault)
         try:
-            if component.name in self._cleanups.pending and _has_to_wait(component, signature):
+            if component.name in self._cleanups.pending and not component.concurrent and signature.pattern == "skill":
                 await self._cleanups.over(component.name)
             if component.name in self.outbox.untaken:
                 await self.outbox.taken(component)
@@ -333,7 +335,7 @@ class Dispatcher:
                 status = await required_status(component, signature, start, call.action_id)
                 if isinstance(status, Ended):
                     return validated(status.outcome, start, signature)
-                if status is Status.RUNNING or not _is_event(signature):  # else it is activated again
+                if status is Status.RUNNING or signature.pattern != "event":  # else it is activated again
                     taken = interrupted.reports
             work = component.execute(start.skill, call, encoded(start.arguments) if start.arguments else {})
             outcome = validated(await dependencies.carrying(work), start, signature)
@@ -352,27 +354,12 @@ class Dispatcher:
         self.timers.cancel(activation)
 
 
-def _is_event(signature: SkillSignature | None) -> bool:
-    """Whether it lasts as long as the state that activated it."""
-    return signature is not None and signature.pattern == "event"
-
-
-def _has_to_wait(component: Component, signature: SkillSignature | None) -> bool:
-    """Whether cancelled skills of the component have to clean up first."""
-    return not component.concurrent and signature is not None and signature.pattern == "skill"
-
-
-def _declared(signature: SkillSignature | None, outcome: Outcome) -> Declared | None:
-    """The declared types of the outcome's attributes; `None` for an outcome of the executive."""
-    return None if signature is None else signature.outcomes.get(outcome.event)
-
-
 @dataclass(slots=True)
 class _Running:
     """A skill that runs.
 
     Attributes:
-        start, signature: of the skill; no signature if the component has no such skill.
+        start, signature: of the skill.
         within, due: seconds that it may take, and the second of run time at which they are over.
         task, limit: its execution, and the bound of that.
         over: the callback at the end of the task.
@@ -381,7 +368,7 @@ class _Running:
     """
 
     start: Start
-    signature: SkillSignature | None
+    signature: SkillSignature
     within: float
     due: float
     task: asyncio.Task[None] = field(init=False)

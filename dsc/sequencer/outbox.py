@@ -129,7 +129,7 @@ async def _take(component: Component, told: Told) -> None:
 
 async def _restore_mode(component: Component, mode: str) -> None:
     """A component that was to start again has done so."""
-    await (component.come_alive() if mode == Life.INIT else component.change_mode(mode))
+    await (component.life.come_alive(component.start) if mode == Life.INIT else component.change_mode(mode))
 
 
 def failure(task: asyncio.Task[None]) -> BaseException | None:

@@ -30,10 +30,10 @@ def encoded(value: Any) -> Any:
     return json.loads(json.dumps(value, allow_nan=False))
 
 
-def validated(outcome: object, start: Start, signature: SkillSignature | None) -> Outcome:
+def validated(outcome: object, start: Start, signature: SkillSignature) -> Outcome:
     """Return the outcome with encoded attributes, or a `skill_error` if the signature does not declare it so."""
     try:
-        return _conforming(outcome, {} if signature is None else signature.outcomes)
+        return _conforming(outcome, signature.outcomes)
     except InputError as error:
         return broken(start, str(error))
     except BaseException as error:

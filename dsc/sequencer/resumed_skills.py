@@ -59,7 +59,7 @@ class PastClock:
 
 
 async def required_status(
-    component: Component, signature: SkillSignature | None, start: Start, action_id: str
+    component: Component, signature: SkillSignature, start: Start, action_id: str
 ) -> Status | Ended:
     """Query the status of an interrupted action; unless it has ended, it is executed again with the same id.
 
@@ -67,6 +67,6 @@ async def required_status(
         UncertainActionError: its status is unknown, and it must not happen twice.
     """
     status = await component.status(action_id, start.skill, start.arguments)
-    if status is Status.UNKNOWN and signature is not None and signature.after_crash == "sense":
+    if status is Status.UNKNOWN and signature.after_crash == "sense":
         raise UncertainActionError(f"the run was broken off, and whether {start.action_id} happened is not known")
     return status

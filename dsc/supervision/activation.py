@@ -49,7 +49,7 @@ class ComponentActivation:
             if component.name in self._supervisors:
                 self._end(self._supervisors[component.name], ())
                 self.look()
-        if component.takes_part:
+        if _is_concerned(component):
             self.concerned.add(component.name)
             component.life.listen(self.look)
         else:
@@ -189,3 +189,9 @@ class ComponentActivation:
     def _over(self, name: str, task: asyncio.Task[None]) -> None:
         if self._released.get(name) is task:
             del self._released[name]
+
+
+def _is_concerned(component: Component) -> bool:
+    """Whether the component needs others, or takes resources while it is active."""
+    kind = type(component)
+    return bool(component.needs) or kind.needed is not Component.needed or kind.activate is not Component.activate

@@ -46,7 +46,7 @@ class SkillDependencies:
         if self.concerned:
             await self._kept()
         elif self._component.life.state is not Life.ALIVE:
-            await self._component.come_alive()
+            await self._component.life.come_alive(self._component.start)
         if self._component.life.state is not Life.ALIVE:
             raise NotAliveError(self._registry.state_of(self._component.name))
 

@@ -100,10 +100,10 @@ class Supervisor:
 
     async def _once(self, component: Component) -> float:
         """One life of it; the seconds for which it was on."""
-        await component.come_alive()
+        await component.life.come_alive(component.start)
         if component.life.state is Life.ALIVE:
             self._switched = True
-            await component.become_active(id(self), active=True)
+            await component.life.become_active(id(self), component.activate, active=True)
         if component.life.state is not Life.ALIVE:
             self.failures += 1
             self._others.announce()
@@ -126,7 +126,7 @@ class Supervisor:
             await asyncio.wait(self._after, timeout=GRACE)
         try:
             async with asyncio.timeout(GRACE):
-                await self.component.become_active(id(self), active=False)
+                await self.component.life.become_active(id(self), self.component.activate, active=False)
         except TimeoutError:
             if self.component.life.state is Life.ALIVE:
                 self.component.life.become(Life.FATAL_ERROR, f"it could not be switched off within {GRACE:g} s")

@@ -344,7 +344,7 @@ class TransportSuite:
         transport, robot = self.transport(), SuiteRobot()
         host = Host(robot, transport, LoopClock())
         remote = await RemoteComponent.connect("robot", transport, PATIENCE)
-        await remote.come_alive()
+        await remote.life.come_alive(remote.start)
         try:
             yield robot, remote, host
         finally:
@@ -398,7 +398,7 @@ class TransportSuite:
             transport, robot = self.transport(), SuiteRobot()
             host = Host(robot, transport, LoopClock())
             remote = await RemoteComponent.connect("robot", transport, PATIENCE)
-            await remote.come_alive()
+            await remote.life.come_alive(remote.start)
             call = SkillCall("a4.0", LoopClock(), lambda _: None)
             task = asyncio.ensure_future(remote.execute("go", call, {"to": "kitchen", "steps": 1000}))
             await until(lambda: bool(robot.log))
@@ -407,7 +407,7 @@ class TransportSuite:
                 await task
             assert remote.life.state == "fatal_error"
             again = Host(SuiteRobot(), transport, LoopClock())
-            await remote.come_alive()
+            await remote.life.come_alive(remote.start)
             assert remote.life.state == "alive"
             assert await remote.execute("doubled", SkillCall("a5.0", LoopClock(), lambda _: None), {"n": 4}) == Outcome(
                 "answered", {"n": 8}
@@ -441,11 +441,13 @@ class TransportSuite:
                 assert remote.needed() == ()
                 await remote.change_mode("scanning")
                 assert remote.needed() == ("power", "light")
-                await remote.become_active(1, active=True)  # otherwise the component is not watched
+                await remote.life.become_active(
+                    1, remote.activate, active=True
+                )  # otherwise the component is not watched
                 robot.mode = "resting"
                 await until(lambda: remote.mode == "resting")
                 assert remote.needed() == ()
-                await remote.become_active(1, active=False)
+                await remote.life.become_active(1, remote.activate, active=False)
 
         self.run(main())
 

@@ -237,8 +237,8 @@ def test_a_start_that_was_broken_off_is_begun_by_who_waits_for_it():
     base = Base(starting=3)
 
     async def main():
-        first = asyncio.ensure_future(base.come_alive())
-        second = asyncio.ensure_future(base.come_alive())
+        first = asyncio.ensure_future(base.life.come_alive(base.start))
+        second = asyncio.ensure_future(base.life.come_alive(base.start))
         await asyncio.sleep(1)
         first.cancel()
         await asyncio.wait_for(second, 10)
@@ -296,7 +296,7 @@ def test_who_waits_for_the_same_start_waits_together():
     base = Base(starting=3)
 
     async def main():
-        await asyncio.gather(base.come_alive(), base.come_alive())
+        await asyncio.gather(base.life.come_alive(base.start), base.life.come_alive(base.start))
 
     run_simulated(main())
     assert base.log == ["start"]
