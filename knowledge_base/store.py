@@ -36,9 +36,9 @@ Now = Callable[[], float]
 class KnowledgeBase(Observable):
     """A world model that may be asked and changed from several threads.
 
-    One lock orders everything, and all get it in turn (`world.turn`): a question sees one version and its answer is a
-    finished list; a change is made as a whole or, with an error, not at all. Listeners are called when the lock is
-    released.
+    One lock orders questions and changes by arrival (`world.read_write_lock`). A question sees one version and its
+    answer is a finished list. A change is made as a whole or, with an error, not at all. Listeners are called when the
+    lock is released.
 
     Made like this it is in memory only and remembers its last changes; `open` makes one that lasts.
 
@@ -169,8 +169,9 @@ class KnowledgeBase(Observable):
     ) -> Iterator[Transaction]:
         """Several changes as one: committed when the block ends, dropped when it raises.
 
-        Other threads wait until the block is left. A block with a `key` that was committed before runs, but
-        changes nothing: the transaction's `change` is the first one's from the beginning.
+        Other threads ask meanwhile; a thread that changes something waits until the block is left. A block with a
+        `key` that was committed before runs, but changes nothing: its transaction has the first one's `change` from
+        the beginning.
 
         Args:
             author: who changes it.
@@ -184,19 +185,20 @@ class KnowledgeBase(Observable):
         """
         _require_names(author, key)
         try:
-            with self._lock.changing():
+            with self._lock.alone():
                 self._require_free()
                 first = self._first(key, expect)
                 transaction = Transaction(Overlay(self._state), self._questions, first)
                 self._writer = (get_ident(), author)
                 try:
-                    with self._announcer.quiet(), self._lock.ajar():
+                    with self._announcer.quiet():
                         yield transaction
                 finally:
                     self._writer = None
                     transaction.close()
                 if first is None:
-                    transaction.change = self._commit(transaction.delta, author, key, along)
+                    with self._lock.changing():
+                        transaction.change = self._commit(transaction.delta, author, key, along)
         finally:
             self._announcer.deliver()
 
@@ -353,7 +355,6 @@ class KnowledgeBase(Observable):
         self._history.append(change, key, self._state, along)
         if effective:
             self._take_in(change)
-        self._lock.made()
         return change
 
     def _take_in(self, change: Change) -> None:
@@ -364,7 +365,7 @@ class KnowledgeBase(Observable):
         self._state.commit(effective)
         if self._graph is not None:
             self._graph.commit(effective)
-        self._version = self._state.stamp.newest = change.version
+        self._version = change.version
         self._announcer.add(change)
         self._installed.commit(effective, departures, self._version)
 

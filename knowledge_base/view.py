@@ -10,12 +10,12 @@ from knowledge_base.exchange import to_json
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.evaluation import Explanation, explain
 from knowledge_base.language.expression import TRUE, Expression
-from knowledge_base.language.inputs import require_params, shown
+from knowledge_base.language.inputs import shown
 from knowledge_base.language.query_plan import QueryPlan, plan_query
 from knowledge_base.language.question_bounds import BoundedWorld, Bounds, Meter
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.problem_writer import problem_to_text
-from knowledge_base.prepared import Binding, Prepared, ReadyQuestions
+from knowledge_base.prepared import Binding, Prepared
 from knowledge_base.questions import Questions
 from knowledge_base.world.graph import Graph, WorldGraph
 from knowledge_base.world.overlay import Overlay
@@ -34,11 +34,10 @@ class View:
     """
 
     def __init__(self, state: WorldState, version: int) -> None:
-        self._lock = ReadWriteLock(state.stamp)
+        self._lock = ReadWriteLock()
         self._state = state
         self._version = version
         self._questions = Questions()
-        self._ready = ReadyQuestions(state, self._lock, self._questions)
         self._graph: WorldGraph | None = None
 
     @property
@@ -87,8 +86,9 @@ class View:
             InputError: a variable occurs only under `not` or in a comparison.
         """
         if bounds is None is limit:
-            given = params if type(params) is dict else _plain(params)
-            return self._ready.querying(text, given)(*given.values())
+            with self._lock:
+                given = self._questions.given(text, params, self._state, "answers")
+                return self._questions.answers(text, given, self._state)
         return list(islice(self.stream(text, params, bounds=bounds), _whole(limit)))
 
     def stream(
@@ -133,24 +133,24 @@ class View:
         self, text: str | Expression, params: Mapping[str, Value] | None = None, bounds: Bounds | None = None
     ) -> bool:
         """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
-        if bounds is not None:
-            meter = Meter(bounds)
-            with self._lock, meter.over(text):
+        if bounds is None:
+            with self._lock:
                 given = self._questions.given(text, params, self._state, "error")
-                return self._questions.ask(text, given, BoundedWorld(self._state, meter))
-        given = params if type(params) is dict else _plain(params)
-        return self._ready.asking(text, given)(*given.values())
+                return self._questions.ask(text, given, self._state)
+        meter = Meter(bounds)
+        with self._lock, meter.over(text):
+            given = self._questions.given(text, params, self._state, "error")
+            return self._questions.ask(text, given, BoundedWorld(self._state, meter))
 
     def prepare(self, text: str | Expression, *parameters: str) -> Prepared:
         """A question to be asked again and again: `kb.prepare("(on ?x ?place)", "place").query("table")`.
 
-        It is read and checked now, and asked with the values alone, in the order of the parameters' names. That
-        takes the least time there is; `ask` and `query` with the same text each time do not take much more.
+        The text is read and checked now, and asked with the values alone, in the order of the parameters' names.
 
         Raises:
             ParseError, UnknownNameError, SchemaError, InputError: as for `query`.
         """
-        return self._ready.prepared(text, parameters)
+        return Prepared(text, parameters, self._state, self._lock, self._questions)
 
     def explain(
         self, text: str | Expression, params: Mapping[str, Value] | None = None, *, bounds: Bounds | None = None
@@ -263,10 +263,3 @@ def _whole(limit: int | None) -> int | None:
     if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int) or limit < 0):
         raise InputError(f"a limit is a whole number, 0 or more, not {shown(limit)}")
     return limit
-
-
-def _plain(params: Mapping[str, Value] | None) -> dict[str, Value]:
-    if params is None:
-        return {}
-    require_params(params)
-    return dict(params)

@@ -155,7 +155,7 @@ class Installed:
             row.relation.renew(row)
         for readers, args, sign in reached:
             for trigger, rows in tuple(readers.made(args, sign)):
-                if rows and trigger.admits(*args):  # what came before may have closed them
+                if rows and trigger.admits(args):  # what came before may have closed them
                     trigger.relation.make(trigger, args, rows)
         touched = {condition for row in self._changed for condition in self._told.get(row, ())}
         for condition in sorted(touched, key=lambda c: c.number):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property, lru_cache
+from collections.abc import Callable, Iterator
+from functools import cached_property
 
 from knowledge_base.conditions.alpha_index import AlphaIndex, picker
 from knowledge_base.conditions.condition_shape import Args, Shape
@@ -12,16 +12,12 @@ from knowledge_base.conditions.open_rows import ROWS, RowsWorld, schema_with_row
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.compiler import compile_query, compile_test
-from knowledge_base.language.expression import And, Atom, Expression, Variable, free_variables
-from knowledge_base.language.generated_code import test_source
+from knowledge_base.language.expression import And, Atom, Variable, free_variables
 from knowledge_base.language.joins import conjuncts
 from knowledge_base.language.lookups import Search
-from knowledge_base.language.terms import Bindings
+from knowledge_base.language.terms import Bindings, Test
 from knowledge_base.world.index import FactIndex
 from knowledge_base.world.state import WorldState
-
-_source = lru_cache(maxsize=1024)(test_source)
-"""Cached for conditions that are installed repeatedly."""
 
 
 class ConditionRow:
@@ -123,37 +119,29 @@ class DeltaJoin:
             if not self._open[values]:
                 del self._open[values]
 
-    @cached_property
-    def admits(self) -> Callable[..., bool]:
-        """Whether a change with these arguments fits, and what it alone settles of the condition is true.
+    def admits(self, args: Args) -> bool:
+        """Whether a change with these arguments fits, and the part of the condition that it alone settles is true.
 
-        Most changes end here. An error counts as true: the evaluation of the whole condition reports it.
+        Most changes end here. A part that cannot be computed is left to the evaluation of the whole condition.
         """
+        if any(args[i] != args[j] for i, j in self._occurrence.equal):
+            return False
+        if self._settled is None:
+            return True
+        try:
+            return self._settled(self.relation.world, self.bindings(args))
+        except InputError:
+            return True
+
+    @cached_property
+    def _settled(self) -> Test | None:
+        """The part of the condition that a change settles alone, if there is one."""
         names = {position: name for name, position in self._occurrence.bound}
         said = Atom(self._occurrence.name, tuple(Variable(names[i]) for i in sorted(names)))  # true by the change
-        settled = set(names.values())
+        known = frozenset(names.values())
         rest = (part for part in conjuncts(self.relation.shape.body) if part != said)
-        parts = [part for part in rest if free_variables(part) <= settled]
-        test = self._settling(And(tuple(parts)), names)
-        equal = self._occurrence.equal
-        return test if not equal else lambda *args: all(args[i] == args[j] for i, j in equal) and test(*args)
-
-    def _settling(self, e: Expression, names: Mapping[int, str]) -> Callable[..., bool]:
-        """`e` as a function of a change's arguments; `names` are its variables by the positions of these."""
-        world, schema = self.relation.world, self.relation.world.schema
-        arguments = tuple([names.get(i, f"argument {i}") for i in range(max(names, default=-1) + 1)])
-        source = _source(e, schema, arguments)
-        if source is not None:
-            return source.bound(world)
-        holds = compile_test(e, schema)
-
-        def test(*args: Value) -> bool:
-            try:
-                return holds(world, self.bindings(args))
-            except InputError:
-                return True
-
-        return test
+        parts = tuple(part for part in rest if free_variables(part) <= known)
+        return compile_test(And(parts), self.relation.world.schema) if parts else None
 
     @cached_property
     def search(self) -> Search:

@@ -49,7 +49,7 @@ def require_params(params: object) -> None:
         InputError: it is no mapping, a name is no text, or a value is none.
         SchemaError: a value is a geometry.
     """
-    if not isinstance(params, Mapping):
+    if type(params) is not dict and not isinstance(params, Mapping):
         raise InputError(f"parameters are a mapping of variables' names to values, not {shown(params)}")
     for name, value in params.items():
         if not isinstance(name, str):

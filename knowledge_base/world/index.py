@@ -17,29 +17,25 @@ class FactIndex:
     """A set of facts in order of insertion, indexed per predicate and argument position.
 
     Dicts with `None` stand for ordered sets. Facts of one argument need no list for it.
-
-    Attributes:
-        by_predicate: the facts of a predicate, by their arguments; only read by others, as the next.
-        by_argument: the arguments of all facts with a value at a position, by predicate, position and value.
     """
 
     def __init__(self) -> None:
-        self.by_predicate: dict[str, dict[Args, Fact]] = {}
-        self.by_argument: dict[tuple[str, int, Value], dict[Args, None]] = {}
+        self._by_predicate: dict[str, dict[Args, Fact]] = {}  # by arguments
+        self._by_argument: dict[tuple[str, int, Value], dict[Args, None]] = {}
 
     def __contains__(self, fact: Fact) -> bool:
         return self.holds(fact.predicate, fact.args)
 
     def __iter__(self) -> Iterator[Fact]:
         """All facts, predicate by predicate."""
-        return chain.from_iterable(known.values() for known in self.by_predicate.values())
+        return chain.from_iterable(known.values() for known in self._by_predicate.values())
 
     def __len__(self) -> int:
-        return sum(map(len, self.by_predicate.values()))
+        return sum(map(len, self._by_predicate.values()))
 
     def holds(self, predicate: str, args: Args) -> bool:
         """Whether the fact is in the set."""
-        known = self.by_predicate.get(predicate)
+        known = self._by_predicate.get(predicate)
         return known is not None and args in known
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[Args]:
@@ -48,28 +44,28 @@ class FactIndex:
         Looks through the shortest of the lists of facts that have one of the bound arguments. It looks when
         it is iterated, so the set must not change until then.
         """
-        listed = self.listed(predicate, pattern)
+        listed = self._listed(predicate, pattern)
         exact = len(pattern) < 3 or pattern.count(None) >= len(pattern) - 1
         return listed if exact else _agreeing(listed, pattern)
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
         """At most how many facts agree with `pattern`, without looking through them."""
-        return len(self.listed(predicate, pattern))
+        return len(self._listed(predicate, pattern))
 
-    def listed(self, predicate: str, pattern: tuple[Value | None, ...]) -> Collection[Args]:
+    def _listed(self, predicate: str, pattern: tuple[Value | None, ...]) -> Collection[Args]:
         """The shortest list that has all facts which agree with `pattern`."""
         if len(pattern) == 2:  # arcs from or to a thing are asked for so often that it pays
             start, end = pattern
             if start is None and end is not None:
-                return self.by_argument.get((predicate, 1, end), ())
+                return self._by_argument.get((predicate, 1, end), ())
             if end is None and start is not None:
-                return self.by_argument.get((predicate, 0, start), ())
+                return self._by_argument.get((predicate, 0, start), ())
         if None not in pattern:
             return (pattern,) if self.holds(predicate, pattern) else ()  # type: ignore[arg-type,return-value]
-        shortest: Collection[Args] = self.by_predicate.get(predicate, ())
+        shortest: Collection[Args] = self._by_predicate.get(predicate, ())
         for position, value in enumerate(pattern):
             if value is not None:
-                listed = self.by_argument.get((predicate, position, value), ())
+                listed = self._by_argument.get((predicate, position, value), ())
                 if len(listed) < len(shortest):
                     shortest = listed
         return shortest
@@ -77,9 +73,9 @@ class FactIndex:
     def add(self, fact: Fact) -> None:
         """Put the fact at the end, unless it is there."""
         predicate, args = fact.predicate, fact.args
-        known = self.by_predicate.get(predicate)
+        known = self._by_predicate.get(predicate)
         if known is None:
-            known = self.by_predicate[predicate] = {}
+            known = self._by_predicate[predicate] = {}
         elif args in known:
             return
         known[args] = fact
@@ -87,35 +83,35 @@ class FactIndex:
             return
         for position, value in enumerate(args):
             key = predicate, position, value
-            listed = self.by_argument.get(key)
+            listed = self._by_argument.get(key)
             if listed is None:
-                self.by_argument[key] = {args: None}
+                self._by_argument[key] = {args: None}
             else:
                 listed[args] = None
 
     def discard(self, fact: Fact) -> None:
         """Take the fact out, if it is there."""
         predicate, args = fact.predicate, fact.args
-        known = self.by_predicate.get(predicate)
+        known = self._by_predicate.get(predicate)
         if known is None or args not in known:
             return
         del known[args]
         if not known:  # so that the facts alone say in which order the predicates come
-            del self.by_predicate[predicate]
+            del self._by_predicate[predicate]
         if len(args) == 1:
             return
         for position, value in enumerate(args):
             key = predicate, position, value
-            listed = self.by_argument[key]
+            listed = self._by_argument[key]
             del listed[args]
             if not listed:
-                del self.by_argument[key]
+                del self._by_argument[key]
 
     def copy(self) -> FactIndex:
         """An independent set with the same facts in the same order."""
         twin = FactIndex()
-        twin.by_predicate = _copied(self.by_predicate)
-        twin.by_argument = _copied(self.by_argument)
+        twin._by_predicate = _copied(self._by_predicate)
+        twin._by_argument = _copied(self._by_argument)
         return twin
 
 

@@ -1,83 +1,165 @@
-"""Turns for many who ask and some who change: one lock that neither keeps the other from.
+"""Read-write lock: questions and changes take turns in order of arrival, and an interrupt never leaves it taken.
 
-Three rules make the order:
-
-- Who waits for the lock stands in line (`world.line`), first come, first served, whether to ask or to change something.
-- Who changes something may want to be *alone* with that, without the lock: others who want to change something leave
-  the lock's line then and wait apart, in order of arrival, and go before whoever comes later to change something.
-- Most questions are answered without the lock as long as the *door* is open (`Stamp.version` is not `None`). A change
-  shuts it from when it stands in line until it is made, so that those questions take their place there, too. Otherwise
-  who asks without pause would hold Python's own lock (GIL), and a change would wait for that, 5 ms each time that it
-  touches a file or gets the lock from another thread. Who asks with the lock, and sees nobody coming to change
-  anything, opens the door again.
-
-So a change has nothing to do when it ends but to give back a lock of Python's own. No line of Python is run for that,
-and no interrupt can come before it. (A block that is a generator, like a transaction, can be interrupted as it is
-left; it ends when the interrupt and its traceback are forgotten.)
-
-Re-entrance: a thread that holds the lock may take it again at once, and one that changes something or is alone may
-take both. A thread that holds the lock only to ask cannot change anything; waiting to be let it would keep out who is
-alone.
+An interrupt (`KeyboardInterrupt`) comes as Python enters a function, begins a loop again, or returns from a call. So an
+`__exit__` here is that of Python's own lock: one call into C, before which no interrupt can come. A gate is a queue,
+because a queue may be opened twice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from queue import SimpleQueue
+from threading import RLock
+from time import monotonic
 from types import TracebackType
+from typing import Protocol
 
 from knowledge_base.errors import ConflictError
-from knowledge_base.world.fair_lock import PATIENCE_S, FairLock
+
+PATIENCE_S = 0.0005
+"""How long the first in line lets others go first: a few changes' time, some times what handing the lock over takes."""
 
 
-@dataclass(slots=True)
-class Stamp:
-    """The version of a world, by which who reads a few facts without a lock knows that they are of one version.
+class Enter(Protocol):
+    """A context manager's `__enter__` as a value."""
 
-    Attributes:
-        version: `None` while a change is being made, or waits to be made, and after it until somebody asks.
-        newest: the version that was made last.
-    """
-
-    version: int | None = 0
-    newest: int = 0
+    def __call__(self) -> None:
+        """Take the lock."""
 
 
-class ReadWriteLock(FairLock):
-    """The lock of a world; used as a context manager by who asks.
+class Exit(Protocol):
+    """A context manager's `__exit__` as a value."""
+
+    def __call__(
+        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None, /
+    ) -> None:
+        """Give the lock back."""
+
+
+class FairLock:
+    """Re-entrant lock, taken in order of arrival; used as a context manager.
+
+    A thread that finds the lock free goes first as long as the first in line is within its patience; then all join
+    the line at its end. (Handing the lock over each time costs more than most of the work done with it.)
 
     Args:
-        stamp: that of the world, for who reads without the lock.
+        patience_s: how long the first in line lets others go first, in seconds.
+
+    Attributes:
+        held: whether this thread has the lock.
+        release: give the lock back, once.
+        marked: set by the thread that has the lock; cleared each time it is taken anew.
+    """
+
+    __slots__ = ("__exit__", "_acquire", "_due", "_gates", "_patience_s", "held", "marked", "release")
+
+    __exit__: Exit
+
+    def __init__(self, patience_s: float = PATIENCE_S) -> None:
+        lock = RLock()
+        self.held: Callable[[], bool] = lock._is_owned  # type: ignore[attr-defined]  # noqa: SLF001
+        self.release = lock.release
+        self.__exit__ = lock.__exit__
+        self._acquire = lock.acquire
+        self._patience_s = patience_s
+        self._gates: deque[SimpleQueue[None]] = deque()  # that of the first is open
+        self._due = 0.0  # when the patience of the first is over
+        self.marked = False
+
+    @property
+    def length(self) -> int:
+        """Number of threads in line."""
+        return len(self._gates)
+
+    def __enter__(self) -> None:
+        again = self.held()
+        try:
+            may_go = again or not self._gates or monotonic() < self._due
+            if not (may_go and self._acquire(blocking=False)):
+                self._wait()
+        except BaseException:
+            self.let_go()
+            raise
+        if not again:  # no calls from here on: they could be interrupted
+            self.marked = False
+
+    def let_go(self) -> None:
+        """Give back what an interrupted call may have taken."""
+        try:
+            self.release()
+        except RuntimeError:  # the interrupt came before the call took it
+            return
+
+    def is_free(self) -> bool:
+        """Whether no other thread has the lock or stands in line."""
+        free = not self._gates
+        try:
+            self._acquire(blocking=False)
+        finally:
+            try:
+                self.release()
+            except RuntimeError:  # another thread has it
+                free = False
+        return free
+
+    def _wait(self) -> None:
+        """Stand in line until the lock is taken; leaving the line opens the next gate."""
+        gate: SimpleQueue[None] = SimpleQueue()
+        try:
+            try:
+                self._gates.append(gate)
+                if self._gates[0] is gate:
+                    gate.put(None)
+                    self._due = monotonic() + self._patience_s
+                gate.get()
+                self._acquire()
+            finally:
+                self._gates.remove(gate)
+        finally:
+            try:
+                self._gates[0].put(None)
+            except IndexError:  # the line is empty
+                pass
+            else:
+                self._due = monotonic() + self._patience_s
+
+
+class ReadWriteLock:
+    """Lock of a world: `with lock` to ask, `with lock.changing()` to change, `with lock.alone()` to prepare a change.
+
+    A thread that is *alone* leaves the lock to questions. Another thread that wants to change something then waits
+    apart, in order of arrival, and goes before each later one.
+
+    Each of the three may be entered again; a thread that changes something or is alone may enter all. A thread that
+    only asks cannot change anything: its wait would keep out the thread that is alone.
+
+    Args:
         patience_s: how long the first in line lets others go first, in seconds.
     """
 
-    def __init__(self, stamp: Stamp, patience_s: float = PATIENCE_S) -> None:
-        super().__init__(patience_s)
-        self._stamp = stamp
+    __slots__ = ("__enter__", "__exit__", "_alone", "_apart", "_as_alone", "_as_changing", "_lock")
+
+    __enter__: Enter
+    __exit__: Exit
+
+    def __init__(self, patience_s: float = PATIENCE_S) -> None:
+        self._lock = FairLock(patience_s)  # marked by a thread that changes something
         self._alone = FairLock(patience_s)
-        self._apart: set[object] = set()  # who waits until somebody is alone no longer, and then for the lock
-        self._first_apart = FairLock(patience_s)  # had by one of these
-        self._coming: set[object] = set()  # who stands in line to change something
-        self._changing = False  # who has the lock has it to change something
-        self._as_changing = _Passage(self._begin_changing, self.__exit__)
+        self._apart = FairLock(patience_s)  # had by the first that waits until no thread is alone
+        self.__enter__ = self._lock.__enter__
+        self.__exit__ = self._lock.__exit__
+        self._as_changing = _Passage(self._begin_changing, self._lock.__exit__)
         self._as_alone = _Passage(self._begin_alone, self._alone.__exit__)
 
     @property
     def waiting(self) -> tuple[int, int]:
-        """How many threads stand in line, and how many wait until somebody is alone no longer."""
-        return self.length, self._alone.length + self._first_apart.length
-
-    def __enter__(self) -> bool:
-        again = self.get()
-        if not again:  # no calls from here on: they could be interrupted
-            self._changing = False
-            if not self._coming:
-                self._stamp.version = self._stamp.newest
-        return again
+        """Number of threads in line, and of threads that wait apart."""
+        return self._lock.length, self._alone.length + self._apart.length
 
     def changing(self) -> AbstractContextManager[None]:
-        """Nobody else changes anything or asks.
+        """No other thread asks or changes anything.
 
         Raises:
             ConflictError: on entering, this thread is inside a question.
@@ -85,109 +167,61 @@ class ReadWriteLock(FairLock):
         return self._as_changing
 
     def alone(self) -> AbstractContextManager[None]:
-        """Nobody else changes anything; who asks may go on.
+        """No other thread changes anything; other threads may ask.
 
         Raises:
             ConflictError: on entering, this thread is inside a question.
         """
         return self._as_alone
 
-    def made(self) -> None:
-        """Who reads without the lock may go on; said by who changes something, when nothing is changed any more."""
-        if not self._coming:
-            self._stamp.version = self._stamp.newest
-
-    @contextmanager
-    def ajar(self) -> Iterator[None]:
-        """Who reads without the lock may go on; used while changing, as long as nothing is changed."""
-        self.made()
-        try:
-            yield
-        finally:
-            self._stamp.version = None
-
     def _begin_changing(self) -> None:
         self._get_to_change()
-        # No calls from here on: they could be interrupted.
-        self._stamp.version = None  # for good: now nobody can open it
-        self._changing = True
+        self._lock.marked = True  # no calls from here on: they could be interrupted
 
     def _begin_alone(self) -> None:
-        again = self._get_to_change()
-        if not (again or self._coming):
-            self._stamp.version = self._stamp.newest
+        self._get_to_change()
+        entered = False
         try:
             try:
-                self._alone.acquire()  # it is free, or will be at once
-            finally:
-                self.release()
-        except BaseException:
-            self._alone.let_go()
-            raise
-
-    def _get_to_change(self) -> bool:
-        """Get the lock while nobody else is alone, with the door shut; whether this thread had it already."""
-        again = self.held()
-        if again and not self._changing and not self._alone.held():
-            raise ConflictError("a question is being answered in this thread; nothing can be changed meanwhile")
-        entered, me = False, object()
-        try:
-            try:
-                self._coming.add(me)
-                self._stamp.version = None
-                self.get()
+                self._alone.__enter__()  # it is free, or will be at once
                 entered = True
-                if not again and self._has_to_wait():
-                    self.release()
-                    self._wait_apart(me)
             finally:
-                self._coming.discard(me)
+                self._lock.release()
         except BaseException:
             if entered:
-                self.let_go()
+                self._alone.let_go()
             raise
-        return again
 
-    def _has_to_wait(self) -> bool:
-        """Whether another thread is alone, or has waited longer for that to end."""
-        if self._alone.held():
-            return False
-        another = bool(self._apart)
+    def _get_to_change(self) -> None:
+        """Take the lock while no other thread is alone or has waited longer for that."""
+        again, alone = self._lock.held(), self._alone.held()
+        if again and not (self._lock.marked or alone):
+            raise ConflictError("a question is being answered in this thread; nothing can be changed meanwhile")
+        entered = False
         try:
-            self._alone.acquire(blocking=False)
-        finally:
-            try:
-                self._alone.release()
-            except RuntimeError:  # it was not to be had
-                another = True
-        return another
-
-    def _wait_apart(self, me: object) -> None:
-        """Wait until nobody is alone, and then for the lock, in order of arrival."""
-        try:
-            self._apart.add(me)
-            self._coming.discard(me)
-            with self._first_apart:
-                with self._alone:
-                    pass
-                self._coming.add(me)
-                self._stamp.version = None
-                self.get()
-        finally:
-            self._apart.discard(me)
+            self._lock.__enter__()
+            entered = True
+            if not (again or alone or (self._apart.is_free() and self._alone.is_free())):
+                self._lock.release()
+                entered = False
+                with self._apart:
+                    with self._alone:
+                        pass
+                    self._lock.__enter__()
+                    entered = True
+        except BaseException:
+            if entered:
+                self._lock.let_go()
+            raise
 
 
 class _Passage:
-    """A context manager that is made of two functions; the second may be one of C's."""
+    """A context manager made of two functions; the second may be one of C's."""
 
     __slots__ = ("__enter__", "__exit__")
 
-    __enter__: Callable[[], None]
-    __exit__: Callable[[type[BaseException] | None, BaseException | None, TracebackType | None], None]
+    __enter__: Enter
+    __exit__: Exit
 
-    def __init__(
-        self,
-        enter: Callable[[], None],
-        leave: Callable[[type[BaseException] | None, BaseException | None, TracebackType | None], None],
-    ) -> None:
+    def __init__(self, enter: Enter, leave: Exit) -> None:
         self.__enter__, self.__exit__ = enter, leave

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterable, Mapping
 
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.world.index import FactIndex
-from knowledge_base.world.read_write_lock import Stamp
 from knowledge_base.world.schema import Schema
 
 
@@ -15,13 +14,9 @@ class WorldState:
 
     Functions may be fed by sources (`sources`): their latest values are read like any other, but they are no
     part of `values`, of copies, and of what is committed.
-
-    Attributes:
-        stamp: kept by who changes it while others read.
     """
 
     def __init__(self, schema: Schema) -> None:
-        self.stamp = Stamp()
         self._schema = schema
         self._facts = FactIndex()
         self._values: dict[Fact, Content] = {}

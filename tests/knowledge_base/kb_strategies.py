@@ -163,7 +163,12 @@ def removals() -> st.SearchStrategy[Delta]:
 
 # --- the slow evaluator
 
-_COMPARE = {"=": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt,
+
+def _same(left, right) -> bool:
+    return left == right and isinstance(left, bool) == isinstance(right, bool)
+
+
+_COMPARE = {"=": _same, "!=": lambda left, right: not _same(left, right), "<": operator.lt, "<=": operator.le, ">": operator.gt,
             ">=": operator.ge}  # fmt: skip
 _COMPUTE = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 
