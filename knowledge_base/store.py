@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import sqlite3
 import time as wall
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from threading import get_ident
 from types import TracebackType
 from typing import Self, get_args
+from weakref import WeakSet
 
-from knowledge_base.errors import ConflictError, HistoryError, InputError
+from knowledge_base.conditions.condition import Condition, Fire
+from knowledge_base.conditions.damping import TimerClock
+from knowledge_base.conditions.installed import Installed, terms
+from knowledge_base.conditions.notification import Listener, Notifier
+from knowledge_base.conditions.watch import Watch, watch
+from knowledge_base.errors import ConflictError, HistoryError, InputError, StoreError
 from knowledge_base.exchange import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
 from knowledge_base.group_commit import GroupCommit
@@ -20,8 +26,8 @@ from knowledge_base.journal.file import Durability, located
 from knowledge_base.journal.history import History, Version, Writer, gone
 from knowledge_base.journal.journal import Journal
 from knowledge_base.journal.memory_history import MemoryHistory
+from knowledge_base.language.expression import Expression
 from knowledge_base.language.inputs import require_delta, require_text, require_time, require_version, shown
-from knowledge_base.observable import Observable
 from knowledge_base.sources import DataSource, Sources
 from knowledge_base.transaction import Transaction
 from knowledge_base.view import View
@@ -33,7 +39,7 @@ Now = Callable[[], float]
 """Tells the time in seconds."""
 
 
-class KnowledgeBase(Observable):
+class KnowledgeBase(View):
     """A world model that may be asked and changed from several threads.
 
     One lock orders questions and changes by arrival (`world.read_write_lock`). A question sees one version and its
@@ -52,6 +58,10 @@ class KnowledgeBase(Observable):
         self._history = history or MemoryHistory(Version(WorldState(schema), 0, clock()))
         start = self._history.newest()
         super().__init__(start.state, start.version)
+        self._announcer = Notifier(self._lock)
+        self._installed = Installed(start.state, start.version, self._lock, self._announcer)
+        self._watches: WeakSet[Watch] = WeakSet()
+        self._closed = False
         self._sources = Sources(start.state, lambda: self._graph, self._installed, self._announcer, self._lock)
         self._clock = clock
         self._time = start.time
@@ -138,7 +148,13 @@ class KnowledgeBase(Observable):
         Installed conditions are cancelled, so that no timer goes on and whoever waits for one is told; watches
         end and sources are closed. Repeating it is fine.
         """
-        super().close()
+        with self._lock:
+            self._closed = True
+            conditions, watches = self._installed.conditions(), list(self._watches)
+        for condition in conditions:
+            condition.cancel()
+        for one in watches:
+            one.close()
         for source in self.sources():
             source.close()
         with self._lock.changing():
@@ -251,6 +267,79 @@ class KnowledgeBase(Observable):
             ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
         """
         return GroupCommit(self._lock, self._require_free, self._history)
+
+    def subscribe(self, listener: Listener) -> Callable[[], None]:
+        """Call `listener` with every committed change from now on; the function returned ends that.
+
+        Changes come in commit order; a commit that changes nothing is not announced. A listener may ask and
+        change the knowledge base. When listeners raise, the committing call raises an `ExceptionGroup`
+        after all have been told; the change stays.
+        """
+        return self._announcer.subscribe(listener)
+
+    def install(
+        self,
+        text: str | Expression,
+        params: Mapping[str, Value] | None = None,
+        *,
+        fire: Fire = "edge",
+        hold_s: float = 0.0,
+        once: bool = False,
+        hysteresis: float | None = None,
+        clock: TimerClock | None = None,
+    ) -> Condition:
+        """Keep a condition evaluated at every version from now on, and fire when it becomes true (S2.4).
+
+        What an update costs depends on what it changes, see `conditions.join`. What is true already does
+        not fire; it begins to hold.
+
+        Args:
+            text: a condition; it is true if there are values for its free variables, which then are its witness.
+            params: variables that have a value already.
+            fire: `edge`, when it becomes true; `each`, also at every change of the set of its witnesses while
+                it is true.
+            hold_s: it fires when it has been true for so many seconds without a break.
+            once: it is cancelled by its first firing.
+            hysteresis: it stays true until its comparisons fail by more than that: `(> (level) 9)` becomes
+                true above 9 and false when `(> (level) (- 9 hysteresis))` is.
+            clock: what `hold_s` is measured with.
+
+        Raises:
+            InputError: as for `query`; a negative or not finite time, a time without a clock, a hysteresis
+                without a comparison; another word for `fire`.
+            StoreError: the knowledge base is closed.
+        """
+        firing = terms(fire, hold_s=hold_s, once=once, clock=clock)
+        with self._lock:
+            self._require_open()
+            params = self._questions.given(text, params, self._state, "answers")
+            e = self._questions.query(text, params, self._state)
+            condition = self._installed.install(e, params, firing, hysteresis)
+        self._announcer.deliver()
+        return condition
+
+    def watch(
+        self, pattern: str | Expression | None = None, params: Mapping[str, Value] | None = None, *, limit: int = 1000
+    ) -> Watch:
+        """The committed changes from now on that touch `pattern`, as an asynchronous iterator.
+
+        When `limit` changes wait to be read and another one comes, all of them are dropped and the next item
+        is a `Missed` that says since when.
+
+        Args:
+            pattern: a predicate, function or type with arguments, e.g. `(on ?o table)`; `None` for all changes.
+            params: variables of the pattern that have a value.
+            limit: how many changes may wait, at least 1.
+
+        Raises:
+            InputError: the pattern is none, or names what is not declared.
+            StoreError: the knowledge base is closed.
+        """
+        with self._lock:
+            self._require_open()
+            made = watch(self, pattern, {} if params is None else params, limit)
+            self._watches.add(made)
+            return made
 
     def bind_source(self, function: str, *args: Value, reference: str) -> DataSource:
         """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
@@ -379,6 +468,10 @@ class KnowledgeBase(Observable):
             raise gone(version, self.oldest)
         if version > self._version:
             raise HistoryError(f"version {version} is not there yet; the newest is {self._version}")
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise StoreError("the knowledge base is closed; it can only be asked")
 
     def _require_free(self) -> None:
         self._require_open()

@@ -31,10 +31,7 @@ class Notifier:
 
     @contextmanager
     def quiet(self) -> Iterator[None]:
-        """Nothing is delivered meanwhile; used under the lock, by a thread that goes on holding it.
-
-        Within a transaction whoever listens would hear of other commits under the lock.
-        """
+        """Nothing is delivered meanwhile; used by the thread that is alone, for the block of its transaction."""
         self._quiet = True
         try:
             yield
