@@ -34,7 +34,7 @@ PARTS = (
 OURS = tuple(part for part in PARTS if part != "engine")
 _HERE = tuple(part for part in OURS if part != "translate")  # that the engine's process does
 _WRAPPED = (
-    (search, "mending", "mend"), (search, "build_problem", "pose"), (search, "deordered", "validate, de-order"),
+    (search, "local_repair", "mend"), (search, "build_problem", "pose"), (search, "deordered", "validate, de-order"),
     (asking, "written", "write"),
     (plotting, "deordered", "validate, de-order"), (plotting, "laid_out", "generate"),
     (plotting, "plot_of", "generate"),

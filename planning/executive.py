@@ -38,7 +38,7 @@ from planning.engines.cache import CachingPlanner
 from planning.engines.planner import Planner, PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.execution.component import PlanningComponent
-from planning.execution.foresight import Foresight
+from planning.execution.search import Foresight
 from planning.fragments import shipped_by
 from planning.garbage_collection import settled
 from planning.problem.construction import check_goal

@@ -1,1 +1,1 @@
-"""Carrying plans out: watched, mended, replaced, given up."""
+"""Execution of plans: monitoring, repair, replacement, and giving up."""

@@ -34,7 +34,7 @@ class LocalRepair:
     end: tuple[PlanStep, ...]
     problem: Problem
 
-    def mended(
+    def repaired(
         self, first: Plan, before: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
     ) -> Plan | None:
         """The plan that begins with the solution `first`, if it leads to the goal and is not much longer."""
@@ -43,7 +43,7 @@ class LocalRepair:
         return plan if short and validate(plan, domain, world, goal).valid else None
 
 
-def mending(
+def local_repair(
     before: PlanProgress,
     excluded: AbstractSet[PlanStep],
     domain: PlanningDomain,
@@ -67,7 +67,7 @@ def mending(
         OutOfPatienceError: it takes too long.
     """
     derived = derivation(domain)
-    closed, left = derived.world(world), before.left  # once: the plan may go on meanwhile
+    closed, left = derived.world(world), before.remaining  # once: the plan may go on meanwhile
     if derived.recursive:  # its conditions are those of another state of the world
         before = before.renewed(derived.domain, derived.expand(goal))
     ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))

@@ -84,7 +84,7 @@ class Monitor:
     """Watches one plan until it is closed.
 
     Args:
-        course: how far the plan is; whoever begins a step there calls `look` then.
+        progress: how far the plan is; whoever begins a step there calls `look` then.
         domain, knowledge: as everywhere.
         is_own: whether a change by this author is the running step's own doing.
         hear: is told what is new, in the moment in which it becomes so.
@@ -92,13 +92,13 @@ class Monitor:
 
     def __init__(
         self,
-        course: PlanProgress,
+        progress: PlanProgress,
         domain: PlanningDomain,
         knowledge: KnowledgeBase,
         is_own: Callable[[str], bool],
         hear: Callable[[News], None],
     ) -> None:
-        self._course = course
+        self._course = progress
         self._domain = domain
         self._knowledge = knowledge
         self._is_own = is_own
@@ -106,26 +106,26 @@ class Monitor:
         self._links: dict[Expression, Condition] = {}
         self._to_come: dict[Expression, Condition] = {}
         self._whole: Callable[[], None] = lambda: None
-        self._goal = self._install(course.goal, self._goal_fired)
+        self._goal = self._install(progress.goal, self._goal_fired)
 
     def look(self, author: str) -> None:
         """Judge the plan as a whole, whoever changed the world (`author`, as far as that is known)."""
-        self.watch()
-        course, world = self._course, self._knowledge
-        if _true(course.goal, world):
+        self.update()
+        progress, world = self._course, self._knowledge
+        if _true(progress.goal, world):
             self._hear(GoalReached(author))
-        elif len(course.at_work) > 1:  # nobody is interrupted for the sake of a shorter plan
-            if not course.stands(world):
+        elif len(progress.running) > 1:  # nobody is interrupted for the sake of a shorter plan
+            if not progress.stands(world):
                 self._hear(self._broken(author, world.version))
         else:
-            end = shortest_end(course.left_steps, self._domain, world, course.goal)
+            end = shortest_end(progress.remaining_steps, self._domain, world, progress.goal)
             if end is None:
                 self._hear(self._broken(author, world.version))
                 return
-            if course.early:
-                course.early = False
-                end = thinned(end, self._domain, world, course.goal)
-            if len(end) < len(course.left):
+            if progress.early:
+                progress.early = False
+                end = thinned(end, self._domain, world, progress.goal)
+            if len(end) < len(progress.remaining):
                 self._hear(Shorter(end))
 
     def close(self) -> None:
@@ -136,16 +136,16 @@ class Monitor:
                 condition.cancel()
         self._links, self._to_come, self._goal = {}, {}, None
 
-    def watch(self) -> None:
+    def update(self) -> None:
         """Watch what is needed now, and what later steps will bring in case that somebody else does."""
-        course = self._course
-        needed, later = course.needed(), course.needed_later()
+        progress = self._course
+        needed, later = progress.needed(), progress.needed_later()
         self._whole()
         if needed is None or later is None:
             self._whole = self._knowledge.subscribe(self._changed)
             needed = later = {}
         self._keep(self._links, {**later, **needed}, self._link_fired)
-        bring = (part for step in course.coming() for part in _brought(step, self._domain))
+        bring = (part for step in progress.coming() for part in _brought(step, self._domain))
         fresh = [fact for fact in bring if fact not in self._links and not _true(fact, self._knowledge)]
         self._keep(self._to_come, dict.fromkeys(fresh), self._came)
 
@@ -189,13 +189,13 @@ class Monitor:
         author = None if firing.truth else self._foreign(firing)
         if author is None or _true(self._course.goal, self._knowledge):  # that the goal is reached is heard by itself
             return
-        course, world = self._course, self._knowledge
-        if e in (course.needed() or {}) and e in (course.needed_later() or {}):
+        progress, world = self._course, self._knowledge
+        if e in (progress.needed() or {}) and e in (progress.needed_later() or {}):
             # Whatever the step at work has done by now; if a later step can be the next one, it will be.
-            if shortest_end(course.coming(), self._domain, world, course.goal) is None:
+            if shortest_end(progress.coming(), self._domain, world, progress.goal) is None:
                 self._hear(self._broken(author, firing.version, e))
-        elif not course.stands(world):  # the step at work itself is hit
-            end = shortest_end(course.coming(), self._domain, world, course.goal)
+        elif not progress.stands(world):  # the step at work itself is hit
+            end = shortest_end(progress.coming(), self._domain, world, progress.goal)
             self._hear(self._broken(author, firing.version, e) if end is None else Shorter(end))
 
     def _changed(self, change: Change) -> None:
@@ -203,14 +203,14 @@ class Monitor:
             self._hear(self._broken(change.author, change.version))
 
     def _broken(self, author: str, version: int, fallen: Expression | None = None) -> Broken:
-        course = self._course
-        now, later = course.needed() or {}, course.needed_later() or {}
+        progress = self._course
+        now, later = progress.needed() or {}, progress.needed_later() or {}
         needed = {**now, **{one: user for one, user in later.items() if one not in now}}
         if fallen is None:
             fallen = next((one for one in needed if not _true(one, self._knowledge)), None)
-        why = validate(Plan(course.left_steps), self._domain, self._knowledge, course.goal).why
+        why = validate(Plan(progress.remaining_steps), self._domain, self._knowledge, progress.goal).why
         if fallen is None:
-            return Broken(why, "", len(course.steps) + 1, author, version)
+            return Broken(why, "", len(progress.steps) + 1, author, version)
         return Broken(why, to_text(fallen), needed[fallen], author, version)
 
 

@@ -59,16 +59,16 @@ class PlanRecords:
         """There is none."""
         self._trace.record("plan.none", kind=kind, reason=reason, **(_CUT_SHORT if kind == "timed_out" else {}))
 
-    def broken(self, course: PlanProgress, news: Broken) -> None:
+    def broken(self, progress: PlanProgress, news: Broken) -> None:
         """What is left of a plan does not lead to the goal any more: who changed what that which step needs."""
-        user = str(course.steps[news.user - 1]) if news.user <= len(course.steps) else "the goal"
+        user = str(progress.steps[news.user - 1]) if news.user <= len(progress.steps) else "the goal"
         self._trace.record(
             "plan.broken",
             reason=news.why,
             link={"fact": news.needed, "step": news.user, "user": user},
             author=news.author,
             version=news.version,
-            step=max(course.at_work, default=1),
+            step=max(progress.running, default=1),
         )
 
     def replaced(self, old: str, new: str, kept: int) -> None:

@@ -1,4 +1,4 @@
-"""The plot that a plan is carried out with."""
+"""Plotting makes the plot that executes a plan."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dsc.model.plot import ActionPlot
     from knowledge_base.language.expression import Expression
     from knowledge_base.store import KnowledgeBase
-    from planning.execution.carried import Carried
+    from planning.execution.plan_run import PlanRun
     from planning.problem.derived import Derivation
 
 
@@ -29,8 +29,8 @@ class Plotting:
         derivation: of the planning domain.
         library: plots that implement its actions, and the holders whose rules are inherited.
         knowledge: the world that a plan is for.
-        parallel: whether steps that need not wait for each other are carried out side by side.
-        shared: names of components that can carry out several skills at once.
+        parallel: whether independent steps run in parallel.
+        shared: names of components that can execute several skills concurrently.
     """
 
     derivation: Derivation
@@ -40,22 +40,22 @@ class Plotting:
     shared: Collection[str]
 
     def order(self, plan: Plan, goal: Expression, known: PartialOrder | None = None) -> PartialOrder:
-        """Which steps wait for which; `known` if that was found out already."""
+        """Return which steps wait for which: `known`, if given."""
         if plan.schedule:
             return linked(plan, self.derivation.original, self.knowledge, goal)
         order = known or deordered(plan, self.derivation.original, self.knowledge, goal)
         return order if self.parallel else replace(order, before=in_sequence(plan).before)
 
-    def form(self, carried: Carried, order: PartialOrder, instead_of: str | None = None) -> dict[str, Any]:
-        """The plot as data; its first step is done rather not with the candidate `instead_of`.
+    def form(self, run: PlanRun, order: PartialOrder, instead_of: str | None = None) -> dict[str, Any]:
+        """Return the plot as data; its first step tries the candidate `instead_of` last.
 
-        The plan's course learns in which order the plot takes the steps.
+        The progress of the plan takes over the order of the plot.
         """
-        rules = self.library.plot(carried.holder).rules if carried.holder in self.library else ()
-        plan, domain = Plan(carried.course.steps), carried.course.domain
+        rules = self.library.plot(run.holder).rules if run.holder in self.library else ()
+        plan, domain = Plan(run.progress.steps), run.progress.domain
         layout = laid_out(plan, domain, self.library, rules, order, self.shared)
-        carried.course.take_in_order(layout.before)
-        plot = plot_of(plan, layout, carried.name, watched=True)
+        run.progress.take_in_order(layout.before)
+        plot = plot_of(plan, layout, run.name, watched=True)
         self.library.expect(plot)
         form = plot.to_form()
         if instead_of is not None:
@@ -64,7 +64,7 @@ class Plotting:
 
 
 def _state(plot: ActionPlot, form: dict[str, Any], name: str) -> dict[str, Any]:
-    """The form of a state, wherever it stands in the plot's."""
+    """Return the form of a state inside the form of its plot."""
     path = next(path for own, _, path in plot.walk() if own == name)
     found: Any = form
     for key in path:

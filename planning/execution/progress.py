@@ -13,12 +13,12 @@ from knowledge_base.language.evaluation import World, holds
 from knowledge_base.language.expression import Expression
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.execution.causal_needs import CausalNeeds
+from planning.execution.regression import CausalNeeds
 from planning.plan import PlanStep
 from planning.problem.costs import TOTAL_COST
 from planning.quantities import worth
 
-_MOST_AT_WORK = 3
+_MOST_RUNNING = 3
 """Of so many steps at work, each is looked at as not begun and as done; of more, only all of them."""
 
 
@@ -125,17 +125,17 @@ class PlanProgress:
     def from_json(cls, form: Mapping[str, Any], domain: PlanningDomain, goal: Expression) -> PlanProgress:
         """The inverse of `to_json`, with conditions written for the present state of the world."""
         before = None if form["before"] is None else {(first, second) for first, second in form["before"]}
-        course = cls([PlanStep.from_json(step) for step in form["steps"]], domain, goal, before)
+        progress = cls([PlanStep.from_json(step) for step in form["steps"]], domain, goal, before)
         for number in form["begun"]:
-            course.begin(number)
-        course.early = form["early"]
-        return course
+            progress.begin(number)
+        progress.early = form["early"]
+        return progress
 
     def renewed(self, domain: PlanningDomain, goal: Expression) -> PlanProgress:
         """Just as far, with conditions written for another state of the world."""
-        course = PlanProgress(self.steps, domain, goal, self._before)
-        course._begun, course._done = set(self._begun), set(self._done)
-        return course
+        progress = PlanProgress(self.steps, domain, goal, self._before)
+        progress._begun, progress._done = set(self._begun), set(self._done)
+        return progress
 
     def take_in_order(self, before: AbstractSet[tuple[int, int]]) -> None:
         """The steps wait for each other in this way as well; nothing has begun yet."""
@@ -157,26 +157,26 @@ class PlanProgress:
         return {first for first, second in self._before if second == later}
 
     @property
-    def at_work(self) -> tuple[int, ...]:
+    def running(self) -> tuple[int, ...]:
         """The steps that have begun and are not known to be done."""
         return tuple(sorted(self._begun - self._done))
 
     @property
-    def left(self) -> tuple[int, ...]:
+    def remaining(self) -> tuple[int, ...]:
         """The steps that are not done, those at work among them, in an order in which they can be taken."""
         return tuple(number for number in range(1, len(self.steps) + 1) if number not in self._done)
 
     @property
-    def left_steps(self) -> tuple[PlanStep, ...]:
+    def remaining_steps(self) -> tuple[PlanStep, ...]:
         """The steps with the numbers of `left`."""
-        return self.steps_of(self.left)
+        return self.steps_of(self.remaining)
 
     def needed(self) -> Mapping[Expression, int] | None:
         """What must hold now, with who needs it first; `None` if that cannot be written as conditions.
 
         A step at work may have done its part already, so that what later steps need of it counts as well.
         """
-        return self._needs.before(self.left)
+        return self._needs.before(self.remaining)
 
     def needed_by(self, numbers: tuple[int, ...]) -> Mapping[Expression, int] | None:
         """As `needed`, if only the steps with these numbers, in this order, were left."""
@@ -188,7 +188,7 @@ class PlanProgress:
 
     def needed_later(self) -> Mapping[Expression, int] | None:
         """As `needed`, as if everything at work were done."""
-        return self._needs.before(self._after(self.at_work))
+        return self._needs.before(self._after(self.running))
 
     def stands(self, world: World) -> bool:
         """Whether the goal is reached from `world`; each step at work may not have begun or be done."""
@@ -201,15 +201,15 @@ class PlanProgress:
 
     def coming(self) -> tuple[PlanStep, ...]:
         """The steps that have not begun."""
-        return self.steps_of(self._after(self.at_work))
+        return self.steps_of(self._after(self.running))
 
     def _ways_on(self) -> Iterator[tuple[PlanStep, ...]]:
         """What may be left to do."""
-        at_work = self.at_work
-        sizes = range(len(at_work) + 1) if len(at_work) <= _MOST_AT_WORK else (0, len(at_work))
-        finished = itertools.chain.from_iterable(itertools.combinations(at_work, size) for size in sizes)
+        running = self.running
+        sizes = range(len(running) + 1) if len(running) <= _MOST_RUNNING else (0, len(running))
+        finished = itertools.chain.from_iterable(itertools.combinations(running, size) for size in sizes)
         return (self.steps_of(self._after(done)) for done in finished)
 
     def _after(self, done: Iterable[int]) -> tuple[int, ...]:
         gone = set(done)
-        return tuple(number for number in self.left if number not in gone)
+        return tuple(number for number in self.remaining if number not in gone)

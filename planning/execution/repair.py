@@ -1,15 +1,14 @@
-"""What to do when a plan does not go on: the rungs between the rules of a plot and giving up (S1.4, S4.2).
+"""Attempt chooses the escalation step for a failed plan, between the rules of a plot and giving up (S1.4, S4.2).
 
-The same failure in the same situation never gets the same answer twice. Every answer is bounded, so that all of them
-together are.
+The same failure in the same situation never gets the same answer twice. Each answer and their number are bounded.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -20,17 +19,13 @@ from knowledge_base.view import View
 from planning.domain import PlanningDomain
 from planning.plan import PlanStep
 from planning.problem.relevance import names_of, relevant
-from planning.strips import Problem
 
 MOST_RESUMED = 3
-"""How often one attempt goes on at the same step without a new plan."""
-
-EXCLUDED_SECONDS = 120.0
-"""Seconds of run time for which new plans do without a step that failed again and again."""
+"""The number of times that one attempt resumes at the same step without a new plan."""
 
 
 class EscalationStep(Enum):
-    """What is tried, in this order."""
+    """The answers to a failed plan, in the order in which they are tried."""
 
     RESUME = "the same plan goes on"
     OTHER_CANDIDATE = "the same plan goes on, the step done in another way"
@@ -41,12 +36,12 @@ class EscalationStep(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A step that ended otherwise than its plan hoped.
+    """A step that failed.
 
     Attributes:
         step: the step.
-        why: the outcome, or what did not hold.
-        situation: what was so then, as far as it matters for the goal; see `situation`.
+        why: the outcome, or the condition that did not hold.
+        situation: digest of the world then; see `situation`.
     """
 
     step: PlanStep
@@ -56,12 +51,12 @@ class Failure:
 
 @dataclass(slots=True)
 class Attempt:
-    """What has been tried for one goal, over all plans made for it.
+    """The answers given so far on the way to one goal, over all plans for it.
 
     Attributes:
-        replans: how many new plans were made because one did not go on.
-        failures: how often each failure was met in the same situation.
-        resumed: how often a plan went on at a step.
+        replans: the number of plans that replaced a failed one.
+        failures: the number of times that each failure occurred in the same situation.
+        resumed: the number of times that a plan resumed at a step.
     """
 
     replans: int = 0
@@ -84,34 +79,34 @@ class Attempt:
         return cls(form["replans"], Counter(failures), Counter(resumed))
 
     def failed(self, failure: Failure, *, stands: bool, others: bool) -> EscalationStep:
-        """The answer to a failure, which is counted.
+        """Count a failure and return the answer to it.
 
         Args:
-            failure: what happened.
+            failure: the failed step and its reason.
             stands: whether the plan still leads to the goal, the step included.
-            others: whether there is another way to do the step.
+            others: whether another candidate implements the step.
         """
         self.failures[failure] += 1
         if stands and self.resumed[failure.step] < MOST_RESUMED:
-            rungs = [
+            answers = [
                 EscalationStep.RESUME,
                 *([EscalationStep.OTHER_CANDIDATE] if others else []),
                 EscalationStep.EXCLUDE,
             ]
         else:
-            rungs = [EscalationStep.REPLAN, EscalationStep.EXCLUDE]
+            answers = [EscalationStep.REPLAN, EscalationStep.EXCLUDE]
         tried = self.failures[failure] - 1
-        return rungs[tried] if tried < len(rungs) else EscalationStep.GIVE_UP
+        return answers[tried] if tried < len(answers) else EscalationStep.GIVE_UP
 
     def interrupted(self, step: PlanStep | None) -> EscalationStep:
-        """The answer when the plan was stopped from outside; `step` is where it could go on."""
+        """Return the answer for a plan that its monitor stopped; `step` is the one at which it could resume."""
         return (
             EscalationStep.RESUME if step is not None and self.resumed[step] < MOST_RESUMED else EscalationStep.REPLAN
         )
 
 
 def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:
-    """A digest of everything in the world that the problem of reaching the goal depends on."""
+    """Return a digest of the part of the world that the problem of reaching the goal depends on."""
     names = _asked.find(goal, domain) or _asked.keep(goal, domain, _asked_about(goal, domain))
     facts = sorted(str(fact) for fact in world.facts() if fact.predicate in names)
     numbers = sorted((str(number), value) for number, value in world.values().items() if number.predicate in names)
@@ -127,14 +122,3 @@ def _asked_about(goal: Expression, domain: PlanningDomain) -> frozenset[str]:
     asked = [goal, *(action.precondition for action in actions)]
     asked += [condition for action in actions for condition in effect_conditions(action.effect)]
     return frozenset(name for condition in asked for name in names_of(condition))
-
-
-def without(problem: Problem, steps: Collection[PlanStep]) -> Problem:
-    """The problem of reaching the goal without taking any of these steps."""
-    if not steps:
-        return problem
-    allowed = tuple(action for action in problem.actions if action.step not in steps)
-    unsliced = problem.unsliced
-    timed = None if problem.timed is None else without(problem.timed, steps)
-    whole = None if unsliced is None else lambda: without(unsliced(), steps)
-    return replace(problem, actions=allowed, unsliced=whole, timed=timed)

@@ -1,20 +1,19 @@
-"""Asking for a plan until there is one that holds: for the world as it is, without what failed, with what was planned.
+"""Search asks for plans until one holds in the present world, without steps that failed before.
 
-However a planner behaves, the answer comes within a bound of real time, and only a plan that leads to the goal counts.
+However a planner behaves, an answer comes within a bound of real time. Only a plan that leads to the goal counts.
 """
 
 from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from knowledge_base.errors import InputError
 from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.engines.registry import timing
-from planning.execution.local_repair import mending
-from planning.execution.planner_call import Answer, Asking
-from planning.execution.repair import EXCLUDED_SECONDS, without
+from planning.execution.local_repair import local_repair
+from planning.execution.planner_call import Answer, PlannerCalls
 from planning.explanation.unsolvability import why_unsolvable
 from planning.ordering.partial_order import deordered
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
@@ -26,24 +25,41 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Collection, Iterable
 
     from dsc.sequencer.clock import LoopClock
+    from knowledge_base.language.evaluation import World
     from knowledge_base.language.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from knowledge_base.world.state import WorldState
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
-    from planning.execution.foresight import Foresight
-    from planning.execution.improvements import Improvements
     from planning.execution.plan_records import PlanRecords
+    from planning.execution.planner_call import Improvements
     from planning.execution.progress import PlanProgress
     from planning.ordering.partial_order import PartialOrder
+    from planning.plan import Plan
     from planning.strips import Problem
+    from planning.validation import Validation
 
+
+class Foresight(Protocol):
+    """A simulation that knows more than the planning domain does, e.g. the physics of a ready world."""
+
+    def foresee(self, plan: Plan, world: World) -> Validation:
+        """What will come of the plan when it is carried out from `world`, the world as the robot believes it to be.
+
+        A plan that is not valid is rejected, and its failing step left out of the next one. Called in a thread of its
+        own; must end by itself and change nothing.
+        """
+        ...
+
+
+EXCLUDED_SECONDS = 120.0
+"""Seconds of run time for which new plans omit a step that failed repeatedly."""
 MAX_ATTEMPTS = 3
 """How often to plan anew because the world changed while the planner worked."""
 MAX_REJECTED = 5
 """How many plans the simulation may reject."""
 _IN_CONCERT = "there is only a plan with several steps at a time that need each other, which is not carried out yet"
-MENDING_SECONDS = 2.0
+LOCAL_REPAIR_SECONDS = 2.0
 """Real time for finding out how to mend a plan, at most."""
 
 
@@ -89,7 +105,7 @@ class Search:
 
     Args:
         domain, knowledge, planner, clock: as everywhere.
-        telling: hears what is excluded, readmitted and rejected.
+        records: hears what is excluded, readmitted and rejected.
         foresight: has to agree with a plan before it counts.
     """
 
@@ -99,21 +115,21 @@ class Search:
         knowledge: KnowledgeBase,
         planner: Planner,
         clock: LoopClock,
-        telling: PlanRecords,
+        records: PlanRecords,
         foresight: Foresight | None = None,
     ) -> None:
         self._domain = domain
         self._knowledge = knowledge
-        self._asking = Asking(planner, clock)
+        self._planner = PlannerCalls(planner, clock)
         self._clock = clock
-        self._telling = telling
+        self._records = records
         self._foresight = foresight
         self._excluded: dict[PlanStep, float] = {}
 
     def exclude(self, step: PlanStep, why: str) -> None:
         """Do without a step for a while."""
         self._excluded[step] = self._clock.now() + EXCLUDED_SECONDS
-        self._telling.excluded(step, EXCLUDED_SECONDS, why)
+        self._records.excluded(step, EXCLUDED_SECONDS, why)
 
     def remember(self) -> list[Any]:
         """Which steps to do without until when, as plain data."""
@@ -180,10 +196,10 @@ class Search:
 
     async def _in_time(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
         try:
-            async with self._asking.give_up_at(seconds):
+            async with self._planner.give_up_at(seconds):
                 return await finding
         except TimeoutError:
-            return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after ({self._asking.name})")
+            return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after ({self._planner.name})")
 
     async def _found(
         self,
@@ -195,16 +211,16 @@ class Search:
     ) -> Found | NotFound:
         """One plan for the world as it was."""
         budget = WorkLimit(seconds)
-        mended = None if before is None else await self._mended(goal, seconds / 2, before, snapshot)
-        if isinstance(mended, Found):
-            return mended
+        repaired = None if before is None else await self._repaired(goal, seconds / 2, before, snapshot)
+        if isinstance(repaired, Found):
+            return repaired
         try:
             problem = await self._posed(goal, snapshot, WorkLimit(budget.left))
         except WorkLimitError as error:
             return NotFound("timed_out", f"no plan within {seconds:g} s (while {error.doing})")
         answer, better = await self._answer(problem, budget.left, rejected)
         if isinstance(answer, PlanFound):
-            reproducible = answer.reproducible and mended is None
+            reproducible = answer.reproducible and repaired is None
             return Found(replace(answer, reproducible=reproducible), better=better)
         if not isinstance(answer, ProvenUnsolvable):
             return _unknown(answer, self._domain, goal, seconds)
@@ -230,30 +246,32 @@ class Search:
     async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> Answer:
         """The planner's answer, without the excluded steps if there is a plan without them."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
-        answer, better = await self._asking.solve(without(problem, {*excluded, *rejected}), seconds)
+        answer, better = await self._planner.solve(without(problem, {*excluded, *rejected}), seconds)
         if isinstance(answer, ProvenUnsolvable) and excluded and not problem.unreachable:
             self._excluded.clear()
-            self._telling.readmitted(excluded)
-            return await self._asking.solve(without(problem, rejected), patience.left)
+            self._records.readmitted(excluded)
+            return await self._planner.solve(without(problem, rejected), patience.left)
         return answer, better
 
-    async def _mended(
+    async def _repaired(
         self, goal: Expression, seconds: float, before: PlanProgress, snapshot: WorldState
     ) -> Found | TimedOut | None:
         """What was left of the plan before, mended; `TimedOut` if a limit of real time cut in."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
         try:
             with self._clock.hold():
-                how = await aside(lambda: mending(before, excluded, self._domain, snapshot, goal, patience), patience)
+                how = await aside(
+                    lambda: local_repair(before, excluded, self._domain, snapshot, goal, patience), patience
+                )
         except WorkLimitError:
-            return TimedOut("mending", seconds)
+            return TimedOut("local repair", seconds)
         if how is None:
             return None
-        seconds = min(patience.left / 4, MENDING_SECONDS)
-        answer, _ = await self._asking.solve(without(how.problem, excluded), seconds, going_on=False)
+        seconds = min(patience.left / 4, LOCAL_REPAIR_SECONDS)
+        answer, _ = await self._planner.solve(without(how.problem, excluded), seconds, going_on=False)
         if not isinstance(answer, PlanFound):
             return answer if isinstance(answer, TimedOut) else None
-        plan = how.mended(answer.plan, before.left_steps, self._domain, snapshot, goal)
+        plan = how.repaired(answer.plan, before.remaining_steps, self._domain, snapshot, goal)
         return None if plan is None else Found(replace(answer, plan=plan), kept=len(how.end))
 
     def _excluded_now(self) -> set[PlanStep]:
@@ -270,7 +288,7 @@ class Search:
             verdict = await aside(lambda: foresight.foresee(plan, world))
         if not verdict.valid:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
-            self._telling.rejected(step, verdict.why, found.answer.engine)
+            self._records.rejected(step, verdict.why, found.answer.engine)
         return verdict
 
 
@@ -287,3 +305,14 @@ def _unknown(
             return NotFound("failed", f"{engine}: {message}")
         case NobodyCan():
             return NotFound("failed", why_no_engine(domain, goal, answer))
+
+
+def without(problem: Problem, steps: Collection[PlanStep]) -> Problem:
+    """Return the problem of reaching the goal without any of these steps."""
+    if not steps:
+        return problem
+    allowed = tuple(action for action in problem.actions if action.step not in steps)
+    unsliced = problem.unsliced
+    timed = None if problem.timed is None else without(problem.timed, steps)
+    whole = None if unsliced is None else lambda: without(unsliced(), steps)
+    return replace(problem, actions=allowed, unsliced=whole, timed=timed)

@@ -203,4 +203,4 @@ def test_plans_that_are_over_are_not_remembered(whole):
     path, _, _ = whole
     with archive(path) as runs:
         text = runs.latest_snapshot().memory["planner"]
-    assert json.loads(text)["carried"] == []
+    assert json.loads(text)["runs"] == []

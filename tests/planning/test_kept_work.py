@@ -11,8 +11,7 @@ from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.parser import parse_condition, parse_term
 from knowledge_base.pddl.problem_text import Metric
 from planning import Executive, Plan, PlanningDomain, PlanStep, build_problem, plot_from_plan
-from planning.execution.causal_needs import CausalNeeds
-from planning.execution.regression import conjuncts, leaves, regressed
+from planning.execution.regression import CausalNeeds, conjuncts, leaves, regressed
 
 TEXT = """
 (define (domain shelves) (:types shelf box)

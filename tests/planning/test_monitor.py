@@ -48,13 +48,13 @@ class Watched:
         known = "at bob store, in p1 store, in p2 store, in p3 store, open store, open office, open hall"
         told = tuple(fact(*one.split()) for one in known.split(", "))
         self.kb.apply(Delta(nodes={**nodes, "bob": "robot", "eve": "robot"}, added=(*told, *facts)), "test")
-        self.course = PlanProgress(steps, DOMAIN, goal, before)
+        self.progress = PlanProgress(steps, DOMAIN, goal, before)
         self.news = []
-        self.monitor = Monitor(self.course, DOMAIN, self.kb, lambda author: author == "bob", self.news.append)
+        self.monitor = Monitor(self.progress, DOMAIN, self.kb, lambda author: author == "bob", self.news.append)
         self.monitor.look("earlier")
 
     def begin(self, number):
-        self.course.begin(number)
+        self.progress.begin(number)
         self.monitor.look("the steps before")
 
     def change(self, author, *, gone="", now="", **more):
@@ -63,7 +63,7 @@ class Watched:
 
     def do(self, number):
         """The robot carries out the step, as planned."""
-        self.kb.apply(DOMAIN.effects(self.course.steps[number - 1], self.kb), "bob")
+        self.kb.apply(DOMAIN.effects(self.progress.steps[number - 1], self.kb), "bob")
 
 
 def test_what_a_late_step_needs_is_watched_from_the_beginning():
@@ -188,10 +188,10 @@ def test_steps_at_work_at_once_may_each_be_done_or_not():
     )
     plan.begin(1)
     plan.begin(2)
-    assert plan.course.at_work == (1, 2)
+    assert plan.progress.running == (1, 2)
     plan.do(2)
     plan.begin(4)
-    assert (plan.course.at_work, plan.course.left) == ((1, 4), (1, 3, 4, 5, 6))
+    assert (plan.progress.running, plan.progress.remaining) == ((1, 4), (1, 3, 4, 5, 6))
     plan.change("somebody", now="painted office")
     assert plan.news == []
     plan.change("somebody", gone="in p1 store")
@@ -224,9 +224,9 @@ def test_steps_at_work_at_once_are_left_out_of_what_is_left_when_they_are_done()
     )
     plan.begin(1)
     plan.begin(2)
-    assert plan.course.shortest_end(plan.kb) == tuple(TWO)
+    assert plan.progress.shortest_end(plan.kb) == tuple(TWO)
     plan.do(2)
-    assert plan.course.shortest_end(plan.kb) == (TWO[0], *TWO[2:])
+    assert plan.progress.shortest_end(plan.kb) == (TWO[0], *TWO[2:])
 
 
 def test_a_closed_monitor_says_nothing():

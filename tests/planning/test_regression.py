@@ -9,7 +9,7 @@ from knowledge_base.language.evaluation import holds
 from knowledge_base.language.parser import parse_condition
 from knowledge_base.language.printer import to_text
 from planning import Plan, PlanningDomain, PlanStep, validate
-from planning.execution.causal_needs import CausalNeeds
+from planning.execution.regression import CausalNeeds
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain everything)

@@ -18,7 +18,7 @@ FOUND = PlanFound(Plan((PlanStep("go", ("a", "b")),)), "fake", 0.0, 0.1)
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch):
     monkeypatch.setattr("planning.execution.planner_call.PATIENCE", -4.9)  # of the five seconds that the goal has
-    monkeypatch.setattr("planning.execution.planner_deadline.STOPPING", 0.1)
+    monkeypatch.setattr("planning.execution.planner_call.STOPPING", 0.1)
 
 
 async def goes_on():
@@ -134,7 +134,7 @@ class Tidy:
 
 
 def test_a_program_that_is_interrupted_ends_when_planners_have_stopped(monkeypatch, caplog):
-    monkeypatch.setattr("planning.execution.planner_deadline.STOPPING", 5)
+    monkeypatch.setattr("planning.execution.planner_call.STOPPING", 5)
     planner = Tidy()
 
     async def interrupted(sequencer):

@@ -6,7 +6,7 @@ from breadth_first import BreadthFirst
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.parser import parse_condition
 from planning import Plan, PlanningDomain, PlanStep, validate
-from planning.execution.local_repair import mending
+from planning.execution.local_repair import local_repair
 from planning.execution.progress import PlanProgress
 
 DOMAIN = PlanningDomain.parse("""
@@ -47,34 +47,34 @@ def solved(how):
 
 def test_the_nearest_end_is_kept_and_reached_in_the_fewest_steps():
     here = world("d")
-    how = mending(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
+    how = local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
     assert how.end == STEPS[1:]  # from d to b at once, not by way of a
-    plan = how.mended(solved(how), STEPS, DOMAIN, here, GOAL)
+    plan = how.repaired(solved(how), STEPS, DOMAIN, here, GOAL)
     assert plan.steps == (PlanStep("go", ("d", "b")), *STEPS[1:])
     assert validate(plan, DOMAIN, here, GOAL).valid
 
 
 def test_an_end_with_a_step_that_is_done_without_is_not_kept():
-    how = mending(PlanProgress(STEPS, DOMAIN, GOAL), {STEPS[1]}, DOMAIN, world("d"), GOAL)
+    how = local_repair(PlanProgress(STEPS, DOMAIN, GOAL), {STEPS[1]}, DOMAIN, world("d"), GOAL)
     assert how.end == STEPS[2:]
-    assert mending(PlanProgress(STEPS, DOMAIN, GOAL), {STEPS[3]}, DOMAIN, world("d"), GOAL) is None
+    assert local_repair(PlanProgress(STEPS, DOMAIN, GOAL), {STEPS[3]}, DOMAIN, world("d"), GOAL) is None
 
 
 def test_what_lacks_something_that_nothing_brings_is_not_mended():
     here = world("d")
     here.apply(Delta(removed=(fact("sells", "c", "egg"),)), "test")
-    assert mending(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
+    assert local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
 
 
 def test_what_lacks_too_much_is_not_mended():
     here = world("d")
     here.apply(Delta(removed=(fact("open", "b"), fact("open", "c"), fact("sells", "b", "nut"))), "test")
-    assert mending(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
+    assert local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
 
 
 def test_a_mended_plan_that_is_much_longer_or_wrong_is_not_taken():
     here = world("d")
-    how = mending(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
+    how = local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
     round_trip = [PlanStep("go", way) for way in (("d", "a"), ("a", "d"), ("d", "a"), ("a", "b"))]
-    assert how.mended(Plan(tuple(round_trip)), STEPS, DOMAIN, here, GOAL) is None
-    assert how.mended(Plan(()), STEPS, DOMAIN, here, GOAL) is None
+    assert how.repaired(Plan(tuple(round_trip)), STEPS, DOMAIN, here, GOAL) is None
+    assert how.repaired(Plan(()), STEPS, DOMAIN, here, GOAL) is None

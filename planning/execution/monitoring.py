@@ -1,0 +1,251 @@
+"""Monitoring answers broken causal links, superfluous steps and better plans while a plan runs."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import aclosing
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dsc.calls import Outcome
+from dsc.sequencer.resumed_skills import PastClock
+from knowledge_base.errors import described
+from knowledge_base.language.printer import to_text
+from knowledge_base.world.overlay import Overlay
+from planning.execution.monitor import Broken, GoalReached, Monitor, News, Shorter
+from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, StepEnded, Successor
+from planning.execution.progress import cost_of, shortest_end
+from planning.execution.search import Found, NotFound, Search
+from planning.plan import PlanFound
+
+if TYPE_CHECKING:
+    from dsc.sequencer.clock import LoopClock
+    from knowledge_base.facts import Change
+    from knowledge_base.store import KnowledgeBase
+    from planning.execution.plan_records import PlanRecords
+    from planning.execution.plan_run import PlanRuns
+    from planning.execution.planner_call import Improvements
+    from planning.plan import Plan, PlanStep
+    from planning.problem.derived import Derivation, Settled
+
+
+@dataclass(frozen=True, slots=True)
+class MonitoringParts:
+    """The parts of the planning component that monitoring uses.
+
+    Attributes:
+        derivation: of the planning domain.
+        knowledge, runs, search, records, clock: as in the planning component.
+        cancelled: receives the tasks that were cancelled and have not ended.
+    """
+
+    derivation: Derivation
+    knowledge: KnowledgeBase
+    runs: PlanRuns
+    search: Search
+    records: PlanRecords
+    clock: LoopClock
+    cancelled: set[asyncio.Task[None]]
+
+
+class Monitoring:
+    """The monitoring of one plan.
+
+    Args:
+        run: the plan.
+        parts: see `MonitoringParts`.
+        is_own: whether the running step made a change, from the change's author.
+    """
+
+    def __init__(self, run: PlanRun, parts: MonitoringParts, is_own: Callable[[str], bool]) -> None:
+        self._run = run
+        self._parts = parts
+        self._is_own = is_own
+        self._new = asyncio.Event()
+        self._settled: Settled | None = None
+        self._unsubscribe: Callable[[], None] = lambda: None
+        self._monitor: Monitor | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+
+    async def outcome(self) -> Outcome:
+        """Monitor the plan until its end; return the outcome of the skill `monitor`."""
+        try:
+            self._begin()
+            while True:
+                outcome = self._answer(await self._next_news())
+                if outcome is not None:
+                    self._run.state = PlanState.STOPPED
+                    return outcome
+        finally:
+            self._end()
+
+    def _begin(self) -> None:
+        run, parts = self._run, self._parts
+        run.on_begin = self._begun
+        if parts.derivation.recursive:
+            self._settled = parts.derivation.at(parts.knowledge)
+            self._unsubscribe = parts.knowledge.subscribe(self._changed)
+        if run.state is PlanState.BOUND:
+            run.state = PlanState.MONITORED
+            self._look("earlier")  # the world may have changed since the search
+        else:
+            self._resume()
+        if run.improvements is not None:
+            self._tasks.append(asyncio.create_task(self._improve(run.improvements)))
+
+    def _resume(self) -> None:
+        """Continue after a restart. The running step may be half done; its end is validated."""
+        run = self._run
+        self._install().update()
+        if run.searching_since is not None:
+            self._search_meanwhile(run.searching_since)
+        while run.missed:
+            self._begun(run.missed.pop(0))
+
+    async def _next_news(self) -> Heard:
+        """Wait for the next news."""
+        while not self._run.news:
+            self._new.clear()
+            await self._new.wait()
+        return self._run.news.popleft()
+
+    def _put(self, heard: Heard) -> None:
+        self._run.news.append(heard)
+        self._new.set()
+
+    def _end(self) -> None:
+        self._run.on_begin = None
+        self._unsubscribe()
+        for task in self._tasks:
+            if task.cancel():  # else it is over
+                self._parts.cancelled.add(task)
+                task.add_done_callback(self._parts.cancelled.discard)
+        if self._monitor is not None:
+            self._monitor.close()
+
+    def _answer(self, news: Heard) -> Outcome | None:
+        """Return the outcome with which monitoring ends; `None` if it continues."""
+        run = self._run
+        outcome: Outcome | None = None
+        if isinstance(news, Found | NotFound):
+            run.searching_since = None
+        match news:
+            case GoalReached():
+                self._parts.records.skipped(run.name, run.progress.remaining_steps, "the goal holds")
+                outcome = Outcome("goal_holds")
+            case Shorter(steps):
+                outcome = self._shorten(steps)
+            case StepEnded():
+                outcome = Outcome("plan_changed", {"why": "another plan takes its place"})
+            case NotFound():
+                outcome = _invalid("", news.reason, "earlier")
+            case Broken() if self._may_continue(news):
+                run.attempt.replans += 1
+                self._search_meanwhile(self._parts.clock.now())
+            case Broken():
+                outcome = _invalid(news.needed, news.why, news.author)
+            case Found():
+                outcome = self._follow(news.answer, news.steps, news.kept)
+            case Better(answer):
+                better = self._better(answer.plan)
+                outcome = None if better is None else self._follow(answer, better, 0)
+        return outcome
+
+    def _changed(self, change: Change) -> None:
+        """Look at the plan again if recursive predicates now expand to other conditions."""
+        settled = self._parts.derivation.at(self._parts.knowledge)
+        if settled != self._settled:
+            self._settled = settled
+            self._run.renew(settled)
+            self._look(change.author)
+
+    def _look(self, author: str) -> None:
+        self._install().look(author)
+
+    def _install(self) -> Monitor:
+        progress = self._run.progress
+        if self._monitor is not None:
+            self._monitor.close()
+        self._monitor = Monitor(progress, progress.domain, self._parts.knowledge, self._is_own, self._hear)
+        return self._monitor
+
+    def _hear(self, news: News) -> None:
+        if isinstance(news, Broken):
+            if self._run.state is PlanState.BROKEN:
+                return
+            self._run.state = PlanState.BROKEN
+            self._parts.records.broken(self._run.progress, news)
+        self._put(news)
+
+    def _begun(self, number: int) -> None:
+        if self._run.successor is not None:
+            self._put(StepEnded())
+            return
+        self._run.progress.begin(number)
+        if self._monitor is not None:
+            self._monitor.look("the steps before")
+
+    def _may_continue(self, news: Broken) -> bool:
+        """Whether the running step may continue during a search: only a later step needs the broken condition."""
+        run, running = self._run, self._run.progress.running
+        later = len(running) == 1 and bool(news.needed) and news.user > running[0]
+        return later and run.attempt.replans < run.replans and run.successor is None
+
+    def _search_meanwhile(self, since: float) -> None:
+        self._run.searching_since = since
+        self._tasks.append(asyncio.create_task(self._plan_meanwhile(PastClock(self._parts.clock, since))))
+
+    async def _plan_meanwhile(self, clock: PastClock) -> None:
+        run, parts = self._run, self._parts
+        goal, progress = run.goal, run.progress
+        parts.records.asked(to_text(goal), parts.knowledge.version)
+        try:
+            found = await parts.search.plan(goal, run.seconds, progress, clock.sleep)
+            if isinstance(found, Found):
+                await found.close()
+        except Exception as error:  # noqa: BLE001  an error of the search must not end the monitoring
+            found = NotFound("failed", described(error))
+        self._put(found)
+
+    async def _improve(self, improvements: Improvements) -> None:
+        async with aclosing(improvements):
+            async for answer in improvements:
+                if isinstance(answer, PlanFound):
+                    self._put(Better(answer))
+
+    def _better(self, plan: Plan) -> tuple[PlanStep, ...] | None:
+        """The running step and the end of a better plan, if that end costs less than the steps that have not begun."""
+        run, progress = self._run, self._run.progress
+        if run.successor is not None or run.state is PlanState.BROKEN or len(progress.running) != 1:
+            return None
+        (step,) = progress.steps_of(progress.running)
+        ahead = Overlay(self._parts.knowledge)
+        ahead.apply(progress.domain.effects(step, ahead))
+        end = shortest_end(plan.steps, progress.domain, ahead, progress.goal)
+        if end is None or cost_of(end, progress.domain, ahead) >= cost_of(progress.coming(), progress.domain, ahead):
+            return None
+        return (step, *end)
+
+    def _shorten(self, steps: tuple[PlanStep, ...]) -> Outcome | None:
+        """Skip steps, after the running step if that is not one of them."""
+        run, why = self._run, "fewer steps lead to the goal"
+        skipped = [step for step in run.progress.remaining_steps if step not in steps]
+        self._parts.records.skipped(run.name, skipped, why)
+        if not run.follow(run.shortened(steps)):
+            return Outcome("plan_changed", {"why": why})
+        self._install().update()  # the monitor has just looked at these steps, as if the running one were done
+        return None
+
+    def _follow(self, answer: PlanFound, steps: tuple[PlanStep, ...], kept: int) -> Outcome | None:
+        """Replace the plan by a new one, after the running step if the new one begins with that too."""
+        run, name = self._run, self._parts.runs.new_name()
+        self._parts.records.found(answer, name)
+        if not run.follow(Successor(steps, name, kept)):
+            return Outcome("plan_changed", {"why": "a new plan begins in another way"})
+        self._look("earlier")
+        return None
+
+
+def _invalid(which: str, why: str, author: str) -> Outcome:
+    return Outcome("plan_invalid", {"which": which, "why": why, "author": author})
