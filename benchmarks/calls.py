@@ -33,6 +33,7 @@ from dsc.events import Event
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from knowledge_base import Delta, KnowledgeBase, Schema
+from knowledge_base.facts import Fact, fact
 from knowledge_base.language.printer import to_text
 from planning import Executive, PlanStep
 from planning.engines.planner import PlannerProcess
@@ -45,6 +46,8 @@ BEFORE = Path(__file__).with_name("calls.json")
 """The counts that `tests/test_bench_calls.py` holds new ones against."""
 ITEMS = 3
 """On the table that is planned for."""
+MOVED_TO = "shelf"
+"""Place of the items after the disturbance."""
 ROUNDS = 7
 
 
@@ -294,7 +297,7 @@ CLEAR = ActionPlot.model_validate({
 
 
 class _Table:
-    """A table of `ITEMS` items; in the first step of its plan somebody takes away what the next one relies on."""
+    """A table of `ITEMS` items; in the first step of its plan somebody moves the items that later steps need."""
 
     def __init__(self, *, replanned: bool) -> None:
         self._domain = set_table.domain()
@@ -340,20 +343,21 @@ class _TableRobot(Component):
         if not self.counted and self._steps == (2 if self._disturbed else 1):
             self._counter.stop()
             self.counted = True
+            assert not self._disturbed or b == MOVED_TO, "no new plan was bound"
         step = PlanStep(action, tuple(filter(None, (a, b, c, d, e))))
         if self._disturbed and self._steps == 1:
             await call.clock.sleep(1)
             self._counter.start()
-            _disturb(self._world, step)
+            _disturb(self._world)
             await call.clock.sleep(1)
         return Outcome("did", observed=self._domain.effects(step, self._world))
 
 
-def _disturb(world: KnowledgeBase, step: PlanStep) -> None:
-    """Somebody takes away what the rest of the plan relies on: nothing fits into what is being picked up."""
-    item = step.args[0]
-    fits = [one for one in world.facts() if getattr(one, "predicate", "") == "fits" and item in one.args]
-    world.apply(Delta(removed=tuple(fits)), author="somebody")
+def _disturb(world: KnowledgeBase) -> None:
+    """Somebody moves every item to another place, so that the plan fails at its next step."""
+    lying = [one for one in world.facts() if isinstance(one, Fact) and one.predicate == "lies-at"]
+    moved = tuple(fact("lies-at", one.args[0], MOVED_TO) for one in lying)
+    world.apply(Delta(removed=tuple(lying), added=moved), author="somebody")
 
 
 def _plot(action: Any) -> ActionPlot:
