@@ -14,7 +14,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation import explain, holds
 from knowledge_base.language.parser import parse_condition
 from planning.execution.escalation import Choices, Escalation
-from planning.execution.monitoring import Monitoring, MonitoringParts
+from planning.execution.monitoring import Monitoring
 from planning.execution.plan_records import PlanRecords
 from planning.execution.plan_run import PlanRun, PlanRuns
 from planning.execution.plotting import Plotting
@@ -86,9 +86,6 @@ class PlanningComponent(Component):
             self._derivation, self._plotting, self._runs, self._choices, self._search, self._records
         )
         self._cancelled: set[asyncio.Task[None]] = set()  # searches that have not ended
-        self._monitoring = MonitoringParts(
-            self._derivation, knowledge, self._runs, self._search, self._records, clock, self._cancelled
-        )
         self._answers: dict[str, Outcome] = {}  # by action, until `forget`
 
     async def over(self) -> None:
@@ -184,13 +181,13 @@ class PlanningComponent(Component):
     @skill(
         outcomes={
             "goal_holds": {},
-            "plan_changed": {"why": "text"},
+            "plan_found": _PLAN_FOUND,
             "plan_invalid": {"which": "text", "why": "text", "author": "symbol"},
         },
         after_crash="repeat",
     )
     async def monitor(self, call: SkillCall, plan: str) -> Outcome:
-        """Monitor the plan of that name; end when another plan must replace it, or none.
+        """Monitor the plan of that name; end with the plan that replaces it, or when it no longer leads to the goal.
 
         A change by another author is validated immediately, a change by the running step at the end of that step. A
         step with which the new plan begins too continues.
@@ -199,7 +196,8 @@ class PlanningComponent(Component):
         def is_own(author: str) -> bool:
             return author == CHART or author in self._working_for(call.action_id)
 
-        outcome = await Monitoring(self._runs.required(plan), self._monitoring, is_own).outcome()
+        run = self._runs.required(plan)
+        outcome = await Monitoring(run, self._escalation, self._clock, is_own, self._cancelled).outcome()
         if outcome.event == "goal_holds":
             self._runs.over(plan)
         return outcome

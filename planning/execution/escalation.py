@@ -91,7 +91,11 @@ class Escalation:
         return self.plotting.knowledge
 
     def answer(self, run: PlanRun, why: str) -> Outcome:
-        """Return the outcome of the skill `repair`."""
+        """Answer the failure of a plan.
+
+        Returns:
+            The outcome of the skill `repair`.
+        """
         if self._reached(run):
             return Outcome("goal_holds")
         progress, attempt = run.progress, run.attempt
@@ -111,6 +115,13 @@ class Escalation:
         if step is EscalationStep.EXCLUDE and failed is not None:
             self.search.exclude(failed, why)
         return Outcome("replan")
+
+    def succeeded(self, run: PlanRun, why: str) -> Outcome | None:
+        """Return the outcome with the plot of the successor; `None` if that no longer leads to the goal."""
+        if self._reached(run):
+            return Outcome("goal_holds")
+        end = self._end(run)
+        return None if end is None else self._continued(run, end, why)
 
     def found(self, run: PlanRun, order: PartialOrder, form: dict[str, Any]) -> Outcome:
         """Keep a plan and return the outcome that carries its plot.
@@ -162,10 +173,9 @@ class Escalation:
     def _continued(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None) -> Outcome:
         """Continue with `steps` without a planner call; their first one prefers other candidates to `instead_of`."""
         name = self._recorded(run, steps, why, instead_of)
-        self.runs.over(run.name)
         order = self.plotting.order(Plan(steps), run.goal)
         progress = PlanProgress(steps, run.progress.domain, run.progress.goal, order.before)
-        again = PlanRun(name, run.goal, progress, run.attempt, run.holder, run.seconds, run.replans)
+        again = PlanRun(name, run.goal, progress, run.attempt, run.holder, run.seconds, run.replans, replaces=run.name)
         return self.found(again, order, self.plotting.form(again, order, instead_of))
 
     def _recorded(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None) -> str:

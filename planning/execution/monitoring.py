@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import aclosing
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dsc.calls import Outcome
@@ -16,37 +15,16 @@ from knowledge_base.world.overlay import Overlay
 from planning.execution.monitor import Broken, GoalReached, Monitor, News, Shorter
 from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, StepEnded, Successor
 from planning.execution.progress import cost_of, shortest_end
-from planning.execution.search import Found, NotFound, Search
+from planning.execution.search import Found, NotFound
 from planning.plan import PlanFound
 
 if TYPE_CHECKING:
     from dsc.sequencer.clock import LoopClock
     from knowledge_base.facts import Change
-    from knowledge_base.store import KnowledgeBase
-    from planning.execution.plan_records import PlanRecords
-    from planning.execution.plan_run import PlanRuns
+    from planning.execution.escalation import Escalation
     from planning.execution.planner_call import Improvements
     from planning.plan import Plan, PlanStep
-    from planning.problem.derived import Derivation, Settled
-
-
-@dataclass(frozen=True, slots=True)
-class MonitoringParts:
-    """The parts of the planning component that monitoring uses.
-
-    Attributes:
-        derivation: of the planning domain.
-        knowledge, runs, search, records, clock: as in the planning component.
-        cancelled: receives the tasks that were cancelled and have not ended.
-    """
-
-    derivation: Derivation
-    knowledge: KnowledgeBase
-    runs: PlanRuns
-    search: Search
-    records: PlanRecords
-    clock: LoopClock
-    cancelled: set[asyncio.Task[None]]
+    from planning.problem.derived import Settled
 
 
 class Monitoring:
@@ -54,14 +32,28 @@ class Monitoring:
 
     Args:
         run: the plan.
-        parts: see `MonitoringParts`.
+        escalation: replaces it; the other parts of the planning component are its parts.
+        clock: of the program's run.
         is_own: whether the running step made a change, from the change's author.
+        cancelled: receives the tasks that were cancelled and have not ended.
     """
 
-    def __init__(self, run: PlanRun, parts: MonitoringParts, is_own: Callable[[str], bool]) -> None:
+    def __init__(
+        self,
+        run: PlanRun,
+        escalation: Escalation,
+        clock: LoopClock,
+        is_own: Callable[[str], bool],
+        cancelled: set[asyncio.Task[None]],
+    ) -> None:
         self._run = run
-        self._parts = parts
+        self._escalation = escalation
+        self._clock = clock
         self._is_own = is_own
+        self._cancelled = cancelled
+        self._derivation = escalation.derivation
+        self._knowledge = escalation.plotting.knowledge
+        self._records = escalation.records
         self._new = asyncio.Event()
         self._settled: Settled | None = None
         self._unsubscribe: Callable[[], None] = lambda: None
@@ -81,11 +73,12 @@ class Monitoring:
             self._end()
 
     def _begin(self) -> None:
-        run, parts = self._run, self._parts
+        run = self._run
         run.on_begin = self._begun
-        if parts.derivation.recursive:
-            self._settled = parts.derivation.at(parts.knowledge)
-            self._unsubscribe = parts.knowledge.subscribe(self._changed)
+        self._escalation.runs.begin(run)
+        if self._derivation.recursive:
+            self._settled = self._derivation.at(self._knowledge)
+            self._unsubscribe = self._knowledge.subscribe(self._changed)
         if run.state is PlanState.BOUND:
             run.state = PlanState.MONITORED
             self._look("earlier")  # the world may have changed since the search
@@ -119,8 +112,8 @@ class Monitoring:
         self._unsubscribe()
         for task in self._tasks:
             if task.cancel():  # else it is over
-                self._parts.cancelled.add(task)
-                task.add_done_callback(self._parts.cancelled.discard)
+                self._cancelled.add(task)
+                task.add_done_callback(self._cancelled.discard)
         if self._monitor is not None:
             self._monitor.close()
 
@@ -132,17 +125,17 @@ class Monitoring:
             run.searching_since = None
         match news:
             case GoalReached():
-                self._parts.records.skipped(run.name, run.progress.remaining_steps, "the goal holds")
+                self._records.skipped(run.name, run.progress.remaining_steps, "the goal holds")
                 outcome = Outcome("goal_holds")
             case Shorter(steps):
                 outcome = self._shorten(steps)
             case StepEnded():
-                outcome = Outcome("plan_changed", {"why": "another plan takes its place"})
+                outcome = self._replaced("another plan takes its place")
             case NotFound():
                 outcome = _invalid("", news.reason, "earlier")
             case Broken() if self._may_continue(news):
                 run.attempt.replans += 1
-                self._search_meanwhile(self._parts.clock.now())
+                self._search_meanwhile(self._clock.now())
             case Broken():
                 outcome = _invalid(news.needed, news.why, news.author)
             case Found():
@@ -154,7 +147,7 @@ class Monitoring:
 
     def _changed(self, change: Change) -> None:
         """Look at the plan again if recursive predicates now expand to other conditions."""
-        settled = self._parts.derivation.at(self._parts.knowledge)
+        settled = self._derivation.at(self._knowledge)
         if settled != self._settled:
             self._settled = settled
             self._run.renew(settled)
@@ -167,7 +160,7 @@ class Monitoring:
         progress = self._run.progress
         if self._monitor is not None:
             self._monitor.close()
-        self._monitor = Monitor(progress, progress.domain, self._parts.knowledge, self._is_own, self._hear)
+        self._monitor = Monitor(progress, progress.domain, self._knowledge, self._is_own, self._hear)
         return self._monitor
 
     def _hear(self, news: News) -> None:
@@ -175,7 +168,7 @@ class Monitoring:
             if self._run.state is PlanState.BROKEN:
                 return
             self._run.state = PlanState.BROKEN
-            self._parts.records.broken(self._run.progress, news)
+            self._records.broken(self._run.progress, news)
         self._put(news)
 
     def _begun(self, number: int) -> None:
@@ -194,14 +187,13 @@ class Monitoring:
 
     def _search_meanwhile(self, since: float) -> None:
         self._run.searching_since = since
-        self._tasks.append(asyncio.create_task(self._plan_meanwhile(PastClock(self._parts.clock, since))))
+        self._tasks.append(asyncio.create_task(self._plan_meanwhile(PastClock(self._clock, since))))
 
     async def _plan_meanwhile(self, clock: PastClock) -> None:
-        run, parts = self._run, self._parts
-        goal, progress = run.goal, run.progress
-        parts.records.asked(to_text(goal), parts.knowledge.version)
+        run, goal, progress = self._run, self._run.goal, self._run.progress
+        self._records.asked(to_text(goal), self._knowledge.version)
         try:
-            found = await parts.search.plan(goal, run.seconds, progress, clock.sleep)
+            found = await self._escalation.search.plan(goal, run.seconds, progress, clock.sleep)
             if isinstance(found, Found):
                 await found.close()
         except Exception as error:  # noqa: BLE001  an error of the search must not end the monitoring
@@ -220,7 +212,7 @@ class Monitoring:
         if run.successor is not None or run.state is PlanState.BROKEN or len(progress.running) != 1:
             return None
         (step,) = progress.steps_of(progress.running)
-        ahead = Overlay(self._parts.knowledge)
+        ahead = Overlay(self._knowledge)
         ahead.apply(progress.domain.effects(step, ahead))
         end = shortest_end(plan.steps, progress.domain, ahead, progress.goal)
         if end is None or cost_of(end, progress.domain, ahead) >= cost_of(progress.coming(), progress.domain, ahead):
@@ -231,20 +223,24 @@ class Monitoring:
         """Skip steps, after the running step if that is not one of them."""
         run, why = self._run, "fewer steps lead to the goal"
         skipped = [step for step in run.progress.remaining_steps if step not in steps]
-        self._parts.records.skipped(run.name, skipped, why)
+        self._records.skipped(run.name, skipped, why)
         if not run.follow(run.shortened(steps)):
-            return Outcome("plan_changed", {"why": why})
+            return self._replaced(why)
         self._install().update()  # the monitor has just looked at these steps, as if the running one were done
         return None
 
     def _follow(self, answer: PlanFound, steps: tuple[PlanStep, ...], kept: int) -> Outcome | None:
         """Replace the plan by a new one, after the running step if the new one begins with that too."""
-        run, name = self._run, self._parts.runs.new_name()
-        self._parts.records.found(answer, name)
+        run, name = self._run, self._escalation.runs.new_name()
+        self._records.found(answer, name)
         if not run.follow(Successor(steps, name, kept)):
-            return Outcome("plan_changed", {"why": "a new plan begins in another way"})
+            return self._replaced("a new plan begins in another way")
         self._look("earlier")
         return None
+
+    def _replaced(self, why: str) -> Outcome:
+        """Return the outcome with the plot of the successor; `plan_invalid` if that no longer leads to the goal."""
+        return self._escalation.succeeded(self._run, why) or _invalid("", why, "earlier")
 
 
 def _invalid(which: str, why: str, author: str) -> Outcome:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 MOST_UNMONITORED = 64
 """The number of unmonitored plans that are kept. A new plan may replace one; the chart abandons others silently."""
-_PLAIN = ("name", "holder", "seconds", "replans", "searching_since")
+_PLAIN = ("name", "holder", "seconds", "replans", "replaces", "searching_since")
 
 
 class PlanState(Enum):
@@ -95,6 +95,7 @@ class PlanRun:
         attempt: the earlier answers to failures on the way to the goal.
         holder, seconds, replans: the rules, bound and budget of the dynamic state that it is for.
         improvements: better plans from its planner.
+        replaces: name of the plan that it replaces when its own monitoring begins.
         state: see `PlanState`.
         successor: the steps that replace it.
         begun: numbers of the steps of its plot that have begun.
@@ -113,6 +114,7 @@ class PlanRun:
     seconds: float
     replans: int
     improvements: Improvements | None = None
+    replaces: str | None = None
     state: PlanState = PlanState.BOUND
     successor: Successor | None = None
     begun: set[int] = field(default_factory=set)
@@ -214,8 +216,22 @@ class PlanRuns:
         self._runs[run.name] = run
 
     def over(self, name: str) -> None:
-        """Forget a plan that is over or replaced."""
-        self._runs.pop(name, None)
+        """Forget a plan, the one that it replaces, and a successor that has not begun."""
+        run = self._runs.pop(name, None)
+        if run is not None and run.replaces is not None:
+            self.over(run.replaces)
+        self.withdraw(name)
+
+    def withdraw(self, name: str) -> None:
+        """Forget a successor of the plan that has not begun, since the chart did not take it."""
+        for successor in [one.name for one in self._runs.values() if one.replaces == name]:
+            del self._runs[successor]
+
+    def begin(self, run: PlanRun) -> None:
+        """Begin the monitoring of a plan, which ends the one that it replaces."""
+        replaced, run.replaces = run.replaces, None
+        if replaced is not None:
+            self.over(replaced)
 
     def remember(self) -> dict[str, Any]:
         """Plain data."""

@@ -87,6 +87,7 @@ def plate(*added):
 
 LATE = plate(fact("in", "plate", "a"))
 GONE = Delta(removed=(fact("in", "cup", "a"),), added=(fact("in", "cup", "b"),))
+BLOCKED = Delta(removed=(fact("way", "b", "c"),))
 DROPPED = Delta(removed=(fact("at", "b"), fact("holding", "cup")), added=(fact("at", "c"), fact("in", "cup", "c")))
 CASES = {
     "the plan goes on": ("(in cup c)", {"script": {"(go b c)": [FAILED]}}, "resumed"),
@@ -103,6 +104,7 @@ CASES = {
         "replaced",
     ),
     "broken meanwhile": ("(forall (?t - thing) (in ?t b))", {"then": LATE}, "replaced"),
+    "another way": ("(at c)", {"then": BLOCKED, "ways_between": ("a b", "b c", "a d", "d c")}, "replaced"),
     "hit": ("(in cup c)", {"then": GONE}, "broken"),
     "skipped": ("(and (clean a) (clean b) (clean c))", {"then": Delta(added=(fact("clean", "b"),))}, "skipped"),
     "reached": ("(clean c)", {"then": Delta(added=(fact("clean", "c"),))}, "skipped"),

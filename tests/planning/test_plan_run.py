@@ -1,0 +1,110 @@
+"""A plan in execution: its state, its successor, and which plans are kept."""
+
+import json
+
+import pytest
+from errands import DOMAIN
+from test_carrying_out import Run
+
+from knowledge_base import Delta, KnowledgeBase, UnknownNameError, fact
+from knowledge_base.language.parser import parse_condition
+from planning import PlanStep
+from planning.execution.monitor import Broken, GoalReached, Shorter
+from planning.execution.plan_run import PlanRun, PlanRuns, PlanState, StepEnded, Successor
+from planning.execution.progress import PlanProgress
+from planning.execution.repair import Attempt
+from planning.problem.derived import derivation
+
+GOAL = parse_condition("(at c)")
+STEPS = (PlanStep("go", ("a", "b")), PlanStep("go", ("b", "c")))
+ROUND_ABOUT = (PlanStep("go", ("a", "d")), PlanStep("go", ("d", "c")))
+
+
+def plan_run(name="plan_1", **more):
+    return PlanRun(name, GOAL, PlanProgress(STEPS, DOMAIN, GOAL), Attempt(), "errand", 5, 4, **more)
+
+
+def kept(*runs):
+    all_of_them = PlanRuns()
+    for run in runs:
+        all_of_them.add(run)
+    return all_of_them
+
+
+def names(runs):
+    return [form["name"] for form in runs.remember()["runs"]]
+
+
+def skills_started(run):
+    return [r.data["skill"] for r in run.records if r.type == "action" and r.data.get("action") == "start"]
+
+
+def test_monitoring_ends_with_the_new_plan_and_nobody_asks_for_it_again():
+    blocked = (0.5, Delta(removed=(fact("way", "b", "c"),)))
+    run = Run("(at c)", then=[blocked], links=("a b", "b c", "a d", "d c"))
+    assert run.how == "reached"
+    answers = [r.data["name"] for r in run.records if r.type == "event" and r.data.get("source") == "planner.monitor"]
+    assert (answers, len(run.said("replaced"))) == (["plan_found"], 1)
+    assert skills_started(run).count("planner.repair") == 0
+
+
+def test_a_successor_that_begins_with_the_running_step_takes_over_after_it():
+    run = plan_run(state=PlanState.BROKEN)
+    run.progress.begin(1)
+    assert run.follow(Successor(STEPS[:1]))
+    assert (run.state, run.superseded.is_set()) == (PlanState.MONITORED, True)
+    assert (run.progress.steps, run.progress.running) == (STEPS[:1], (1,))
+
+
+def test_a_successor_that_begins_in_another_way_does_not():
+    run = plan_run(state=PlanState.BROKEN)
+    run.progress.begin(1)
+    assert not run.follow(Successor(ROUND_ABOUT, "plan_2"))
+    assert (run.state, run.superseded.is_set(), run.progress.steps) == (PlanState.BROKEN, False, STEPS)
+
+
+@pytest.mark.parametrize("state", PlanState)
+def test_what_is_remembered_of_a_plan_is_plain_data_and_is_recalled(state):
+    run = plan_run(replaces="plan_0", state=state, successor=Successor(ROUND_ABOUT, "plan_2", 1), searching_since=2.5)
+    run.begun.add(1)
+    run.news.extend([Broken("no", "(at b)", 2, "somebody", 7), Shorter(STEPS[1:]), GoalReached("me"), StepEnded()])
+    world = KnowledgeBase(DOMAIN.schema)
+    world.apply(Delta(nodes=dict.fromkeys("abcd", "room")), "test")
+    form = json.loads(json.dumps(run.to_json()))
+    again = PlanRun.from_json(form, derivation(DOMAIN).at(world))
+    assert again.to_json() == form
+    assert (again.state, again.successor, again.news) == (run.state, run.successor, run.news)
+    assert again.superseded.is_set() == (state is not PlanState.STOPPED)
+
+
+def test_a_step_that_begins_before_its_monitor_is_back_is_not_forgotten():
+    run = plan_run(state=PlanState.MONITORED)
+    run.begun.add(1)
+    run.begin(1)  # a restart repeats the last parameter
+    run.begin(2)
+    assert run.missed == [2]
+
+
+def test_a_plan_is_kept_until_the_monitoring_of_the_one_that_replaces_it_begins():
+    old, new = plan_run(), plan_run("plan_2", replaces="plan_1")
+    runs = kept(old, new)
+    assert names(runs) == ["plan_1", "plan_2"]
+    runs.begin(new)
+    assert names(runs) == ["plan_2"]
+    runs.begin(new)
+    assert names(runs) == ["plan_2"]
+
+
+def test_a_plan_that_the_chart_does_not_take_is_withdrawn():
+    runs = kept(plan_run(), plan_run("plan_2", replaces="plan_1"))
+    runs.withdraw("plan_1")
+    assert names(runs) == ["plan_1"]
+
+
+@pytest.mark.parametrize("over", ["plan_1", "plan_2"])
+def test_a_plan_that_is_over_takes_the_one_that_it_replaces_and_its_successor_along(over):
+    runs = kept(plan_run(), plan_run("plan_2", replaces="plan_1"), plan_run("plan_3"))
+    runs.over(over)
+    assert names(runs) == ["plan_3"]
+    with pytest.raises(UnknownNameError, match="there is no plan 'plan_1'"):
+        runs.required("plan_1")
