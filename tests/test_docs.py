@@ -1,5 +1,6 @@
 """The pages are true: their Python runs, their plots and scenarios are read, their links lead somewhere."""
 
+import ast
 import re
 import shlex
 import shutil
@@ -70,6 +71,62 @@ def test_names_in_code_that_the_guide_for_contributors_names_exist():
     sources.append(ROOT / "frontend" / "src" / "core" / "plots.ts")
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
     assert named_in_the_guide(r"^(\w*(?:_|[a-z][A-Z]|[A-Z]{2})\w*)$") - words == set()
+
+
+ARCHITECTURE = (ROOT / "docs" / "architecture.md").read_text()
+PACKAGES = ("knowledge_base", "dsc", "planning", "domains")
+
+
+def named_in_code(text):
+    """The Python names in code spans."""
+    return {span for span in re.findall(r"`([^`\n]+)`", text) if re.fullmatch(r"\w+(\.\w+)*", span)}
+
+
+def test_rooms_and_methods_that_the_architecture_names_exist():
+    dotted = {name for name in named_in_code(ARCHITECTURE) if "." in name and name != "pyproject.toml"}
+    rooms = {name for name in dotted if name.partition(".")[0] in PACKAGES}
+    assert len(rooms) > 20
+    for room in rooms:
+        import_module(room)
+    defined = classes()
+    for method in dotted - rooms:
+        owner, _, name = method.partition(".")
+        assert name in defined[owner], method
+
+
+def test_classes_that_the_architecture_names_exist():
+    named = {name for name in named_in_code(ARCHITECTURE) if re.fullmatch(r"[A-Z]\w*[a-z]\w*", name)}
+    assert len(named) > 30
+    assert named - {*classes(), "Protocol"} == set()
+
+
+def test_the_architecture_names_every_room():
+    rooms = {
+        ".".join(init.parent.relative_to(ROOT).parts)
+        for package in PACKAGES
+        for init in [*(ROOT / package).glob("__init__.py"), *(ROOT / package).glob("*/__init__.py")]
+    }
+    tables = {
+        room
+        for line in ARCHITECTURE.splitlines()
+        if line.startswith("| `")
+        for room in re.findall(r"^\| `([\w.]+)`", line)
+    }
+    shown = (ROOT / "docs" / "pictures" / "rooms.svg").read_text()
+    assert rooms <= tables
+    assert {room for room in rooms if f">{room.rpartition('.')[2]}<" not in shown} == set()
+
+
+def classes():
+    """The names in the body of each class of the project, by the name of the class."""
+    found = {}
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.ClassDef):
+                    body = {one.name for one in node.body if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)}
+                    found.setdefault(node.name, set()).update(body)
+    return found
 
 
 UNITS = {"": 1, " s": 1, " MiB": 1 << 20, " GiB": 1 << 30}
