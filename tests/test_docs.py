@@ -1,6 +1,7 @@
 """The pages are true: their Python runs, their plots and scenarios are read, their links lead somewhere."""
 
 import ast
+import pkgutil
 import re
 import shlex
 import shutil
@@ -106,12 +107,7 @@ def test_the_architecture_names_every_room():
         for package in PACKAGES
         for init in [*(ROOT / package).glob("__init__.py"), *(ROOT / package).glob("*/__init__.py")]
     }
-    tables = {
-        room
-        for line in ARCHITECTURE.splitlines()
-        if line.startswith("| `")
-        for room in re.findall(r"^\| `([\w.]+)`", line)
-    }
+    tables = set(re.findall(r"^\| `([\w.]+)`", ARCHITECTURE, flags=re.MULTILINE))
     shown = (ROOT / "docs" / "pictures" / "rooms.svg").read_text()
     assert rooms <= tables
     assert {room for room in rooms if f">{room.rpartition('.')[2]}<" not in shown} == set()
@@ -127,6 +123,14 @@ def classes():
                     body = {one.name for one in node.body if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)}
                     found.setdefault(node.name, set()).update(body)
     return found
+
+
+def test_the_glossary_names_code_that_exists():
+    rows = re.findall(r"^\|.*\| ([^|]+) \|$", (ROOT / "docs" / "glossary.md").read_text(), flags=re.MULTILINE)
+    named = {name for row in rows for name in named_in_code(row) if name.partition(".")[0] in PACKAGES}
+    assert len(named) > 40
+    for name in named:
+        pkgutil.resolve_name(name)
 
 
 UNITS = {"": 1, " s": 1, " MiB": 1 << 20, " GiB": 1 << 30}
