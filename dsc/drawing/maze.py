@@ -15,9 +15,9 @@ BEND = 25.0
 CROSSED = 15.0
 """Additional length that avoiding one crossing justifies."""
 COVERED = 5.0
-"""Price factor for running on top of a line, per pixel."""
+"""Additional price per pixel on top of another line."""
 THROUGH = 60.0
-"""Price factor for running through an obstacle, per pixel: the last resort."""
+"""Additional price per pixel through an obstacle: the last resort."""
 NEAR = 3.5
 """Lines closer than this run on top of each other."""
 

@@ -131,9 +131,9 @@ def led_away(
         reason = f"the budget of {most} new plans is used up: rules have led to '{rule.then}' once more"
         ways[event] = (_way(rule, counter, most), *(because(reason, way) for way in own))
         if not _settles(own):
-            said = added.event(f"{GAVE_UP}_{name}_{rule.then}")
-            given_up[said] = reason
-            ways[event] += (Transition(do=(Emit(emit=said),)),)
+            report = added.event(f"{GAVE_UP}_{name}_{rule.then}")
+            given_up[report] = reason
+            ways[event] += (Transition(do=(Emit(emit=report),)),)
     return ways
 
 
@@ -142,7 +142,7 @@ def answered(on: Ways, given_up: MutableMapping[str, str]) -> Ways:
     own = on.get(GAVE_UP, ())
     if not (own and given_up):
         return on
-    ways = {**on, **{said: tuple(because(reason, way) for way in own) for said, reason in given_up.items()}}
+    ways = {**on, **{report: tuple(because(reason, way) for way in own) for report, reason in given_up.items()}}
     if _settles(own):
         given_up.clear()
     return ways

@@ -92,8 +92,8 @@ def _message(details: ErrorDetails) -> str:
     if kind in _PLAIN:
         found = "" if kind == "missing" else f"; found {in_yaml(details['input'])}"
         return _PLAIN[kind].format(key=next(reversed(details["loc"]), "")) + found
-    said = details["msg"].replace("Input should be", "it should be").replace("True", "true").replace("False", "false")
-    return f"{said}; found {in_yaml(details['input'])}"
+    text = details["msg"].replace("Input should be", "it should be").replace("True", "true").replace("False", "false")
+    return f"{text}; found {in_yaml(details['input'])}"
 
 
 def in_yaml(value: Any) -> str:

@@ -98,5 +98,5 @@ def _own_forms(plot: ActionPlot) -> dict[str, dict[str, Any]]:
         for key in path:
             own = own[key]
         holder = "/".join(str(key) for key in path[:-1] if key not in _INSIDE)
-        found[name] = {**{key: said for key, said in own.items() if key not in _INSIDE}, "place": holder}
+        found[name] = {**{key: value for key, value in own.items() if key not in _INSIDE}, "place": holder}
     return found

@@ -67,7 +67,7 @@ def _ends_silently(plot: ActionPlot) -> bool:
         target for state in plot.states.values() if isinstance(state, State) for target in _silent_ways(plot, state)
     }
     seen: set[str] = set()
-    while waiting:  # an outcome may be fired on the path through connectors
+    while waiting:  # follow connectors along transitions without an outcome
         name = waiting.pop()
         seen.add(name)
         reached = plot.states.get(name)

@@ -100,8 +100,8 @@ class Control:
             raise UnknownNameError(f"there is nothing to do called '{verb}'", found=str(verb), valid=verbs)
         verbs[verb](command)
         self._changed()
-        said = {"ok": True, "breaks": [{"number": n, "on": str(b)} for n, b in self._breaks.items()]}
-        return {**said, "dropped": list(self._dropped)} if self._dropped else said
+        result = {"ok": True, "breaks": [{"number": n, "on": str(b)} for n, b in self._breaks.items()]}
+        return {**result, "dropped": list(self._dropped)} if self._dropped else result
 
     # --- in the page's thread
 
@@ -112,17 +112,17 @@ class Control:
     def _tell(self, command: Mapping[str, Any]) -> None:
         from knowledge_base.statements import retracted, told  # noqa: PLC0415  imported only for a controlled run
 
-        said = command.get("statements")
-        if not isinstance(said, list) or not all(isinstance(one, str) for one in said):
+        statements = command.get("statements")
+        if not isinstance(statements, list) or not all(isinstance(one, str) for one in statements):
             raise InputError("'statements' is a list of texts such as (on cup1 table)")
-        if len(said) > MOST_STATEMENTS:
-            raise InputError(f"these are {len(said)} statements; a browser may send {MOST_STATEMENTS}")
-        require_short("".join(said), "statements")
+        if len(statements) > MOST_STATEMENTS:
+            raise InputError(f"these are {len(statements)} statements; a browser may send {MOST_STATEMENTS}")
+        require_short("".join(statements), "statements")
         known = self._run().knowledge
         if command["do"] == "tell":
-            delta = told(said, known, "FACT", Bounds(work=MOST_WORK))
+            delta = told(statements, known, "FACT", Bounds(work=MOST_WORK))
         else:
-            delta = retracted(said, known, "FACT")  # a statement retracts only the facts that it names
+            delta = retracted(statements, known, "FACT")  # a statement retracts only the facts that it names
         self._in_run(lambda run: run.change(delta, AUTHOR))
 
     def _set(self, command: Mapping[str, Any]) -> None:

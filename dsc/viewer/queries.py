@@ -106,10 +106,10 @@ def knowledge(log: RecordLog) -> RecordReplay[Known]:
 
 
 def _known(before: Known, record: Mapping[str, Any]) -> Known:
-    said = dict(record)
+    data = dict(record)
     if record["type"] == "world":
-        return Known(world_of(said, schema_of(said["schema"])), record["version"])
-    before.state.commit(delta_of(said))
+        return Known(world_of(data, schema_of(data["schema"])), record["version"])
+    before.state.commit(delta_of(data))
     before.version = record["version"]
     return before
 
@@ -150,10 +150,10 @@ class PageQueries:
         variables = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
         bounds = Bounds(seconds=MOST_SECONDS, cancelled=left)
         answers = view.query(condition, params, MOST_ANSWERS + 1, bounds)
-        said = {"variables": variables, "holds": bool(answers), "answers": answers, "version": view.version}
+        result = {"variables": variables, "holds": bool(answers), "answers": answers, "version": view.version}
         if len(answers) > MOST_ANSWERS:
-            return {**said, "answers": answers[:MOST_ANSWERS], "more": True}
-        return said if variables else {**said, "why": _why(view, condition, params, left, holds=bool(answers))}
+            return {**result, "answers": answers[:MOST_ANSWERS], "more": True}
+        return result if variables else {**result, "why": _why(view, condition, params, left, holds=bool(answers))}
 
     def facts(self, asked: Form, left: Left = _still_there) -> dict[str, Any]:  # noqa: ARG002  it takes a moment
         """Return all facts, or all facts about one object."""
@@ -166,13 +166,13 @@ class PageQueries:
             values = {fluent: value for fluent, value in values.items() if about in fluent.args}
             near = {arg for fact in (*facts, *values) for arg in fact.args} | {about}
             things = {name: kind for name, kind in things.items() if name in near}
-        said = {
+        result = {
             "version": view.version,
             "things": dict(islice(things.items(), MOST_ANSWERS)),
             "facts": [_listed(fact) for fact in facts[:MOST_ANSWERS]],
             "values": [[*_listed(fluent), value] for fluent, value in islice(values.items(), MOST_ANSWERS)],
         }
-        return {**said, "more": True} if max(map(len, (things, facts, values))) > MOST_ANSWERS else said
+        return {**result, "more": True} if max(map(len, (things, facts, values))) > MOST_ANSWERS else result
 
     def _view(self, asked: Form) -> View:
         known = self._knowledge.at(_seq(asked))
@@ -198,11 +198,11 @@ def _seq(asked: Form) -> int:
 
 
 def _text(asked: Form, name: str) -> str:
-    said = asked.get(name)
-    if not isinstance(said, str):
+    text = asked.get(name)
+    if not isinstance(text, str):
         raise InputError(f"'{name}' is a text")
-    require_short(said, name)
-    return said
+    require_short(text, name)
+    return text
 
 
 def require_short(text: str, name: str) -> None:

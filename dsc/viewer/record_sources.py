@@ -106,8 +106,8 @@ def following_store(path: Path) -> Iterator[RecordLog]:
         def hear(change: Change) -> None:
             nonlocal start
             start = change.time if start is None else start
-            said = {"version": change.version, "author": change.author, **delta_form(change.delta)}
-            log.hear(Record(len(log) + 1, change.time - start, "knowledge", None, said))
+            data = {"version": change.version, "author": change.author, **delta_form(change.delta)}
+            log.hear(Record(len(log) + 1, change.time - start, "knowledge", None, data))
 
         for change in changes:
             hear(change)

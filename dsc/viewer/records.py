@@ -145,8 +145,8 @@ def read_trace(path: Path) -> RecordLog:
 
 def damaged(seq: int, t: float, line: int, why: str, text: str) -> str:
     """Return the line of a record that replaces an unreadable one."""
-    said = {"line": line, "why": why, "text": text[:MOST_SHOWN]}
-    return json.dumps({"seq": seq, "t": t, "type": DAMAGED, "cause": None, **said})
+    data = {"line": line, "why": why, "text": text[:MOST_SHOWN]}
+    return json.dumps({"seq": seq, "t": t, "type": DAMAGED, "cause": None, **data})
 
 
 def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterator[str]:
@@ -184,7 +184,7 @@ def _seq_of(line: str, expected: int) -> int | None:
     if line.endswith("}") and (line.isascii() or not _NO_CHARACTER.search(line)):
         if line.startswith(f'{{"seq": {expected}, '):
             return expected
-        seq = said.get("seq") if isinstance(said := _parsed(line), dict) else None
+        seq = parsed.get("seq") if isinstance(parsed := _parsed(line), dict) else None
         return seq if isinstance(seq, int) and not isinstance(seq, bool) else None
     return None
 
@@ -192,32 +192,34 @@ def _seq_of(line: str, expected: int) -> int | None:
 def _why_unreadable(line: str) -> str:
     if _NO_CHARACTER.search(line):
         return "it has bytes that are no UTF-8"
-    said = _parsed(line)
-    if isinstance(said, str):
-        return f"it ends in the middle ({said})" if not line.endswith("}") else f"it is no JSON ({said})"
+    parsed = _parsed(line)
+    if isinstance(parsed, str):
+        return f"it ends in the middle ({parsed})" if not line.endswith("}") else f"it is no JSON ({parsed})"
     return (
-        "it is no record with a number" if said is None else f"it says that it is record {said.get('seq')}"[:MOST_SHOWN]
+        "it is no record with a number"
+        if parsed is None
+        else f"it says that it is record {parsed.get('seq')}"[:MOST_SHOWN]
     )
 
 
 def _parsed(line: str) -> Any:
     """Return the line's object, the reason if it is not JSON, else `None`."""
     try:
-        said = from_json(line)
+        parsed = from_json(line)
     except (TypeError, ValueError) as error:  # TypeError: half a surrogate pair
         return str(error)
-    return said if isinstance(said, dict) else None
+    return parsed if isinstance(parsed, dict) else None
 
 
 def _require_header(line: str, path: Path) -> None:
-    said, begins = _parsed(line), f'{{"format": "{FORMAT}", …}}'
+    parsed, begins = _parsed(line), f'{{"format": "{FORMAT}", …}}'
     place = Place(str(path), 1)
     if not line.strip():
         raise ParseError(f"the file is empty, or its first line is; a trace begins with {begins}", place=place)
-    if isinstance(said, str) and FORMAT in line:
-        raise ParseError(f"the first line of this trace is damaged: {said}", place=place)
-    if not isinstance(said, dict) or said.get("format") != FORMAT:
+    if isinstance(parsed, str) and FORMAT in line:
+        raise ParseError(f"the first line of this trace is damaged: {parsed}", place=place)
+    if not isinstance(parsed, dict) or parsed.get("format") != FORMAT:
         raise ParseError(f"neither a store nor a trace, which begins with {begins}", place=place)
-    if said.get("version") != VERSION:
-        found = json.dumps(said.get("version"))[:MOST_SHOWN]
+    if parsed.get("version") != VERSION:
+        found = json.dumps(parsed.get("version"))[:MOST_SHOWN]
         raise ParseError(f"a trace of version {found}; this program reads version {VERSION}", place=place)

@@ -23,15 +23,15 @@ def asked(body: bytes | str, form: Form = MappingProxyType({})) -> dict[str, Any
         InputError: it is not a JSON object, is nested too deeply, or a field has a value of another type.
     """
     try:
-        said = from_json(body, allow_inf_nan=False)
+        request = from_json(body, allow_inf_nan=False)
     except ValueError as error:
         raise InputError(f"a request is one JSON object: {error}") from None
-    if not isinstance(said, dict):
+    if not isinstance(request, dict):
         raise InputError("a request is one JSON object")
     for name, (fits, words) in form.items():
-        if said.get(name) is not None and not fits(said[name]):
+        if request.get(name) is not None and not fits(request[name]):
             raise InputError(f"'{name}' is {words}")
-    return said
+    return request
 
 
 def _text(value: Any) -> bool:

@@ -105,15 +105,15 @@ def test_a_machine_that_was_not_started_or_has_ended_does_nothing():
 @pytest.mark.parametrize(
     ("path", "value", "said"),
     [
-        ((), [], "no state of a machine: the whole: "),
-        (("root",), 3, "no state of a machine: root: "),
-        (("serials",), "many", "no state of a machine: serials: "),
-        (("root", "plot"), [], "no state of a machine: root.plot: "),
-        (("root", "active"), {"a": 1}, "no state of a machine: root.active: "),
-        (("root", "kept"), [["a"]], "no state of a machine: root.kept.0.1: "),
-        (("root", "kept"), [["a", {"name": "e", "sent": 1}]], "no state of a machine: root.kept.0.1."),
-        (("root", "history"), [1], "no state of a machine: root.history: "),
-        (("root", "surplus"), 1, "no state of a machine: root.surplus: "),
+        ((), [], "not a state of a machine: the whole: "),
+        (("root",), 3, "not a state of a machine: root: "),
+        (("serials",), "many", "not a state of a machine: serials: "),
+        (("root", "plot"), [], "not a state of a machine: root.plot: "),
+        (("root", "active"), {"a": 1}, "not a state of a machine: root.active: "),
+        (("root", "kept"), [["a"]], "not a state of a machine: root.kept.0.1: "),
+        (("root", "kept"), [["a", {"name": "e", "sent": 1}]], "not a state of a machine: root.kept.0.1."),
+        (("root", "history"), [1], "not a state of a machine: root.history: "),
+        (("root", "surplus"), 1, "not a state of a machine: root.surplus: "),
         (("root", "form"), {"plot": 3}, "plot"),
     ],
 )
@@ -136,7 +136,7 @@ def test_a_state_nested_too_deeply_is_refused():
     form = json.loads(json.dumps(run.machine.state.to_json()))
     for _ in range(2000):
         form["root"] = {**form["root"], "children": {"a": form["root"]}}
-    with pytest.raises(InputError, match="no state of a machine"):
+    with pytest.raises(InputError, match="not a state of a machine"):
         MachineState.from_json(form, run.library)
 
 

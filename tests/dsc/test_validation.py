@@ -481,7 +481,7 @@ WRONG = [
     ("handler", S + "  a: {on: {done: e, x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    interrupt: true\n    do: {tell: (free)}\n", 7, "interrupts nothing", "use"),
     ("dialect", H + "  a: {on: {x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    do: {use: wait}\n", 7, "handlers are for plots of dialect dsc", "transitions"),
     ("connectors lead on", S + "  a: {use: wait, on: {done: b}, after: {seconds: 9, to: e}}\n  b: {use: wait, on: {done: a}}\n" + E
-     + "rules:\n  - {before: [a, b], when: (free), do: {then: continue}}\n", 6, "all steps of a circle", "`then`"),
+     + "rules:\n  - {before: [a, b], when: (free), do: {then: continue}}\n", 6, "all steps of a cycle", "`then`"),
     # -- parameters of components
     ("parameter roles", "parameters:\n  n: {type: number, default: 5, most: 3}\n" + S + E, 2, "'p.n' is 3 or less; found 5", ""),
     ("parameter roles", "parameters:\n  n: {type: number, changed_by: profile}\n" + S + E, 2, "'n' needs a default", "a profile may say another one"),
