@@ -1,4 +1,4 @@
-"""How long people wait for the error in a broken plot: the installed command on each file, median and longest.
+"""Time until the command reports the error in a broken plot: median and longest time over the files.
 
 `python benchmarks/broken_plots.py [--runs N]` runs the corpus and the bombs of `tests/dsc`, slowest first.
 """
@@ -46,7 +46,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         kept = [file for file in TESTS.glob("broken/*/*") if file.suffix in {".yaml", ".scxml"}]
         files = [file for file in kept if file.name not in {"grasp.yaml", "wait.yaml"}] + bombs(Path(folder))
-        seconds(files[0])  # the file cache is warm from here on
+        seconds(files[0])  # warms the file cache
         times = {file.name: [seconds(file) for _ in range(runs)] for file in files}
     medians = {name: statistics.median(each) for name, each in times.items()}
     for name in sorted(medians, key=medians.get, reverse=True)[:SHOWN]:

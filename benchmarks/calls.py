@@ -1,9 +1,10 @@
 """`make bench-calls`: Python calls, hops between files, and files on the five main paths of the system.
 
-The counts are deterministic: simulated time, no store, and a planner that repeats the plans of an earlier run.
-Each flow begins and ends at the public interface (an event posted, a skill called), so that it survives every redesign
-behind that interface. A call is one that Python's profiler reports for a function of this project, comprehensions and
-resumed coroutines included; a hop is a call from one file of the project into another.
+The counts are deterministic: simulated time, no store, and a planner that repeats the plans of an earlier run. Each
+flow begins and ends at the public interface (an event posted, a skill called), so that it survives a redesign.
+
+A call is one that Python's profiler reports for a function of this project; comprehensions and resumed coroutines
+count. A hop is a call from one file of the project into another.
 """
 
 from __future__ import annotations
@@ -43,9 +44,9 @@ from planning.strips import Problem
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = tuple(str(ROOT / room) for room in ("knowledge_base", "dsc", "planning", "domains"))
 BEFORE = Path(__file__).with_name("calls.json")
-"""The counts that `tests/test_bench_calls.py` holds new ones against."""
+"""The counts that `tests/test_bench_calls.py` compares with new ones."""
 ITEMS = 3
-"""On the table that is planned for."""
+"""Number of items on the table of the planning flows."""
 MOVED_TO = "shelf"
 """Place of the items after the disturbance."""
 ROUNDS = 7
@@ -53,12 +54,12 @@ ROUNDS = 7
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """A flow's figures.
+    """The figures of a flow.
 
     Attributes:
-        calls: of Python functions of the project.
-        hops: of these, from one file of the project to another.
-        files: of the project that were visited.
+        calls: calls of Python functions of the project.
+        hops: calls from one file of the project to another.
+        files: files of the project that were visited.
         microseconds: the median of several rounds without the profiler.
     """
 
@@ -69,7 +70,7 @@ class Count:
 
 
 class Counter:
-    """Counts between `start` and `stop`, in every thread that begins meanwhile and in the one that starts it."""
+    """Counts calls between `start` and `stop`, in the starting thread and in each thread that begins meanwhile."""
 
     def __init__(self, *, profiled: bool) -> None:
         self.calls = self.hops = 0
@@ -80,18 +81,18 @@ class Counter:
 
     @property
     def files(self) -> int:
-        """How many of the project's files were visited."""
+        """Number of the project's files that were visited."""
         return len(self._files)
 
     def start(self) -> None:
-        """Count from now on."""
+        """Start counting."""
         self.seconds = -time.perf_counter()
         if self._profiled:
             threading.setprofile(self._hear)
             sys.setprofile(self._hear)
 
     def stop(self) -> None:
-        """Count no more; what `stop` itself costs does not count."""
+        """Stop counting; calls of `stop` itself do not count."""
         sys.setprofile(None)
         threading.setprofile(None)
         self.seconds += time.perf_counter()
@@ -117,7 +118,7 @@ Flow = Callable[[Counter], None]
 
 
 def main() -> None:
-    """Print the table; `--json` gives plain data, `--write` the docs and the counts to hold new ones against."""
+    """Print the table; `--json` prints plain data, `--write` updates the docs and the kept counts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--write", action="store_true")
@@ -136,12 +137,12 @@ def main() -> None:
 
 
 def counts(rounds: int = ROUNDS) -> dict[str, Count]:
-    """The figures of every flow by its name."""
+    """Return the figures of every flow by its name."""
     return {name: _count(flow(), rounds) for name, flow in FLOWS.items()}
 
 
 def table(found: dict[str, Count]) -> str:
-    """A Markdown table."""
+    """Return a Markdown table."""
     lines = ["| flow | calls | hops between files | files | µs |", "| --- | --- | --- | --- | --- |"]
     lines += [f"| {name} | {one.calls:,} | {one.hops:,} | {one.files} | {one.microseconds:,.1f} |"
               for name, one in found.items()]  # fmt: skip
@@ -149,7 +150,7 @@ def table(found: dict[str, Count]) -> str:
 
 
 def _count(flow: Flow, rounds: int) -> Count:
-    for _ in range(2):  # tables, generated source and caches are made
+    for _ in range(2):  # fills tables and caches, and generates source
         flow(Counter(profiled=False))
     counter = Counter(profiled=True)
     flow(counter)
@@ -161,7 +162,7 @@ def _count(flow: Flow, rounds: int) -> Count:
 
 
 def event() -> Flow:
-    """An event to a machine whose tables are made: a guard, an assignment, exit, and an entry action."""
+    """Return a flow with an event to a warm machine: a guard, an assignment, exit, and an entry action."""
     states = {
         one: {
             "entry": [{"set": "robot.speed", "to": 1}],
@@ -183,7 +184,7 @@ def event() -> Flow:
 
 
 def skill_and_back() -> Flow:
-    """An event posted, the skill that it starts, its outcome, and the next state's skill called."""
+    """Return a flow from a posted event to the skill it starts, its outcome, and the next state's skill."""
     plot = ActionPlot.model_validate({
         "plot": "worker", "receives": {"ping": None},
         "states": {
@@ -231,7 +232,7 @@ class _Worker(Component):
 
 
 def fired() -> Flow:
-    """A fact told in a transaction, and the installed condition that it makes true heard."""
+    """Return a flow from an asserted fact to the notification of an installed condition."""
     schema = Schema.parse("(define (domain bench) (:types cup table) (:predicates (on ?c - cup ?t - table)))")
     knowledge = KnowledgeBase(schema)
     with knowledge.transaction(author="bench") as world:
@@ -254,17 +255,17 @@ def fired() -> Flow:
 
 
 def planned() -> Flow:
-    """A skill answers, a dynamic state decides to plan, the plan is bound as a plot, and its first skill is called."""
+    """Return a flow from an outcome to a decision to plan, a bound plan, and the call of its first skill."""
     return _Table(replanned=False).flow
 
 
 def replanned() -> Flow:
-    """A fact told by somebody else during a step, the plan found broken, the next one bound, its first skill called."""
+    """Return a flow from an external change that breaks the plan to the new plan and its first skill."""
     return _Table(replanned=True).flow
 
 
 class _Recalled:
-    """A planner that answers as pyperplan did in the first run: the same calls each time, without its process."""
+    """A planner that repeats pyperplan's outcomes of the first run: the same calls, without its process."""
 
     def __init__(self) -> None:
         self._planner = PlannerProcess()
@@ -272,11 +273,11 @@ class _Recalled:
         self._next = 0
 
     def rewind(self) -> None:
-        """Begin again with the first answer."""
+        """Start again with the first outcome."""
         self._next = 0
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """The answer of the run that came first."""
+        """Return the outcome of the first run."""
         if self._next == len(self._answers):
             self._answers.append(await self._planner.solve(problem, seconds))
         self._next += 1
@@ -297,7 +298,7 @@ CLEAR = ActionPlot.model_validate({
 
 
 class _Table:
-    """A table of `ITEMS` items; in the first step of its plan somebody moves the items that later steps need."""
+    """A table of `ITEMS` items; during the first step an external change moves the items of later steps."""
 
     def __init__(self, *, replanned: bool) -> None:
         self._domain = set_table.domain()
@@ -307,7 +308,7 @@ class _Table:
         self._replanned = replanned
 
     def flow(self, counter: Counter) -> None:
-        """One run, counted where it is to be."""
+        """Run once; the robot starts and stops the counter."""
         world = set_table.world(ITEMS)
         self._planner.rewind()
         robot = _TableRobot(self._domain, world, counter, disturbed=self._replanned)
@@ -318,7 +319,7 @@ class _Table:
 
 
 class _TableRobot(Component):
-    """Does each step at once; counts up to the first step, or from a disturbance to the step after it."""
+    """Finishes each step immediately; counts up to the first step, or from a disturbance to the next step."""
 
     name = "robot"
 
@@ -354,14 +355,14 @@ class _TableRobot(Component):
 
 
 def _disturb(world: KnowledgeBase) -> None:
-    """Somebody moves every item to another place, so that the plan fails at its next step."""
+    """Move every item to another place, so that the plan fails at its next step."""
     lying = [one for one in world.facts() if isinstance(one, Fact) and one.predicate == "lies-at"]
     moved = tuple(fact("lies-at", one.args[0], MOVED_TO) for one in lying)
     world.apply(Delta(removed=tuple(lying), added=moved), author="somebody")
 
 
 def _plot(action: Any) -> ActionPlot:
-    """The action as one call of the robot's skill."""
+    """Return the action's plot, with one call of the robot's skill."""
     given = dict(zip("abcde", (f"?{parameter.name}" for parameter in action.parameters), strict=False))
     act = {"entry": {"trigger": "robot.act", "with": {"action": action.name, **given}}, "on": {"did": "done"}}
     return ActionPlot.model_validate({

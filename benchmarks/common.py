@@ -1,4 +1,4 @@
-"""The cases that everyone is asked."""
+"""Cases that this engine and its peers share."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Everyone = Sequence[Contender]
 
 
 def common_rows(everyone: Everyone, pace: Pace) -> list[Row]:
-    """One row for each case."""
+    """Return one row for each case."""
     return [
         _compared(flat(), stepping, everyone, pace, lead=10, floors=10),
         _compared(deep(), stepping, everyone, pace, lead=10),
@@ -30,7 +30,7 @@ def common_rows(everyone: Everyone, pace: Pace) -> list[Row]:
 
 
 def stepping(one: Contender, chart: Chart) -> Job:
-    """Events to one machine, which is seen to go where it should."""
+    """Return a job of events to one machine, after a check of its transitions."""
     machine = one.start(one.load(one.write(chart)))
     for number in range(2 * chart.rounds if chart.rounds < 10 else 5):
         assert one.where(machine) == chart.leaves(number), (one.name, chart.name, one.where(machine))
@@ -39,7 +39,7 @@ def stepping(one: Contender, chart: Chart) -> Job:
 
 
 def in_turn(one: Contender, chart: Chart) -> Job:
-    """An event to each of many machines of one chart."""
+    """Return a job of one event to each of many machines of one chart."""
     loaded = one.load(one.write(chart))
     machines = [one.start(loaded) for _ in range(INSTANCES)]
     one.run_each(machines, PING)
@@ -53,7 +53,7 @@ def in_turn(one: Contender, chart: Chart) -> Job:
 
 
 def building(one: Contender, chart: Chart) -> Job:
-    """From data to a started machine."""
+    """Return a job from data to a started machine."""
 
     def run(data: list[Any]) -> None:
         for each in data:
@@ -77,14 +77,14 @@ def _compared(
 
 
 def cell(figures: Figures, name: str, against: str, unit: str) -> Cell:
-    """The median, and the ratio where it means something; a table by hand is not built as a chart is."""
+    """Return the median, with its ratio; the floor's hand-written table has no build time to compare."""
     value = {"µs": 1e6, "ms": 1e3}[unit] * median(figures[name])
     compared = name != against and not (unit == "ms" and against == FLOOR)
     return Cell(value, ratio(figures, name, against) if compared else None)
 
 
 def _remembered(everyone: Everyone) -> Row:
-    """What a started machine holds on to besides what all machines of its chart share."""
+    """Return the memory of a started machine, without parts shared by all machines of its chart."""
     cells = {one.name: Cell(_kib(one, flat())) for one in everyone}
     target = Target(" KiB", 3, cells[ENGINE].value)
     return Row("memory of an instance", "KiB", cells, targets=[target])
@@ -92,7 +92,7 @@ def _remembered(everyone: Everyone) -> Row:
 
 def _kib(one: Contender, chart: Chart) -> float:
     loaded = one.load(one.write(chart))
-    one.run(one.start(loaded), PING, chart.rounds)  # what is worked out on the way belongs to all
+    one.run(one.start(loaded), PING, chart.rounds)  # caches filled on the way are shared by all
     tracemalloc.start()
     machines = [one.start(loaded) for _ in range(INSTANCES)]
     held = tracemalloc.get_traced_memory()[0]

@@ -1,7 +1,7 @@
-"""What an event costs: a table written by hand, this engine and its peers, in one run; see docs/speed.md.
+"""The cost of an event: a hand-written table, this engine and its peers, in one run; see docs/speed.md.
 
-`python benchmarks/engine.py [--quick] [--json] [--write]`: one quick round, plain data for programs, or the table
-put into docs/speed.md. Peers that are not installed are left out; `make bench-engine` installs them.
+`python benchmarks/engine.py [--quick] [--json] [--write]`: one quick round, plain data for programs, or the table for
+docs/speed.md. Peers that are not installed are skipped; `make bench-engine` installs them.
 """
 
 import argparse

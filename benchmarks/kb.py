@@ -1,7 +1,7 @@
-"""What knowledge costs: an index by hand, this knowledge base and its peers, in one run; see docs/speed.md.
+"""The cost of knowledge: a hand-written index, this knowledge base and its peers, in one run; see docs/speed.md.
 
-`python benchmarks/kb.py [--quick] [--json] [--write]`: tiny worlds and one short round, plain data for programs, or
-the table put into docs/speed.md. Peers that are not installed are left out; `make bench-kb` installs them.
+`python benchmarks/kb.py [--quick] [--json] [--write]`: tiny worlds and one short round, plain data for programs, or the
+table for docs/speed.md. Peers that are not installed are skipped; `make bench-kb` installs them.
 """
 
 import argparse
@@ -22,7 +22,7 @@ TINY = Sizes(many=300, conditions=(20, 40), facts=(300, 600), versions=70, singl
 
 
 def rows_of(everyone: list[type[Contender]], *, quick: bool) -> list[Row]:
-    """All cases, the everyday one first."""
+    """Return the rows of all cases, the common one first."""
     pace, sizes = (QUICK, TINY) if quick else (FULL, Sizes())
     asked = [row for size in ((100,) if quick else (10_000, 100_000)) for row in question_rows(everyone, size, pace)]
     watched = condition_rows(pace, sizes)

@@ -1,8 +1,9 @@
 """Memory of a long run in simulated time: flat after its first tenth, without a store, with one, and with a trace file.
 
-`python benchmarks/memory.py [--events N] [--json] [--ways W ...]` lives 24 simulated hours of a robot on watch: skills
-with reports, an observed fact that changes, periods, timeouts that are cancelled, and failures that a rule answers.
-It prints the memory at each tenth; exit status 1 if the last nine tenths grow by more than `MOST`.
+`python benchmarks/memory.py [--events N] [--json] [--ways W ...]` runs 24 simulated hours of a robot on watch. Skills
+send reports, an observed fact changes, periods pass, timeouts are cancelled, and a rule answers failures.
+
+The program prints the memory at each tenth. Its exit status is 1 if the last nine tenths grow by more than `MOST`.
 """
 
 from __future__ import annotations
@@ -20,20 +21,20 @@ from memory_run import WAYS, Watch
 
 EVENTS = 1_000_000
 MOST = 0.02
-"""Growth of blocks in use and of the resident set: the pages of SQLite and gaps of the allocator settle slowly."""
+"""Growth of blocks in use and of the resident set: SQLite's pages and the allocator's gaps settle slowly."""
 TENTHS = 10
 PAGE = 4096
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What a run holds after so many events.
+    """The memory of a run after a number of events.
 
     Attributes:
-        events: taken so far.
-        hours: of run time.
-        blocks: that Python's allocator has given out, garbage collected before.
-        rss: bytes that are resident.
+        events: number of events so far.
+        hours: run time.
+        blocks: blocks of Python's allocator in use, after a garbage collection.
+        rss: resident bytes.
     """
 
     events: int
@@ -43,7 +44,7 @@ class Sample:
 
 
 def measured(way: str, events: int, folder: Path) -> list[Sample]:
-    """One sample at each tenth of a run."""
+    """Return one sample at each tenth of a run."""
     samples: list[Sample] = []
 
     def sample(taken: int, seconds: float) -> None:
@@ -57,13 +58,13 @@ def measured(way: str, events: int, folder: Path) -> list[Sample]:
 
 
 def growth(samples: list[Sample], what: str) -> float:
-    """By how much the most of the last nine tenths exceeds the first, as a share."""
+    """Return the growth of the largest later sample over the first, as a share."""
     first, *others = (getattr(one, what) for one in samples)
     return max(others) / first - 1
 
 
 def told(way: str, samples: list[Sample]) -> list[str]:
-    """The table of a run, and its growth."""
+    """Return the table of a run, and its growth."""
     lines = [f"{way}:", "   events    hours      blocks    RSS MB"]
     lines += [f"{s.events:9,} {s.hours:8.1f} {s.blocks:11,} {s.rss / 1e6:9.1f}" for s in samples]
     said = ", ".join(f"{what} {growth(samples, what):+.2%}" for what in ("blocks", "rss"))
@@ -82,7 +83,7 @@ def main() -> None:
             print(json.dumps([asdict(one) for one in measured(options.ways[0], options.events, Path(folder))]))
             return
     grown = False
-    for way in options.ways:  # each in a process of its own, whose memory is its own
+    for way in options.ways:  # each in a separate process with its own memory
         command = [sys.executable, __file__, "--json", "--events", str(options.events), "--ways", way]
         if options.folder is not None:
             command += ["--folder", str(options.folder)]

@@ -1,4 +1,4 @@
-"""The run whose memory is measured: a robot on watch, for 24 simulated hours."""
+"""The run of the memory benchmark: a robot on watch, for 24 simulated hours."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.facts import Delta, fact
 
 WAYS = ("plain", "trace", "store")
-"""Without anything, with a trace file, and with a store."""
+"""Without records, with a trace file, and with a store."""
 SECONDS = 24 * 3600.0
 REPORTS = 6
 A_CYCLE = REPORTS + 4
@@ -59,7 +59,7 @@ WATCH = ActionPlot.model_validate({
 
 
 class Robot(Component):
-    """Looks, reports what moves, and slips now and then."""
+    """Looks, reports moving objects, and slips periodically."""
 
     name = "robot"
 
@@ -85,7 +85,7 @@ LIBRARY = Library([WATCH, primitive_plot(Robot().skills()["grasp"], done="graspe
 
 
 class Watch:
-    """One run; `sample` is told how many events were taken, and the second of run time, after each macrostep."""
+    """One run; after each macrostep it calls `sample` with the number of events and the run time in seconds."""
 
     def __init__(self, way: str, events: int, folder: Path, sample: Callable[[int, float], None]) -> None:
         self._way = way
@@ -94,7 +94,7 @@ class Watch:
         self._sample = sample
 
     def run(self) -> None:
-        """Live it."""
+        """Run it."""
         path = self._folder / "run.db"
         knowledge = KnowledgeBase.open(SCHEMA, path) if self._way == "store" else KnowledgeBase(SCHEMA)
         knowledge.apply(Delta(nodes={"cup": "thing", "here": "place", "there": "place"}), "watch")
@@ -126,4 +126,4 @@ class Watch:
 
 
 class StopError(Exception):
-    """There were as many events as wanted."""
+    """The wanted number of events is reached."""

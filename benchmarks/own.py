@@ -1,4 +1,4 @@
-"""What only this engine is asked: guards, actions, variables, attributes, submachines, the size of the chart."""
+"""Cases of this engine alone: guards, actions, variables, attributes, submachines, the size of the chart."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ READ, STARTED = "pydantic alone", "pydantic, validated, compiled, started"
 
 
 def own_rows(pace: Pace) -> list[Row]:
-    """One row for each case; what is compared is timed together."""
+    """Return one row for each case; cases that are compared are timed together."""
     return [*_step_rows(pace), *_size_rows(pace), *_stage_rows(pace)]
 
 
 def _step_rows(pace: Pace) -> list[Row]:
     guard = {"when": "(> ?n 0)"}
     switched = {"entry": {"switch": "lamp", "to": "on"}, "exit": {"switch": "lamp", "to": "off"}}
-    cases: dict[str, tuple[Job, str, float | None]] = {  # name -> job, what it is compared with, bound
+    cases: dict[str, tuple[Job, str, float | None]] = {  # name -> job, the case to compare with, bound
         PLAIN: (stepping(ping_pong()), FLOOR, None),
         GUARDED: (stepping(ping_pong(**guard)), PLAIN, 2),
         SITUATED: (stepping(ping_pong(), situated=True), PLAIN, None),

@@ -1,4 +1,4 @@
-"""Plots and jobs for what only this engine is asked; each was seen to go where it should."""
+"""Plots and jobs for the cases of this engine alone, each with a check of its transitions."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ PING = Event("ping")
 
 
 def ping_pong(name: str = "bench", *, others: int = 0, entry: Any = (), exit: Any = (), **more: Any) -> Form:  # noqa: A002
-    """Two states, among others, and what shall be in them or in their transitions."""
+    """Return a plot of two states, among others, with the given content for them and their transitions."""
     states: Form = {
         one: {"on": {"ping": {"to": other, **more}}, "entry": entry, "exit": exit} for one, other in ("ab", "ba")
     }
     way = ["a", *(f"s{n}" for n in range(others)), "a"]
-    for one, other in pairwise(way) if others else ():  # round trips that nobody makes
+    for one, other in pairwise(way) if others else ():  # cycles that no event takes
         states.setdefault(one, {"on": {}})["on"]["away"] = other
     variables = {"n": {"type": "number", "initial": 1}}
     return {"plot": name, "variables": variables, "receives": {"ping": None, "away": None}, "states": states}
 
 
 def holder(use: str) -> Form:
-    """A plot with a submachine that every event leaves and enters again."""
+    """Return a plot with a submachine that every event leaves and enters again."""
     again = {"to": "host", **({"assign": {"plan": "?event.plan"}} if use == "?plan" else {})}
     return {
         "plot": "holder", "variables": {"plan": "plot"}, "receives": {"again": {"plan": "plot"}},
@@ -45,13 +45,13 @@ def holder(use: str) -> Form:
 
 
 def plan(number: int) -> Form:
-    """A plot of ten steps one after the other; those with different numbers differ."""
+    """Return a plot of ten steps in sequence; plots of different numbers differ."""
     steps: Form = {f"s{n}": {"on": {"ping": f"s{n + 1}"}} for n in range(9)} | {"s9": {"final": True}}
     return {"plot": "plan", "about": f"plan {number}", "receives": {"ping": None}, "states": steps}
 
 
 def stepping(form: Form, *, situated: bool = False) -> Job:
-    """Ping-pong in the plot; with `situated` in a new situation for every event, as in a run."""
+    """Return a job of ping-pong in the plot; with `situated` in a new situation for every event, as in a run."""
     at, machine = _started(form)
 
     def run(times: int) -> None:
@@ -71,7 +71,7 @@ def stepping(form: Form, *, situated: bool = False) -> Job:
 
 
 def attributes() -> Job:
-    """Ping-pong with an event made anew each time, as one that brings data is."""
+    """Return a job of ping-pong with a new event each time, as one with data is."""
     at, machine = _started(ping_pong())
 
     def run(times: int) -> None:
@@ -85,7 +85,7 @@ def attributes() -> Job:
 
 
 def binding(*forms: Form, plans: Iterator[Form | None]) -> Job:
-    """A submachine left and entered again by every event, which brings the plot to be bound."""
+    """Return a job of a submachine that every event leaves and enters; the event carries the plot to bind."""
     at, machine = _started(*forms)
 
     def events(times: int) -> list[Event]:
@@ -111,26 +111,26 @@ def _started(*forms: Form) -> tuple[Ready, Machine]:
 
 
 def read(form: Form) -> ActionPlot:
-    """What pydantic alone does."""
+    """Return the plot read by pydantic alone."""
     return ActionPlot.model_validate(form)
 
 
 def validated(form: Form) -> Library:
-    """And the validator."""
+    """Return a library with the plot, after validation."""
     library = Library([read(form)])
     raise_findings([finding for plot in library for finding in validate_plot(plot, library)])
     return library
 
 
 def compiled(form: Form) -> Library:
-    """And the compiler."""
+    """Return the validated library, compiled."""
     library = validated(form)
     library.compiled(form["plot"])
     return library
 
 
 def started(form: Form) -> Machine:
-    """And the first step."""
+    """Return a machine after its first step."""
     library = compiled(form)
     machine = Machine(library)
     machine.start(form["plot"], {}, KnowledgeSituation(KNOWLEDGE, library))
@@ -138,7 +138,7 @@ def started(form: Form) -> Machine:
 
 
 def stage(build: Callable[[Form], object], form: Form) -> Job:
-    """Building a plot from data as far as that."""
+    """Return a job of building a plot from data up to a stage."""
 
     def run(times: int) -> None:
         for _ in range(times):

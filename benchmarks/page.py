@@ -1,4 +1,4 @@
-"""docs/speed.md, into which the benchmarks put their tables."""
+"""The page docs/speed.md, whose tables the benchmarks write."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "speed.md"
 
 
 def put(text: str, name: str) -> None:
-    """Replace what stands between `<!-- name -->` and `<!-- /name -->`."""
+    """Replace the text between `<!-- name -->` and `<!-- /name -->`."""
     begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->\n"
     head, _, rest = PAGE.read_text(encoding="utf-8").partition(begin)
     _, ended, tail = rest.partition(end)

@@ -1,7 +1,7 @@
-"""One engine through plain unified-planning, its own reader and defaults: `plain_up.py ENGINE DOMAIN PROBLEM`.
+"""One engine through plain unified-planning, with its reader and defaults: `plain_up.py ENGINE DOMAIN PROBLEM`.
 
-Prints the seconds of the solve alone and the plan's steps, as JSON. A process of its own, since engines ignore
-time limits.
+The program prints the seconds of the search alone and the plan's steps, as JSON. It is a separate process, since
+engines ignore time limits.
 """
 
 import json

@@ -1,8 +1,8 @@
-"""What a plan costs on the clean-up table: each engine through plain unified-planning, the race, and the parts.
+"""The cost of a plan on the clean-up table: each engine through plain unified-planning, the race, and the parts.
 
-`python benchmarks/planners.py [--quick] [--json] [--write]`: small tables in one round, plain data for programs,
-or the tables put into docs/engines.md. `make bench-planning` installs the engines first. All is measured in one
-run, in turns; the ratios count.
+`python benchmarks/planners.py [--quick] [--json] [--write]`: small tables in one round, plain data for programs, or the
+tables for docs/engines.md. `make bench-planning` installs the engines first. One run measures all engines in turn; only
+ratios are meaningful.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ RATIO, EXTRA_MS, OUR_MS, LONGER = 1.5, 50, 40, 0.15
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How long it took and how many trips the plan has; no seconds if there was no plan in time."""
+    """Seconds of the search and trips of the plan; no seconds after a timeout."""
 
     seconds: float | None
     trips: int | None = None
@@ -78,7 +78,7 @@ def main() -> None:
 
 
 def row(items: int, rounds: int) -> dict[str, Any]:
-    """Each engine and the race, in turns; an engine that was too slow once is not asked again."""
+    """Return the figures of each engine and the race, in turn; an engine that timed out once is not asked again."""
     names = [name for name in PLAIN if installed(next(one for one in ENGINES if one.name == name))]
     answers: dict[str, list[Answer]] = {name: [] for name in [*names, "race"]}
     with tempfile.TemporaryDirectory() as folder:
@@ -99,7 +99,7 @@ def row(items: int, rounds: int) -> dict[str, Any]:
 
 
 def plain(name: str, problem: Path) -> Answer:
-    """One engine through unified-planning, in a process that is killed with all it started."""
+    """Return the answer of one engine through unified-planning, in a process group that is killed afterwards."""
     command = [sys.executable, str(Path(__file__).with_name("plain_up.py")), name, str(set_table.FILE), str(problem)]
     running = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True
@@ -117,7 +117,7 @@ def plain(name: str, problem: Path) -> Answer:
 
 
 def _kill_all(running: subprocess.Popen[str]) -> None:
-    """Also the engine, which unified-planning has given a session of its own."""
+    """Kill the process and the engine, which unified-planning starts in a separate session."""
     own = Path(f"/proc/{running.pid}/task/{running.pid}/children")
     children = [int(pid) for pid in own.read_text().split()] if own.exists() else []
     for group in (*children, running.pid):
@@ -145,7 +145,7 @@ def _racing(problem: Problem, rounds: int) -> list[Answer]:
 
 
 def part_row(items: int, rounds: int) -> dict[str, Any]:
-    """Everything that is not the engine's own work, in ms; the medians."""
+    """Return the medians of all work around the engine, in ms."""
     domain, world, goal = set_table.domain(), set_table.world(items), set_table.GOAL
     builder = ProblemBuilder(domain)
     problem = builder.build_problem(world, goal)
@@ -167,7 +167,7 @@ def part_row(items: int, rounds: int) -> dict[str, Any]:
 
 
 def whole_row(items: int) -> dict[str, Any]:
-    """From a failure to the first action of the new plan, in a run; see `replanning`."""
+    """Return the time from a failure to the first action of the new plan, in a run; see `replanning`."""
     spent = replanning.measured(items)
     ours = sum(spent[part] for part in replanning.OURS)
     verdict = f"≤ {OUR_MS} ms: {_verdict(ours <= OUR_MS)}" if items == 25 else ""
@@ -176,7 +176,7 @@ def whole_row(items: int) -> dict[str, Any]:
 
 
 def optimal_row(items: int) -> dict[str, Any]:
-    """Trips next to the fewest there can be, which an optimal engine finds when trips alone cost."""
+    """Return the trips next to the minimum, which an optimal engine finds when only trips cost."""
     problem = build_problem(set_table.domain(), set_table.world(items), set_table.GOAL)
     actions = tuple(replace(a, cost=_trip_cost(a.step)) for a in problem.actions)
     priced = replace(problem, unsliced=None, actions=actions)
@@ -200,7 +200,7 @@ async def _solved(name: str, problem: Problem) -> object:
 
 
 def _plan(problem: Problem) -> Plan:
-    """The race's preferred engine's, or the embedded one's."""
+    """Return a plan of the race's preferred engine, or of the embedded one."""
     for name in ("fast-downward", "pyperplan"):
         if installed(next(one for one in ENGINES if one.name == name)):
             found = asyncio.run(_solved(name, problem))
@@ -234,7 +234,7 @@ def _verdict(met: bool) -> str:  # noqa: FBT001
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> str:
-    """A Markdown table that can be read as it stands."""
+    """Return a Markdown table with aligned columns."""
     lines = [list(rows[0]), *([str(value) for value in one.values()] for one in rows)]
     widths = [max(len(line[n]) for line in lines) for n in range(len(lines[0]))]
     rule = ["-" * max(width, 3) for width in widths]

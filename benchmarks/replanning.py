@@ -1,10 +1,10 @@
-"""From a failure to the first action of the new plan, part by part, in a run with the real component.
+"""Time from a failure to the first action of the new plan, part by part, in a run with the real component.
 
-A robot clears a table; the first time that it stacks something, that fails, and it turns out that the two do not fit:
-the plan is void, and nobody can mend it. What is measured is the way from the skill's answer to the call of the next
-skill: of this process its processor time, so that what else the machine does hardly counts, each part by a clock
-around the function that does it; of the engine's process the processor time in which it puts the problem into the
-engine's words ("translate"), and then the real time that the engine took.
+A robot clears a table. Its first stacking fails, and the two items turn out not to fit: the plan is void, and local
+repair is impossible. The measured time is that from the skill's outcome to the call of the next skill.
+
+For this process it is processor time, so that other load hardly counts; a clock around each function measures its part.
+For the engine's process it is the processor time of the translation ("translate"), then the real time of the search.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ PARTS = (
     "mend", "pose", "write", "translate", "engine", "validate, de-order", "generate", "bind, dispatch and the rest",
 )  # fmt: skip
 OURS = tuple(part for part in PARTS if part != "engine")
-_HERE = tuple(part for part in OURS if part != "translate")  # that the engine's process does
+_HERE = tuple(part for part in OURS if part != "translate")  # the engine's process translates
 _WRAPPED = (
     (search, "local_repair", "mend"), (search, "build_problem", "pose"), (search, "deordered", "validate, de-order"),
     (asking, "written", "write"),
@@ -42,7 +42,7 @@ _WRAPPED = (
 
 
 def measured(items: int) -> dict[str, float]:
-    """Part -> milliseconds; the second failure's, when everything is warm."""
+    """Return milliseconds by part, of the second failure, when everything is warm."""
     domain, world = set_table.domain(), set_table.world(items)
     planner = _Clocked()
     robot = _Robot(domain, world, planner)
@@ -57,7 +57,7 @@ def measured(items: int) -> dict[str, float]:
 
 
 class _Clocked:
-    """A race that says how long the engine took."""
+    """A race that adds up the engine's times."""
 
     def __init__(self) -> None:
         self.race = PlannerRace()
@@ -72,7 +72,7 @@ class _Clocked:
 
 
 class _Robot(Component):
-    """Does each step at once, and fails where two things are stacked for the first and second time."""
+    """Finishes each step immediately; stacking fails the first and second time."""
 
     name = "robot"
 
@@ -111,7 +111,7 @@ class _Robot(Component):
 
 
 def _plot(action: PlanningAction) -> ActionPlot:
-    """The action as one call of the robot's skill."""
+    """Return the action's plot, with one call of the robot's skill."""
     given = dict(zip("abcde", (f"?{parameter.name}" for parameter in action.parameters), strict=False))
     act = {
         "entry": {"trigger": "robot.act", "with": {"action": action.name, **given}},
@@ -126,7 +126,7 @@ def _plot(action: PlanningAction) -> ActionPlot:
 
 @contextmanager
 def _clocked(spent: dict[str, float]) -> Iterator[None]:
-    """A clock around each function of `_WRAPPED`; what one calls inside another counts for the outer one."""
+    """Measure each function of `_WRAPPED`; a nested call counts for the outer one."""
     before = [(module, name, getattr(module, name)) for module, name, _ in _WRAPPED]
     inside = [False]
 

@@ -1,4 +1,4 @@
-"""The table as values: rows with a cell for each contender, and targets with what became of them."""
+"""The table as values: rows with a cell for each contender, and targets with their results."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ENGINE, FLOOR = "this engine", "floor"
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One figure in the row's unit, and how many times as much it is as that of `against` (the floor if empty)."""
+    """One figure in the row's unit, and its ratio to the figure of `against` (the floor if empty)."""
 
     value: float
     times: float | None = None
@@ -23,7 +23,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What a figure shall be: at most (or at least) the bound. No value: it could not be measured."""
+    """The bound of a figure: its maximum, or with `least` its minimum. Without a value it could not be measured."""
 
     what: str
     bound: float
@@ -32,7 +32,7 @@ class Target:
 
     @property
     def met(self) -> bool | None:
-        """Whether it is; `None` if nobody knows."""
+        """Whether the figure meets the bound; `None` if it was not measured."""
         if self.value is None:
             return None
         return self.value >= self.bound if self.least else self.value <= self.bound
@@ -45,7 +45,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A case: who takes how long, how much faster than the fastest peer the engine is, and what was hoped for."""
+    """A case: the contenders' figures, the engine's lead over the fastest peer, and the targets."""
 
     case: str
     unit: str
@@ -55,7 +55,7 @@ class Row:
     targets: list[Target] = field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "case": self.case, "unit": self.unit, "lead": self.lead, "fastest_peer": self.fastest,
             "cells": {
@@ -69,7 +69,7 @@ class Row:
 
 
 def table(rows: list[Row], columns: list[str]) -> str:
-    """A Markdown table that can be read as it stands."""
+    """Return a Markdown table with aligned columns."""
     led = any(row.lead is not None for row in rows)
     head = ["case", *columns, *(["lead"] if led else []), "target"]
     lines = [
@@ -95,5 +95,5 @@ def _targets(row: Row) -> str:
 
 
 def number(value: float) -> str:
-    """Three digits, which is more than the rounds agree on."""
+    """Return three digits, more than the rounds agree on."""
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"

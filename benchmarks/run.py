@@ -1,7 +1,7 @@
-"""What a run costs around the engine: a macrostep, its store, and many plots at once; see docs/speed.md.
+"""The cost of a run around the engine: a macrostep, its store, and many concurrent plots; see docs/speed.md.
 
 `python benchmarks/run.py [--quick] [--json] [--write] [--folder F] [--plots N] [--seconds S]`: a moment for each, plain
-data for programs, or the tables put into docs/speed.md. Files are made below F, and the disk matters.
+data for programs, or the tables for docs/speed.md. Files are made in F; the speed of its disk matters.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from timing import Figures, Pace, measure
 
 FULL, QUICK = Pace(rounds=9, seconds=0.3), Pace(rounds=1, seconds=0.01)
 MOST = {"process": 5.0, "power": 1.3}
-"""How many times a bare commit a macrostep's store may take."""
+"""Maximum ratio of a macrostep's store to a bare commit."""
 COLUMNS = [ENGINE, HOP, NO_STORE, *[name for one in DURABILITIES for name in (one, bare(one))]]
 
 
 def row(case: str, figures: Figures) -> Row:
-    """A case, in microseconds; what a store costs is its own share."""
-    if case == ONE:  # one hop of the two is the way back, which only tells who measures
+    """Return a case, in microseconds; the store's cell has only its own share."""
+    if case == ONE:  # one of the two hops is the way back to the benchmark
         figures = figures | {name: _less(figures[name], figures[HOP]) for name in (NO_STORE, *DURABILITIES)}
     cells = {name: Cell(1e6 * statistics.median(rounds)) for name, rounds in figures.items()}
     cells[NO_STORE] = Cell(cells[NO_STORE].value, _times(figures[NO_STORE], figures[HOP]), HOP)
@@ -42,7 +42,7 @@ def row(case: str, figures: Figures) -> Row:
 
 
 def answers_a_second(measured: Row) -> Row:
-    """The same the other way round."""
+    """Return the reciprocal: answers per second."""
     cells = {name: Cell(1e6 / measured.cells[name].value) for name in (NO_STORE, *DURABILITIES)}
     return Row("answers that lead to the next skill", "1/s", cells)
 

@@ -1,4 +1,4 @@
-"""What is timed of a run: engine, queue, sequencer and store, each alone or one around the other."""
+"""The timed jobs of a run: engine, queue, sequencer and store, alone or inside each other."""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ ROW = "x" * 400
 
 
 class Robot(Component):
-    """Its work is done at once.
+    """Finishes its work immediately.
 
     Attributes:
-        called: when its work was asked for, each time.
+        called: the times of its calls.
     """
 
     name = "robot"
@@ -75,19 +75,19 @@ class Robot(Component):
 
 
 def bare(durability: Durability) -> str:
-    """The column of one commit without anything around it."""
+    """Return the column of one bare commit."""
     return f"bare commit, {durability}"
 
 
 class Bench:
-    """The jobs; files are made in `folder`, a new one whenever a job is prepared."""
+    """The jobs; each prepared job makes a new file in `folder`."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._numbers = count()
 
     def jobs(self, case: str) -> dict[str, Job]:
-        """Everybody who is timed in a case, by column."""
+        """Return the jobs of a case, by column."""
         jobs = {ENGINE: Job(_answered if case == ANSWER else _moved), HOP: Job(_hops), NO_STORE: self._run(case, None)}
         for durability in DURABILITIES:
             jobs[durability] = self._run(case, durability)
@@ -133,7 +133,7 @@ class Bench:
 
 
 async def _one_at_a_time(sequencer: Sequencer, times: int) -> float:
-    """Each event waits until the macrostep of the one before is over: there and back, which is two hops."""
+    """Post each event after the macrostep of the one before: there and back, which is two hops."""
     done: asyncio.Queue[None] = asyncio.Queue()
     sequencer.listen(lambda _: done.put_nowait(None))
     await done.get()  # the start
@@ -147,7 +147,7 @@ async def _one_at_a_time(sequencer: Sequencer, times: int) -> float:
 
 
 async def _all_at_once(sequencer: Sequencer, times: int) -> float:
-    """All events wait when the sequencer takes the first; another one after them says that they are taken."""
+    """Post all events before the sequencer takes the first; a last event marks the end."""
     await _until(lambda: sequencer.machine.state.root is not None)
     start = perf_counter()
     for _ in range(times):
@@ -160,12 +160,12 @@ async def _all_at_once(sequencer: Sequencer, times: int) -> float:
 
 
 async def _until(holds: Callable[[], bool]) -> None:
-    while not holds():  # noqa: ASYNC110  # a listener would hear every macrostep, and its time would count
+    while not holds():  # noqa: ASYNC110  a listener would be called for every macrostep, and its time would count
         await asyncio.sleep(0)
 
 
 DRIVERS: dict[str, Callable[[Sequencer, int], Awaitable[float]]] = {ONE: _one_at_a_time, MANY: _all_at_once}
-"""Post the events of a case and return the seconds they take, without begin and end; the robot's answers need none."""
+"""Post the events of a case and return their seconds, without start and end; the robot's answers need none."""
 
 
 def _moved(times: int) -> None:

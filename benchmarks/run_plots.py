@@ -1,10 +1,11 @@
-"""Many plots at once in one process and one event loop: memory, fairness, and how long an event takes to its action.
+"""Many concurrent plots in one process and event loop: memory, fairness, and the delay from an event to its action.
 
-Each event is due at a second of its own, whoever is late: from then until the skill that it leads to begins, counts. Of
-one plot alone, to which all are compared, it counts from when the event is posted: nothing else could make it late but
-the resolution of the loop's timers, which is a millisecond.
-The skill's answer leads back, so that an event is two macrosteps. With a store, each plot has a file of its own, with a
-past of so many events by chance that the files are not all tidied up (`checkpoint`) at the same time.
+Each event is due at a separate second, independent of delays. Its delay runs from then until its skill begins. The
+reference is one plot alone, whose delay runs from the post of the event. Only the loop's timers, with a resolution of a
+millisecond, could delay it before.
+
+The skill's answer leads back, so that an event is two macrosteps. With a store, each plot has a separate file. A random
+number of past events prevents checkpoints of all files at the same time.
 """
 
 from __future__ import annotations
@@ -44,15 +45,15 @@ PLOT = ActionPlot.model_validate({
 })  # fmt: skip
 LIBRARY = Library([PLOT])
 PAST = TIDY_UP_AFTER // 2
-"""Events that a plot has had before at most: as many as it takes until its file is tidied up; each is two commits."""
+"""Maximum number of earlier events of a plot: the number until a checkpoint, with two commits each."""
 FILES_EACH = 5
-"""How many files SQLite and the lock hold open for a store."""
+"""Number of open files of SQLite and the lock for a store."""
 MOST = 20.0
-"""How many times the p50 of one plot the p99 of all may be."""
+"""Maximum ratio of the p99 of all plots to the p50 of one."""
 
 
 class Robot(Component):
-    """Notes when it is asked to work."""
+    """Records the delays of its calls."""
 
     name = "robot"
 
@@ -69,16 +70,16 @@ class Robot(Component):
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """How it went.
+    """The result of a fleet of plots.
 
     Attributes:
-        what: who ran.
-        plots: how many.
+        what: the kind of store.
+        plots: number of plots.
         rate: events a second, of each.
-        memory: KiB that a plot holds, by what the process has in memory.
+        memory: KiB of a plot, by the process's resident memory.
         fewest, most: events that a plot has handled.
         p50, p99: milliseconds from an event to its action.
-        longest: of them.
+        longest: the longest of these.
         times: p99 as a ratio to the p50 of one.
     """
 
@@ -95,12 +96,12 @@ class Fleet:
     targets: tuple[Target, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return asdict(self) | {"targets": [str(one) for one in self.targets]}
 
 
 def fleets(folder: Path, count: int, seconds: float) -> list[Fleet]:
-    """One plot alone and many, without a store and with one each, at one event a second each."""
+    """Return the results of one plot alone and of many, without and with stores, at one event a second each."""
     _allow_files(count * FILES_EACH + 100)
     found = []
     for kept in (False, True):
@@ -114,7 +115,7 @@ def fleets(folder: Path, count: int, seconds: float) -> list[Fleet]:
 
 
 def plots_table(found: list[Fleet]) -> str:
-    """A Markdown table."""
+    """Return a Markdown table."""
     lines = [
         "| plots | 1/s each | KiB each | handled by each | p50, ms | p99, ms | longest, ms | x p50 of one | target |",
         "|---|---|---|---|---|---|---|---|---|",
@@ -133,7 +134,7 @@ def plots_table(found: list[Fleet]) -> str:
 def _fleet(what: str, folder: Path | None, plots: int, seconds: float, rate: float) -> Fleet:
     if folder is not None:
         folder.mkdir()
-    chance = random.Random(1)  # noqa: S311  nothing is to be kept secret
+    chance = random.Random(1)  # noqa: S311  no secret depends on it
     robots = [Robot() for _ in range(plots)]
     gc.collect()
     before = _memory()
@@ -152,7 +153,7 @@ def _fleet(what: str, folder: Path | None, plots: int, seconds: float, rate: flo
                 for one, robot in zip(runs, robots, strict=True):
                     await _past(one, robot, chance.randrange(PAST) if folder and plots > 1 else 10)
                 gc.collect()
-                gc.freeze()  # as an `Executive` does: what is there stays, and need not be looked through
+                gc.freeze()  # as an `Executive` does: long-lived objects need no collection
                 held = (_memory() - before) / plots
                 group.create_task(_events(runs, robots, clock, round(seconds * rate), rate, chance))
             return held
@@ -179,9 +180,9 @@ async def _past(one: Sequencer, robot: Robot, events: int) -> None:
 async def _events(
     runs: list[Sequencer], robots: list[Robot], clock: LoopClock, events: int, rate: float, chance: random.Random
 ) -> None:
-    """So many for each plot, at a moment of its own in each period.
+    """Post events to each plot, at a random phase of each period.
 
-    One timer a plot: timers for all of them would be a hundred thousand things for the collector to look through.
+    Each plot has one timer; timers for all events would be a hundred thousand objects for the garbage collector.
     """
     begin = clock.now() + 0.1
 
@@ -209,7 +210,7 @@ def _path(folder: Path, number_: int) -> Path:
 
 
 def _memory() -> float:
-    """KiB that the process has in memory."""
+    """Return the resident memory of the process in KiB."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * resource.getpagesize() / 1024
 

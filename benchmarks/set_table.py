@@ -25,7 +25,7 @@ def domain() -> PlanningDomain:
 
 
 def world(items: int) -> KnowledgeBase:
-    """What the robot knows when it has seen everything and stands at the operator's."""
+    """Return the knowledge of a robot at the operator's place that has seen all items."""
     kinds, facts = _kinds(items), []
     for item, kind in kinds.items():
         facts += [fact("lies-at", item, "table"), fact("graspable", item), fact("seen", item)]
@@ -42,7 +42,7 @@ def world(items: int) -> KnowledgeBase:
 
 
 def problem_text(items: int) -> str:
-    """The same as PDDL, for planners that read that; the goal without a quantifier, which not all of them do."""
+    """Return the same as a PDDL problem; its goal has no quantifier, which some planners lack."""
     known, kinds = world(items), _kinds(items)
     objects = " ".join(f"{name} - {kind}" for name, kind in {**_PLACES, **kinds}.items())
     init = "\n".join(str(one) for one in known.facts() if isinstance(one, Fact))

@@ -1,7 +1,8 @@
-"""Thousands of simulated runs of the clean-up table with faults and crashes: does every promise hold in each?
+"""The soak: thousands of simulated runs of the clean-up table with faults and crashes, each checked for every promise.
 
-`python benchmarks/soak.py --runs N --first SEED --faults P` lives runs of the seeds SEED to SEED + N - 1, on all cores.
-What is drawn from a seed is in `soak_run`. Exit status 1 if a promise was broken, with the command that shows it again.
+`python benchmarks/soak.py --runs N --first SEED --faults P` runs the seeds SEED to SEED + N - 1, on all cores.
+`soak_run` draws faults and crashes from the seed. Exit status 1 if a run broke a promise, with the command to repeat
+it.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from soak_judge import PROMISES
 from soak_run import Outcome, Planners, Trial
 
 TOLD_EVERY = 1000
-"""Runs."""
+"""Number of runs between two progress lines."""
 SHOWN = 10
-"""Seeds that are named one by one."""
-MEMORY = Path("/dev/shm")  # noqa: S108  files in memory where there are such: no run waits for a disk
+"""Maximum number of seeds in the summary."""
+MEMORY = Path("/dev/shm")  # noqa: S108  files in memory where possible, so that no run waits for a disk
 _planners: Planners | None = None
 
 
@@ -56,7 +57,7 @@ def main() -> None:
 
 
 def tell_progress(lived: int, runs: int, seconds: float) -> None:
-    """On a terminal at once, in a file now and then."""
+    """Print the progress after each run on a terminal, periodically in a file."""
     if sys.stderr.isatty():
         print(f"\r{lived} of {runs}", end="\n" if lived == runs else "", file=sys.stderr)
     elif lived % TOLD_EVERY == 0:
@@ -64,10 +65,10 @@ def tell_progress(lived: int, runs: int, seconds: float) -> None:
 
 
 def prepare() -> None:
-    """What a process has for all its runs."""
+    """Prepare a process for all its runs."""
     global _planners  # noqa: PLW0603  one for each process, which ends them with itself
     _planners = Planners()
-    gc.freeze()  # what is there stays
+    gc.freeze()  # present objects stay
     gc.set_threshold(20_000)
 
 
@@ -78,7 +79,7 @@ def lived(seed: int, chance: float) -> Outcome:
 
 
 def summary(outcomes: list[Outcome]) -> list[str]:
-    """Counts over all runs, and how often each promise was broken."""
+    """Return counts over all runs, and the number of violations of each promise."""
     broken = Counter(promise for one in outcomes for promise in {promise for promise, _ in one.wrong})
     counts = {
         "outcomes": Counter(one.how for one in outcomes),
@@ -91,7 +92,7 @@ def summary(outcomes: list[Outcome]) -> list[str]:
 
 
 def commit() -> str:
-    """Of the checkout, marked if something in it is different."""
+    """Return the commit of the checkout, marked if a file differs from it."""
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12"]
     found = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
     return found.stdout.strip() or "unknown"

@@ -1,4 +1,4 @@
-"""What must hold of every run of the soak, each under its name, and the truth that it is judged by."""
+"""The promises that each run of the soak must keep, by name, and the true state to compare the run with."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from knowledge_base.facts import Delta, Fact, fact
 NO_REPORT, TWICE, NOT_SO, FALSE_CLAIM = "no report", "executed twice", "knowledge is not so", "false claim"
 HANGS, HISTORY, AFTER_STOP = "hangs", "another history", "acts after a stop"
 PROMISES = (TWICE, NOT_SO, FALSE_CLAIM, NO_REPORT, HANGS, HISTORY, AFTER_STOP)
-"""Names of all that must hold."""
+"""The names of all promises."""
 LONGEST = 6 * 3600.0
-"""Seconds of run time that a table may take."""
+"""Maximum seconds of run time for a table."""
 PREDICATES = ("robot-at", "hand-free", "holding", "inside", "lies-at", "disposed", "missing")
 STOPPED = ("stopped",)
-"""The configuration in which the operator's stop is obeyed."""
+"""The configuration after the operator's stop."""
 
 
 def invariants(world: TableWorld, library: Library | None, *, replayed: bool) -> Iterator[tuple[str, Invariant]]:
-    """What a run must be like that has led to that world."""
+    """Yield the invariants of a run that has led to that world, each with its promise."""
     cleared = all(item.disposed for item in world.items if item.seen)
     yield NO_REPORT, comes_to_an_end(LONGEST)
-    yield TWICE, executed_once(list(world.done))  # the world refuses to do an id twice: what is found are foreign ones
+    yield TWICE, executed_once(list(world.done))  # the world ignores a repeated id, so this finds foreign ones
     yield HISTORY, one_history
     if replayed:
         yield HISTORY, replays(library)
@@ -50,7 +50,7 @@ def invariants(world: TableWorld, library: Library | None, *, replayed: bool) ->
 
 
 def knows_what_it_was_told(world: TableWorld) -> Invariant:
-    """How the robot is itself, and of each item where it was told that it is: that, and nothing else."""
+    """Return the invariant that the robot knows exactly its own state and the reported place of each item."""
 
     def invariant(run: KeptRun) -> Iterable[str]:
         told = Told(run, world)
@@ -61,19 +61,19 @@ def knows_what_it_was_told(world: TableWorld) -> Invariant:
 
 
 def itself(world: TableWorld) -> Iterator[Fact]:
-    """What the robot knows of itself."""
+    """Yield the facts that the robot must know about itself."""
     yield fact("robot-at", world.robot_at)
     if world.items.held is None:
         yield fact("hand-free")
 
 
 def says_all_is_clear(run: KeptRun) -> bool:
-    """Whether the robot has told the operator so."""
+    """Return whether the robot has announced success to the operator."""
     return any(one.data["chosen"] == "announce_success" for one in run.records if one.type == "decision")
 
 
 def stands_still(run: KeptRun) -> Iterable[str]:
-    """While the operator's stop is obeyed, nothing that was started goes on and nothing is started."""
+    """Yield skills that run on, or start, after the operator's stop."""
     going_on: dict[str, str] = {}
     for step in run.steps:
         for record in step.records:
@@ -84,22 +84,22 @@ def stands_still(run: KeptRun) -> Iterable[str]:
         if step.message.get("final"):
             going_on.pop(step.message["action"], None)
         if step.configuration == STOPPED:
-            yield from (f"{skill} goes on at second {step.time:g}" for skill in going_on.values())
+            yield from (f"{skill} still runs at second {step.time:g}" for skill in going_on.values())
 
 
 def ended_stopped(run: KeptRun) -> bool:
-    """Whether nobody has let it go on after a stop."""
+    """Return whether the run ended in the operator's stop."""
     return len(run.steps) > 1 and run.steps[-1 if run.ended is None else -2].configuration == STOPPED
 
 
 def wrong_report(report: Report, world: TableWorld, *, stopped: bool, plain: bool) -> Iterator[str]:
-    """What a report says that is not so.
+    """Yield the false statements of a report.
 
     Args:
-        report: of the run.
-        world: what has become of it.
+        report: the report of the run.
+        world: the world after the run.
         stopped: whether an operator has ended the run.
-        plain: whether nothing else but a permanent fault has kept the robot from anything.
+        plain: whether only permanent faults may have kept the robot from its goal.
     """
     if report.goal_reached and not world.goal_reached:
         yield "the report says that the goal is reached"
@@ -116,9 +116,9 @@ def wrong_report(report: Report, world: TableWorld, *, stopped: bool, plain: boo
 
 
 def said_by_others(world: TableWorld, sequencer: Sequencer) -> list[Delta]:
-    """What somebody who saw it could say: where an item is, rather of one that somebody has moved.
+    """Return possible external observations: the place of an item, preferably of a moved one.
 
-    Not of what the robot handles at the moment: who of the two sees it last would be anybody's guess.
+    Items that the robot handles at the moment are excluded, since the order of the two observations is undefined.
     """
     handled = {str(value) for start in sequencer.dispatcher.started() for value in start.arguments.values()}
     known = [item for item in world.items if sequencer.knowledge.type_of(item.name) is not None]

@@ -1,4 +1,4 @@
-"""One simulated run of the clean-up table with faults and crashes, drawn from its seed, and what must hold of it."""
+"""One simulated run of the clean-up table with seeded faults and crashes, and the check of its promises."""
 
 from __future__ import annotations
 
@@ -45,47 +45,47 @@ from planning.engines.cache import CachingPlanner
 from planning.testing import FaultyPlanner
 
 MOST_STEPS = 5_000
-"""Macrosteps of one life."""
+"""Maximum number of macrosteps of one life."""
 A_HANG = 120
-"""Seconds of real time after which a run is one."""
+"""Seconds of real time after which a run counts as hanging."""
 DEFAULT_EVERY = 100
-"""One table in so many is the default one; the others are small."""
+"""One table in this number is the default one; the others are small."""
 INTERLEAVED = 0.5
-"""Share of the runs in which the order of what comes at one moment is shuffled."""
+"""Share of the runs with a shuffled order of simultaneous messages."""
 RESTARTS = 0.5
-"""Share of the runs in which the operator lets the robot go on after a stop."""
+"""Share of the runs in which the operator lets the robot continue after a stop."""
 CRASHES = 0.015
 """Chance of a crash at each boundary."""
 UNTIL_RESTART = 60.0
-"""Seconds after a stop when the operator lets the robot go on."""
+"""Seconds from a stop until the operator lets the robot continue."""
 REMEMBERED = 2_000
-"""Problems whose plans are: small tables are alike."""
+"""Number of problems with cached plans: small tables are alike."""
 PLAIN = frozenset({Fault.KNOWLEDGE_CHANGED, Fault.ANSWER_LATE, Fault.ANSWER_TWICE, Fault.INTERRUPTED})
-"""What does not keep the robot from anything."""
+"""Faults that keep the robot from no goal."""
 
 _TABLES: tuple[tuple[int, int, tuple[str, ...]], ...] = (
     (1, 0, ()), (1, 0, ()), (1, 0, ()), (0, 1, ()), (0, 1, ()), (0, 0, ("small",)), (2, 0, ()), (2, 0, ()), (1, 1, ()),
     (0, 1, ("small",)), (0, 1, ("large",)), (1, 1, ("small",)), (2, 1, ()), (0, 2, ("large",)), (2, 1, ("small",)),
 )  # fmt: skip
-"""Cups, cans and crisp cans; what is small comes more often."""
+"""Cups, cans and crisp cans; small tables come more often."""
 
 
 class HangError(SystemExit):
-    """A run goes on and on; asyncio lets this out of whatever is at work, and nobody catches it on the way."""
+    """A run that hangs; asyncio does not catch a `SystemExit`, so that it ends the run."""
 
 
 @dataclass(slots=True)
 class Outcome:
-    """What came of a run.
+    """The result of a run.
 
     Attributes:
-        seed: of everything in it.
-        how: `goal reached`, `something left`, `stopped` or `ended early`; `no report` if there is none.
-        lives: how often the program was begun.
-        steps: macrosteps.
-        faults: how often each fault fired.
-        crashes: how often the program died where.
-        wrong: what must not be, as (which promise, what was seen).
+        seed: the seed of everything in it.
+        how: `goal reached`, `something left`, `stopped` or `ended early`; `no report` without a report.
+        lives: number of starts of the program.
+        steps: number of macrosteps.
+        faults: number of times that each fault fired.
+        crashes: number of crashes at each boundary.
+        wrong: the violations, each as promise and finding.
     """
 
     seed: int
@@ -98,7 +98,7 @@ class Outcome:
 
 
 class Planners:
-    """A warm planner for the program that runs, and one for the program that takes over from it meanwhile."""
+    """A warm planner for the running program, and one for the program that replaces it meanwhile."""
 
     def __init__(self) -> None:
         self._first = CachingPlanner(PlannerProcess(), REMEMBERED)
@@ -116,12 +116,12 @@ class Trial:
     """A run from its seed.
 
     Args:
-        seed: of table, faults, crashes and, in half of the runs, the order of what comes at one moment.
-        chance: of a fault per skill call.
-        planners: of this process.
+        seed: seed of table, faults, crashes and, in half of the runs, the order of simultaneous messages.
+        chance: chance of a fault per skill call.
+        planners: the planners of this process.
         folder: for the files.
         replayed: whether the run is replayed as well, which takes half as long as the run.
-        interleaved: whether the order is shuffled; if left out, the seed says so.
+        interleaved: whether the order is shuffled; by default the seed decides.
     """
 
     def __init__(
@@ -148,9 +148,9 @@ class Trial:
                 self._judge(report)
         except HangError as error:
             outcome.wrong.append((HANGS, str(error)))
-        except DamagedStoreError as error:  # nobody has damaged it: two programs have written two histories
+        except DamagedStoreError as error:  # without injected damage, two programs have written two histories
             outcome.wrong.append((HISTORY, str(error)))
-        except Exception as error:  # noqa: BLE001  whatever it is, the seed is worth a look
+        except Exception as error:  # noqa: BLE001  any error makes the seed notable
             if isinstance(error.__cause__, HangError):  # raised by an observer, whose errors are contained
                 outcome.wrong.append((HANGS, str(error.__cause__)))
             else:
@@ -163,12 +163,12 @@ class Trial:
         return outcome
 
     def _live(self, folder: Path) -> Report | None:
-        """Begin the run, or go on with it; `None` if it is over and only its report has not been heard."""
+        """Start or resume the run; return `None` if it is over and only its report was lost."""
         store, planner = folder / "run.kb", FaultyPlanner(self._planners.mine(), self._faults, self._crashes.reached)
         if not has_run(store):
             table = deploy(scenario(self._seed), self._seed, self._chance, planner, store=store)
         else:
-            with kept_run(store) as run:  # as it was left by a program that has died
+            with kept_run(store) as run:  # as the crashed program left it
                 self.outcome.wrong += [(TWICE, wrong) for wrong in executed_once(done(store))(run)]
                 if run.ended is not None:
                     return None
@@ -204,7 +204,7 @@ class Trial:
         interleaving.turned = 0
 
     def _judge(self, report: Report | None) -> None:
-        """What is in the files after the last life, against what has become of the world."""
+        """Compare the files after the last life with the world."""
         outcome, store = self.outcome, self._crashes.folder / "run.kb"
         world = DurableWorld.open(beside(store))
         world.close()
@@ -225,10 +225,10 @@ class Trial:
 
 
 class ObeyedStop:
-    """Sees that the robot does nothing while it is to stand still.
+    """Checks that the robot executes no action during the operator's stop.
 
     Attributes:
-        problems: what it did all the same.
+        problems: actions executed during a stop.
     """
 
     def __init__(self) -> None:
@@ -237,17 +237,17 @@ class ObeyedStop:
         self._life = object()
 
     def resumed(self, configuration: tuple[str, ...]) -> None:
-        """A program goes on where another was; what that had not committed has not been."""
+        """Resume after a crash; uncommitted changes of the crashed program do not count."""
         if configuration != STOPPED:
             self._done = None
 
     def watch(self, sequencer: Sequencer, table: CleanUpTable, *, restarts: bool) -> None:
-        """Look at each macrostep; an operator who `restarts` lets the robot go on after a while."""
+        """Check each macrostep; an operator who `restarts` lets the robot continue after a while."""
         life = self._life = object()
 
         def look(_: Step) -> None:
             if life is not self._life:
-                return  # a program that another has overtaken
+                return  # another program has replaced this one
             stands = sequencer.machine.state.configuration() == STOPPED
             table.world.catch_up()
             if not stands:
@@ -261,13 +261,13 @@ class ObeyedStop:
         sequencer.listen(look)
 
     def judge(self, done: set[str]) -> None:
-        """What has been done by now, against what had been done when it was told to stop."""
+        """Compare the executed actions with those at the stop."""
         if self._done is not None and done > self._done:
             self.problems.append(f"{', '.join(sorted(done - self._done))} were executed after the stop")
 
 
 def scenario(seed: int) -> Scenario:
-    """The table of a seed."""
+    """Return the table of a seed."""
     if seed % DEFAULT_EVERY == 0:
         return Scenario.default()
     cups, cans, crisp_cans = choose(seed, "table", "items", _TABLES)
@@ -275,7 +275,7 @@ def scenario(seed: int) -> Scenario:
 
 
 def done(store: Path) -> list[str]:
-    """What the robot has executed, by action id."""
+    """Return the ids of the executed actions."""
     world = DurableWorld.open(beside(store))
     world.close()
     return list(world.done)
@@ -283,13 +283,13 @@ def done(store: Path) -> list[str]:
 
 @contextmanager
 def no_longer_than(seconds: int) -> Iterator[None]:
-    """Raises `HangError` inside when it takes longer, of real time; in a process's main thread."""
+    """Raise `HangError` in the block after `seconds` of real time; only in a process's main thread."""
 
     def hang(*_: object) -> None:
-        raise HangError(f"it still goes on after {seconds} s")
+        raise HangError(f"it still runs after {seconds} s")
 
     before = signal.signal(signal.SIGALRM, hang)
-    signal.setitimer(signal.ITIMER_REAL, seconds, seconds / 10)  # again, if somebody did not hear it
+    signal.setitimer(signal.ITIMER_REAL, seconds, seconds / 10)  # again, if an error handler caught the first one
     try:
         yield
     finally:

@@ -1,7 +1,7 @@
-"""What the robot has been told of each item, worked out beside its knowledge.
+"""The reported place of each item, derived independently of the robot's knowledge.
 
-It is worked out from what the world did, never from what the robot made of it. So the robot's knowledge can be judged
-exactly, also that of items which others have moved since.
+The world's results are the source, never the robot's conclusions. The robot's knowledge can therefore be compared
+exactly, also for items that other people have moved since.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from dsc.trace import Record
 from knowledge_base.facts import Fact, fact
 
 _PLACED = {"put_down": "surface", "stacked": "carrier", "slipped": "surface"}
-"""Which attribute of a result says where the item is now."""
+"""The attribute of a result with the item's new place."""
 
 
 class Told:
-    """The robot's items as it was told of them, message by message of a run.
+    """The reported places of items, derived message by message from a run.
 
     Args:
-        run: what was taken, in order.
-        world: what became of each action, by its id.
+        run: the kept run, with its messages in order.
+        world: the world, with the result of each action by its id.
 
     Attributes:
-        where: a surface, a carrier, the hand or a destination by item; `None` if it was not where it was last.
-        missing: items that were not found where they had been.
-        stale: items that others have moved since the robot was told of them.
+        where: a surface, a carrier, the hand or a destination by item; `None` if it was missing at its last place.
+        missing: items that were not found at their last place.
+        stale: items that other people have moved since the last report.
     """
 
     def __init__(self, run: KeptRun, world: TableWorld) -> None:
@@ -54,7 +54,7 @@ class Told:
                 self.stale.update(items)
 
     def expected(self) -> Iterator[Fact]:
-        """What the robot has to know of the items, in the domain's predicates."""
+        """Yield the facts about the items that the robot must know, in the domain's predicates."""
         for item, where in self.where.items():
             if item in self.missing:
                 yield fact("missing", item)
@@ -68,14 +68,14 @@ class Told:
                 yield fact("inside", item, where)
 
     def untrue(self) -> Iterator[str]:
-        """What it was told, and is not so, though nobody has moved the item since."""
+        """Yield reports that are false although no other person has moved the item since."""
         for item, where in self.where.items():
             is_at = self._world.items[item].where
             if item not in self.missing | self.stale and where != is_at:
                 yield f"it was told that {item} is at {where}, and it is at {is_at}"
 
     def _take(self, message: Mapping[str, Any], *, compared: bool) -> str | None:
-        """The id of the action whose answer it is, if it is one that the world gave."""
+        """Return the id of the action that the message answers, if the world executed it."""
         match message:
             case {"late": _, "message": inner}:
                 return self._take(inner, compared=compared)
@@ -110,7 +110,7 @@ class Told:
                 self._is_lost(said["item"])
 
     def _looked(self, result: Result, surface: str, *, compared: bool) -> None:
-        """Sightings are known however late the answer comes; an item is missed only while a plot compares."""
+        """Take the sightings of a look; items are missing only if a plot compares the look with its knowledge."""
         seen = {one.item: one.where for one in result.sightings}
         for item in [item for item in self.where if item not in seen and self._outermost(item) == surface]:
             if compared:
@@ -119,9 +119,9 @@ class Told:
             self._is_at(item, where)
 
     def _conclude(self, added: Iterable[list[str]], *, compared: bool) -> None:
-        """What the plots themselves make of it: they may give up an item that was looked for in vain.
+        """Take the plots' conclusions: an item may be missing after a vain search.
 
-        What they make of a look is worked out here as well, but for items in what was missing before.
+        Conclusions from a look are derived here too, except for items in a carrier that was missing before.
         """
         for item in (one[1] for one in added if one[0] == "missing"):
             if not compared or self.where.get(item) in self.missing:
@@ -133,7 +133,7 @@ class Told:
         self.stale.discard(item)
 
     def _is_lost(self, item: str) -> None:
-        """What is in another item is still in it, wherever that may be."""
+        """Mark the item as missing; items in it stay in it."""
         self.missing.add(item)
         if self.where.get(item) in SURFACES:
             self.where[item] = None
@@ -144,6 +144,6 @@ class Told:
 
 
 def _compares(record: Record) -> bool:
-    """Whether a plot takes the answer of a look."""
+    """Return whether a plot compares the answer of a look."""
     steps = record.data["microsteps"] if record.type == "step" else ()
     return any(one["event"] == "recognised" and one["taken"] for one in steps)

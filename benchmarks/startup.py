@@ -1,4 +1,4 @@
-"""What `dsc --help` costs next to a bare interpreter, as the median ratio of runs taken in turn."""
+"""The cost of `dsc --help` next to a bare interpreter, as the median ratio of runs taken in turn."""
 
 import statistics
 import subprocess
@@ -19,7 +19,7 @@ def seconds(command):
 
 def main():
     for command in (BARE, HELP):
-        seconds(command)  # the file cache is warm from here on
+        seconds(command)  # warms the file cache
     pairs = [(seconds(BARE), seconds(HELP)) for _ in range(RUNS)]
     bare, helped = (statistics.median(column) for column in zip(*pairs, strict=True))
     ratio = statistics.median(h / b for b, h in pairs)

@@ -1,4 +1,4 @@
-"""Jobs timed in turn, round by round, so that whatever else the machine does hits all of them."""
+"""Jobs timed in turn, round by round, so that other load of the machine affects all of them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What is timed.
+    """A timed job.
 
     Attributes:
-        run: does it.
-        timed: whether `run` returns its seconds, without what is paid once however often it runs.
-        units: events (or whatever is counted) for each time.
-        prepare: number of times -> what `run` gets; not timed.
+        run: runs the job.
+        timed: whether `run` returns its seconds, without costs that do not depend on the number of times.
+        units: events, or other units, for each time.
+        prepare: number of times -> the argument of `run`; not timed.
     """
 
     run: Callable[[Any], Any]
@@ -27,14 +27,14 @@ class Job:
     timed: bool = False
 
     def seconds(self, times: int) -> float:
-        """How long that many times take."""
+        """Return the seconds of that many times."""
         prepared = self.prepare(times)
         start = time.perf_counter()
         seconds = self.run(prepared)
         return seconds if self.timed else time.perf_counter() - start
 
     def times(self, seconds: float) -> int:
-        """How often it runs in about that many seconds; at least once."""
+        """Return the number of times that take about that many seconds; at least one."""
         times = 1
         while (taken := self.seconds(times)) < seconds / 4:
             times *= 2
@@ -43,7 +43,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How many rounds, and how many seconds each job gets in each."""
+    """Number of rounds, and seconds of each job in a round."""
 
     rounds: int
     seconds: float
@@ -54,18 +54,18 @@ Figures = dict[str, list[float]]
 
 
 def measure(jobs: Mapping[str, Job], pace: Pace) -> Figures:
-    """All jobs in every round; who begins changes from round to round."""
+    """Return the figures of all jobs in every round; each round begins with another job."""
     times = {name: job.times(pace.seconds) for name, job in jobs.items()}
     figures: Figures = {name: [] for name in jobs}
     for number in range(pace.rounds):
         names = list(jobs)
         first = number % len(names)
         for name in names[first:] + names[:first]:
-            gc.collect()  # nobody pays for what others left behind
+            gc.collect()  # so that no job pays for another's garbage
             figures[name].append(jobs[name].seconds(times[name]) / times[name] / jobs[name].units)
     return figures
 
 
 def ratio(figures: Figures, one: str, other: str) -> float:
-    """How many times as long one takes as the other: the median of the rounds."""
+    """Return the ratio of the times of two jobs: the median of the rounds."""
     return statistics.median(a / b for a, b in zip(figures[one], figures[other], strict=True))

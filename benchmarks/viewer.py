@@ -1,6 +1,6 @@
-"""What the page costs: its weight, its layouts, a run that is watched, a long run opened (`make bench-viewer`).
+"""The cost of the page: its size, its layouts, a watched run, and opening a long run (`make bench-viewer`).
 
-Runs that are watched are measured by `watched.py`, layouts and pages by `frontend/bench.mjs`.
+`watched.py` measures watched runs, `frontend/bench.mjs` layouts and pages.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def print_weight() -> None:
-    """Bytes that a browser fetches, compressed, without and with the worker that lays out."""
+    """Print the compressed size of the page in bytes, without and with the layout worker."""
     sizes = {path.name: len(gzip.compress(path.read_bytes())) for path in STATIC.rglob("*") if path.suffix in _FETCHED}
     worker = sizes.pop("elk-worker.min.js")
     print(f"page {sum(sizes.values()) / 1000:.0f} kB compressed, worker for layouts {worker / 1000:.0f} kB")
@@ -48,7 +48,7 @@ _FETCHED = {".html", ".js", ".css", ".svg"}
 
 
 def print_opened() -> None:
-    """A run of 100,000 records in Chromium: until its first moment is drawn, until all of it is there, scrubbing."""
+    """Print times for a run of 100,000 records in Chromium: first moment drawn, all loaded, scrubbing."""
     with tempfile.TemporaryDirectory() as folder:
         trace = Path(folder) / "long.jsonl"
         write_long(trace, RECORDS)
@@ -61,7 +61,7 @@ def print_opened() -> None:
 
 
 def write_long(path: Path, count: int) -> None:
-    """A real run, again and again, numbered on: plots and the world at the start only once."""
+    """Write a real run repeatedly, with consecutive numbers; plots and the initial world appear once."""
     with tempfile.TemporaryFile("w+", encoding="utf-8") as once:
         table = deploy(Scenario.parse(SCENARIO), seed=7, faults=0.2, listener=write_to(once))
         with table.executive:
@@ -88,7 +88,7 @@ def _numbered(real: list[dict[str, Any]], again: list[dict[str, Any]], count: in
 
 
 def node(*arguments: str) -> dict[str, float]:
-    """What `frontend/bench.mjs` says."""
+    """Return the figures of `frontend/bench.mjs`."""
     command = ["node", str(FRONTEND / "bench.mjs"), *arguments]
     said = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout
     found: dict[str, float] = json.loads(said.splitlines()[-1])

@@ -1,13 +1,14 @@
-"""How much longer runs take when they are watched: the hardest case, runs in simulated time, which never wait.
+"""The slowdown of watched runs, in the hardest case: simulated time, which never waits.
 
-Each round has all numbers of browsers, in turn, and who begins changes from round to round. What counts is the ratio to
-the same runs without a page in the same round: of the time by the clock, and of the computing time of the run's own
-process. Said are the median of the rounds and the interval in which the true median lies in 19 of 20 measurements (sign
-test), so that one sees what can be told apart. All plans are known before, so that nothing but the run is measured; the
-garbage of others is collected before, so that nobody pays for it.
+Each round has each number of browsers in turn, in a rotating order. The figures are ratios to the same runs without a
+page in the same round. They compare real time, and processor time of the run's own process.
 
-Each browser is a process that takes in and reads all records. It has to share two cores with the run, the page, and
-whatever else the machine does, which is said as well.
+The output is the median of the rounds, with the interval that contains the true median in 19 of 20 measurements (sign
+test). All plans are cached before, so that only the run is measured. A garbage collection precedes each run, so that it
+pays for its own objects only.
+
+Each browser is a process that receives and parses all records. It shares two cores with the run, the page, and other
+load of the machine, which the output states.
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ from planning.engines.planner import PlannerProcess
 WATCHED = {"no page": None, "nobody looks": 0, "1 browser": 1, "8 browsers": 8}
 SCENARIO = "table: {cups: 4, cans: 3, crisp_cans: [small, large]}"
 SEEDS = (0, 1, 2, 3) * 2
-"""Runs with faults, one after the other: one alone is too short to be measured."""
+"""Seeds of consecutive runs with faults: one run alone is too short to measure."""
 DOUBT = 1 / 20
 
 
 class Taken(NamedTuple):
-    """Seconds: by the clock, of computing in this process (all threads), and of computing by strangers."""
+    """Seconds: real time, processor time of this process (all threads), and processor time of other processes."""
 
     wall: float
     cpu: float
@@ -51,10 +52,10 @@ class Taken(NamedTuple):
 
 
 def print_watched(rounds: int) -> None:
-    """A line for each number of browsers."""
+    """Print a line for each number of browsers."""
     process = PlannerProcess()
     planner = CachingPlanner(process)
-    runs(planner, None)  # all plans are known from here on
+    runs(planner, None)  # caches all plans
     figures: dict[str, list[Taken]] = {name: [] for name in WATCHED}
     for number in range(rounds):
         first = number % len(WATCHED)
@@ -73,7 +74,7 @@ def print_watched(rounds: int) -> None:
 
 
 def ratios(seconds: list[float], bare: list[float]) -> str:
-    """The median of what each round says, and how far it can be trusted."""
+    """Return the median ratio of the rounds, with its interval."""
     found = sorted(one / other for one, other in zip(seconds, bare, strict=True))
     below = sum(1 for rank in range(1, len(found) // 2) if _chance_below(rank, len(found)) <= DOUBT / 2)
     low, high = found[below], found[-1 - below]
@@ -81,12 +82,12 @@ def ratios(seconds: list[float], bare: list[float]) -> str:
 
 
 def _chance_below(rank: int, count: int) -> float:
-    """That at most so many of the rounds are on one side of the true median."""
+    """Return the probability that at most `rank` rounds are on one side of the true median."""
     return sum(math.comb(count, k) for k in range(rank + 1)) / 2**count
 
 
 def runs_watched(browsers: int | None, planner: Planner) -> Taken:
-    """What the runs take with so many browsers; `None` browsers are runs without a page and without records."""
+    """Return the times of the runs with that number of browsers; `None` means without a page and without records."""
     if browsers is None:
         return runs(planner, None)
     with ExitStack() as stack:
@@ -100,9 +101,9 @@ def runs_watched(browsers: int | None, planner: Planner) -> Taken:
 
 
 def runs(planner: Planner, listener: Listener | None) -> Taken:
-    """All of them, measured without their deployment."""
+    """Return the times of all runs, without their deployment."""
     gc.collect()
-    gc.freeze()  # a run in a process of its own does not have what the runs before have left
+    gc.freeze()  # a run in a separate process would not have objects of earlier runs
     taken = []
     for seed in SEEDS:
         table = deploy(Scenario.parse(SCENARIO), seed, 0.2, planner, listener)
@@ -116,14 +117,14 @@ def runs(planner: Planner, listener: Listener | None) -> Taken:
 
 
 def busy_seconds() -> float:
-    """What all cores together have computed."""
+    """Return the processor time of all cores together."""
     user, nice, system, _idle, _waiting, *interrupts = map(int, Path("/proc/stat").read_text().split()[1:8])
     return (user + nice + system + sum(interrupts)) / 100
 
 
 @contextmanager
 def watching(page: LivePage, count: int) -> Iterator[None]:
-    """So many processes attached, each of which has said that it is."""
+    """Run that number of browser processes, after each has attached."""
     command = [sys.executable, __file__, str(page.port), page.token]
     clients = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(count)]
     try:
@@ -138,12 +139,12 @@ def watching(page: LivePage, count: int) -> Iterator[None]:
 
 
 def opened(port: str, token: str) -> ClientConnection:
-    """A socket as the page opens it."""
+    """Open a socket as the page does."""
     return connect(f"ws://127.0.0.1:{port}/socket?token={token}", origin=f"http://127.0.0.1:{port}", open_timeout=60)
 
 
 def watch(port: str, token: str) -> None:
-    """As a browser: take in all records, and read them."""
+    """Act as a browser: receive all records, and parse them."""
     with opened(port, token) as socket:
         socket.recv()
         socket.send(json.dumps({"want": 1}))

@@ -105,25 +105,28 @@ def dsc(
 @app.command()
 def run(
     world: Annotated[str | None, typer.Argument(help="The ready world to run: clean-up-table.")] = None,
-    scenario: Annotated[Path | None, typer.Option(help="What stands on the table (YAML).")] = None,
-    seed: Annotated[int | None, typer.Option(help="Which faults happen; same seed, same run.")] = None,
+    scenario: Annotated[Path | None, typer.Option(help="The items on the table (YAML).")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the faults; same seed, same run.")] = None,
     faults: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")] = None,
     profile: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE", help="Which robot, and what its parameters are worth (YAML).")
+        str | None, typer.Option(metavar="NAME|FILE", help="The robot and the values of its parameters (YAML).")
     ] = None,
-    real_time: Annotated[bool, typer.Option("--real-time", help="Let time pass as on the wall.")] = False,
+    real_time: Annotated[bool, typer.Option("--real-time", help="Run in real time.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
     trace: Annotated[
         Path | None, typer.Option(help="Write every record to this file (JSON lines); - is standard output.")
     ] = None,
     store: Annotated[Path | None, typer.Option(help="Keep the run in this new file: it can be resumed.")] = None,
-    durability: Annotated[Durability, typer.Option(help="With a store, what the run outlives.")] = Durability.process,
-    resume: Annotated[Path | None, typer.Option(help="Go on with the run that was broken off in this store.")] = None,
+    durability: Annotated[
+        Durability, typer.Option(help="With a store, the events that the run survives.")
+    ] = Durability.process,
+    resume: Annotated[Path | None, typer.Option(help="Resume the interrupted run in this store.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Show it in the browser while it runs.")] = False,
     port: Port = 0,
     no_open: NoOpen = False,
     allow_control: Annotated[
-        bool, typer.Option("--allow-control", help="With --view: the page may hold the run and hand things in.")
+        bool,
+        typer.Option("--allow-control", help="With --view: the page may pause the run, and post events and facts."),
     ] = False,
     no_wait: Annotated[bool, typer.Option("--no-wait", help="With --view: end with the run, not at Ctrl-C.")] = False,
 ) -> None:

@@ -62,9 +62,9 @@ def to_unified(domain: PlanningDomain, world: View, goal: str | Expression, metr
         metric = Metric("minimize", TOTAL_COST)
     others = [f.name for f in domain.schema.functions.values() if f.result != "number"]
     derived = [axiom.predicate for axiom in domain.axioms]
-    for what, names in (("function that is no number", others), ("derived predicate", derived)):
+    for what, names in (("a non-numeric function", others), ("a derived predicate", derived)):
         if names:
-            raise InputError(f"unified-planning's reader knows no {what}, as '{names[0]}' is", found=names[0])
+            raise InputError(f"unified-planning's reader does not support {what}, such as '{names[0]}'", found=names[0])
     texts = domain.to_pddl(), world.to_pddl(domain.name, goal=goal, metric=metric)
     try:
         return PDDLReader().parse_problem_string(*texts)

@@ -1,4 +1,4 @@
-"""What `make bench-kb` compares: ways to keep facts, one file each, behind one interface."""
+"""The contenders of `make bench-kb`: ways to keep facts, one file each, behind one interface."""
 
 from importlib import import_module
 from importlib.util import find_spec
@@ -10,7 +10,7 @@ FILES = {"floor": "", "own": "", "graph": "networkx", "rdf": "rdflib", "oxigraph
 
 
 def contenders() -> list[type[Contender]]:
-    """Everyone who is installed."""
+    """Return the installed contenders."""
     return [
         import_module(f"knowledge.{file}").CONTENDER
         for file, package in FILES.items()

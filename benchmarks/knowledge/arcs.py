@@ -1,4 +1,4 @@
-"""The world that everyone holds: objects with five arcs each, all of them in one hall."""
+"""The world of all contenders: objects with five arcs each, all of them in one hall."""
 
 from __future__ import annotations
 
@@ -17,19 +17,18 @@ AT_ONCE = 1000
 class Arcs:
     """A world of `size` objects, the same each time.
 
-    Each is on one of `size / 10` places, in the hall, near two others, and made by somebody; one door opens
-    the hall.
+    Each object is on one of `size / 10` places, in the hall, near two others, and has a maker; one door opens the hall.
     """
 
     size: int
 
     @property
     def places(self) -> int:
-        """How many places there are."""
+        """Number of places."""
         return self.size // 10
 
     def batches(self) -> Iterator[tuple[list[str], list[Arc]]]:
-        """Things and arcs as they are inserted; what an arc leads to has come before."""
+        """Yield batches of objects and arcs; the objects of an arc come before or with it."""
         fixed = [HALL, DOOR, *(f"p{n}" for n in range(self.places)), *(f"m{n}" for n in range(50))]
         yield fixed, [("opens", DOOR, HALL)]
         for first in range(0, self.size, AT_ONCE):
@@ -37,7 +36,7 @@ class Arcs:
             yield [f"i{n}" for n in numbers], [arc for n in numbers for arc in self.about(n)]
 
     def about(self, n: int) -> list[Arc]:
-        """The arcs of one object."""
+        """Return the arcs of one object."""
         item = f"i{n}"
         return [
             ("on", item, self.place(n)),
@@ -48,5 +47,5 @@ class Arcs:
         ]
 
     def place(self, n: int) -> str:
-        """Where an object is, or where one is moved to."""
+        """Return the place of an object, or the place that it is moved to."""
         return f"p{n % self.places}"

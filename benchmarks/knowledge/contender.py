@@ -1,4 +1,4 @@
-"""What is asked of everyone: take in things and arcs, answer five questions, move a thing."""
+"""The interface of contenders: insert objects and arcs, answer five queries, move an object."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any, ClassVar
 from knowledge.arcs import Arc
 
 Answers = list[dict[str, Any]]
-"""A dictionary from variable to value for each answer, as `KnowledgeBase.query` gives them."""
+"""A dictionary from variable to value for each answer, as `KnowledgeBase.query` returns them."""
 
 
 class Contender(ABC):
-    """One way to keep facts, empty when it is made.
+    """One way to keep facts, initially empty.
 
-    Names are given to it and come back as it wants to have them (`term`), which is not timed.
+    Its methods take and return names in its own form (`term`); the conversion is not timed.
 
     Attributes:
         name: the column of the table.
-        package: the distribution whose version is printed; empty for code of our own and Python's.
-        most: how many objects it is asked to hold at most, because more take too long.
+        package: the distribution with the version to print; empty for this project's and Python's code.
+        most: maximum number of objects, because more take too long.
     """
 
     name: ClassVar[str]
@@ -30,46 +30,46 @@ class Contender(ABC):
 
     @classmethod
     def version(cls) -> str:
-        """The installed version; empty for code of our own."""
+        """Return the installed version; empty for this project's code."""
         return version(cls.package) if cls.package else ""
 
     @classmethod
     def is_peer(cls) -> bool:
-        """Whether somebody else wrote it."""
+        """Return whether another project wrote it."""
         return cls.name not in {"floor", "this engine"}
 
     def term(self, name: str) -> Any:
-        """The name as an argument and in answers."""
+        """Return the name as an argument and in answers."""
         return name
 
     def name_of(self, term: Any) -> str:
-        """The name that a term stands for."""
+        """Return the name of a term."""
         return str(term)
 
     @abstractmethod
     def insert(self, things: Iterable[str], arcs: Iterable[Arc]) -> None:
-        """All of that in one transaction."""
+        """Insert all of them in one transaction."""
 
     @abstractmethod
     def point(self, item: Any, place: Any) -> bool:
-        """`(on item place)`?"""
+        """Answer `(on item place)`."""
 
     @abstractmethod
     def pattern(self, place: Any) -> Answers:
-        """`(on ?x place)`."""
+        """Answer `(on ?x place)`."""
 
     @abstractmethod
     def rare(self, hall: Any) -> Answers:
-        """`(opens ?x hall)`, one match, when the hall has many arcs of another kind."""
+        """Answer `(opens ?x hall)`: one match, while the hall has many arcs of another kind."""
 
     @abstractmethod
     def inside(self, hall: Any, item: Any) -> Answers:
-        """`(and (in ?x hall) (near ?x item))`: few of the many things in the hall."""
+        """Answer `(and (in ?x hall) (near ?x item))`: few of the many objects in the hall."""
 
     @abstractmethod
     def join(self, place: Any) -> Answers:
-        """`(and (on ?x place) (near ?x ?y))`."""
+        """Answer `(and (on ?x place) (near ?x ?y))`."""
 
     @abstractmethod
     def move(self, item: Any, old: Any, new: Any) -> None:
-        """`(on item old)` gives way to `(on item new)`, in one transaction."""
+        """Replace `(on item old)` by `(on item new)`, in one transaction."""

@@ -1,4 +1,4 @@
-"""The least that an index of facts does, written by hand: sets of arguments, by predicate and by each argument."""
+"""The floor: a minimal hand-written index of facts, with sets of arguments by predicate and by each argument."""
 
 from collections.abc import Iterable
 
@@ -9,7 +9,7 @@ Args = tuple[str, ...]
 
 
 class Index:
-    """Facts of any predicate; what is empty is taken away."""
+    """Facts of any predicate; empty sets are removed."""
 
     def __init__(self) -> None:
         self.facts: dict[str, set[Args]] = {}
@@ -30,14 +30,14 @@ class Index:
 
 
 class Floor(Contender):
-    """Comprehensions over the index; nothing is checked, kept, told or locked."""
+    """Comprehensions over the index, without checks, history, notifications or locks."""
 
     name = "floor"
 
     def __init__(self) -> None:
         self.index = Index()
 
-    def insert(self, things: Iterable[str], arcs: Iterable[Arc]) -> None:  # noqa: ARG002  it does not know things
+    def insert(self, things: Iterable[str], arcs: Iterable[Arc]) -> None:  # noqa: ARG002  it has no objects
         for kind, one, other in arcs:
             self.index.add(kind, (one, other))
 

@@ -1,4 +1,4 @@
-"""How much memory facts take: what a process has more of when it holds them, whatever language keeps them."""
+"""Memory of facts: the growth of a process that inserts them, in any language."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _CODE = "import sys; sys.path[:0] = [sys.argv[1]]; from knowledge.footprint impo
 
 
 def bytes_a_fact(name: str, size: int) -> float | None:
-    """What a process of its own measures; `None` where the system does not say."""
+    """Return the bytes a fact, measured by a separate process; `None` where the system has no figures."""
     if not _PAGES.exists():
         return None
     command = [sys.executable, "-c", _CODE, str(Path(__file__).parents[1]), name, str(size)]
@@ -24,7 +24,7 @@ def bytes_a_fact(name: str, size: int) -> float | None:
 
 
 def main(name: str, size: str) -> None:
-    """Print the bytes that a fact takes; names made as text count for none, for all start with the same ones."""
+    """Print the bytes a fact; the text of names does not count, since all contenders start with it."""
     arcs = Arcs(int(size))
     batches = list(arcs.batches())
     one = next(kind for kind in contenders() if kind.name == name)()

@@ -9,7 +9,7 @@ from knowledge.contender import Answers, Contender
 
 
 class Graph(Contender):
-    """Arcs are found by node, whatever their kind; joins are loops that begin where few arcs are."""
+    """Arcs are indexed by node but not by kind; joins are loops that begin at the node with few arcs."""
 
     name = package = "networkx"
 

@@ -1,4 +1,4 @@
-"""This knowledge base: questions prepared once, and the same with their text each time."""
+"""This knowledge base: prepared queries, and the same as text each time."""
 
 from collections.abc import Iterable
 
@@ -13,7 +13,7 @@ SCHEMA = Schema.parse(
 
 
 class Own(Contender):
-    """Prepared questions and `kb.apply` of a knowledge base in memory."""
+    """Prepared queries and `kb.apply` of a knowledge base in memory."""
 
     name = "this engine"
     package = "dynamic-state-charts"

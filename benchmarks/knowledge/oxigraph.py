@@ -1,4 +1,4 @@
-"""pyoxigraph: a store in memory, asked by patterns; loops over them are faster here than its SPARQL."""
+"""pyoxigraph: a store in memory, queried by patterns; loops over them are faster here than its SPARQL."""
 
 from collections.abc import Iterable
 
@@ -12,7 +12,7 @@ ON, IN, NEAR, OPENS = (NamedNode(BASE + kind) for kind in ("on", "in", "near", "
 
 
 class Oxigraph(Contender):
-    """`quads_for_pattern` and `in`."""
+    """Queries by `quads_for_pattern` and `in`."""
 
     name = package = "pyoxigraph"
 
@@ -25,7 +25,7 @@ class Oxigraph(Contender):
     def name_of(self, term: NamedNode) -> str:
         return term.value.removeprefix(BASE)
 
-    def insert(self, things: Iterable[str], arcs: Iterable[Arc]) -> None:  # noqa: ARG002  only triples are known
+    def insert(self, things: Iterable[str], arcs: Iterable[Arc]) -> None:  # noqa: ARG002  only triples are stored
         node = NamedNode
         self.store.extend(Quad(node(BASE + one), node(BASE + kind), node(BASE + other)) for kind, one, other in arcs)
 

@@ -1,4 +1,4 @@
-"""The questions that everyone is asked, and what it costs to take the facts in, change and hold them."""
+"""The queries of all contenders, and the costs of inserting, changing and holding the facts."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ UNITS = {"µs": 1e6, "ms": 1e3, "s": 1}
 
 
 def question_rows(everyone: list[type[Contender]], size: int, pace: Pace) -> list[Row]:
-    """One row for each case, all of them on worlds of that size."""
+    """Return one row for each case, all of them on worlds of that size."""
     arcs, about = Arcs(size), f"{size:,} objects"
     able = [kind for kind in everyone if kind.most >= size]
     worlds, seconds = _filled(able, arcs)
-    gc.freeze()  # so that nobody pays for collecting the worlds of all
+    gc.freeze()  # so that no contender pays for a collection of all worlds
     rows = [compared(f"insert, {about}", seconds)]
     for case, (method, words) in CASES.items():
         asked = [words(arcs, n) for n in islice((n * 7919 % size for n in count(1)), ASKED)]
@@ -48,7 +48,7 @@ def question_rows(everyone: list[type[Contender]], size: int, pace: Pace) -> lis
 
 
 def compared(case: str, figures: Figures, bound: float | None = None, unit: str = "µs") -> Row:
-    """Everyone next to the floor, and how far ahead of the fastest peer this engine is."""
+    """Return the row of all contenders with their ratios to the floor, and the engine's lead over the fastest peer."""
     cells = {
         name: Cell(UNITS[unit] * median(each), None if name == FLOOR else ratio(figures, name, FLOOR))
         for name, each in figures.items()
@@ -60,7 +60,7 @@ def compared(case: str, figures: Figures, bound: float | None = None, unit: str 
 
 
 def _by_text(case: str, floor: Contender, own: Contender, method: str, asked: list[tuple[str, ...]], pace: Pace) -> Row:
-    """What it takes to give the text of a question each time."""
+    """Return the row of a query given as text each time."""
     jobs = {FLOOR: _asking(floor, method, asked), ENGINE: _asking(own, f"{method}_by_text", asked)}
     figures = measure(jobs, pace)
     cells = {name: Cell(1e6 * median(each)) for name, each in figures.items()}
@@ -69,7 +69,7 @@ def _by_text(case: str, floor: Contender, own: Contender, method: str, asked: li
 
 
 def _filled(everyone: list[type[Contender]], arcs: Arcs) -> tuple[dict[str, Contender], Figures]:
-    """All worlds, and the seconds for a fact that it took."""
+    """Return all worlds, and their seconds for each fact."""
     worlds: dict[str, Contender] = {}
     seconds: Figures = {}
     for kind in everyone:
@@ -92,7 +92,7 @@ def _asking(one: Contender, method: str, asked: list[tuple[str, ...]]) -> Job:
 
 
 def _agree(case: str, worlds: Any, method: str, asked: list[tuple[str, ...]]) -> None:
-    """Everyone has the same answers, which are not all empty."""
+    """Check that all contenders give the same answers, some of them not empty."""
     said = {one.name: [_plain(one, getattr(one, method)(*map(one.term, words))) for words in asked] for one in worlds}
     for name, answers in said.items():
         assert answers == said[FLOOR], (case, name)
@@ -106,7 +106,7 @@ def _plain(one: Contender, answers: Any) -> Any:
 
 
 def _moving(one: Contender, arcs: Arcs) -> Job:
-    """Each thing moves to the next place, and on when its turn comes again."""
+    """Return a job in which each object moves to the next place, round by round."""
     steps = ((n, lap) for lap in count() for n in range(arcs.size))
 
     def moves(times: int) -> list[tuple[Any, ...]]:

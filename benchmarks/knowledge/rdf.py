@@ -1,4 +1,4 @@
-"""rdflib: a graph in its default store, asked by patterns; loops over them are faster than its SPARQL."""
+"""rdflib: a graph in its default store, queried by patterns; loops over them are faster than its SPARQL."""
 
 from collections.abc import Iterable
 
@@ -12,7 +12,7 @@ ON, IN, NEAR, OPENS = (URIRef(BASE + kind) for kind in ("on", "in", "near", "ope
 
 
 class Rdf(Contender):
-    """`subjects`, `objects` and `in`."""
+    """Queries by `subjects`, `objects` and `in`."""
 
     name = package = "rdflib"
     most = 10_000
@@ -26,7 +26,7 @@ class Rdf(Contender):
     def name_of(self, term: URIRef) -> str:
         return term.removeprefix(BASE)
 
-    def insert(self, things: Iterable[str], arcs: Iterable[Arc]) -> None:  # noqa: ARG002  only triples are known
+    def insert(self, things: Iterable[str], arcs: Iterable[Arc]) -> None:  # noqa: ARG002  only triples are stored
         for kind, one, other in arcs:
             self.graph.add((URIRef(BASE + one), URIRef(BASE + kind), URIRef(BASE + other)))
 

@@ -6,17 +6,17 @@ from collections.abc import Iterable
 from knowledge.arcs import KINDS, Arc
 from knowledge.contender import Answers, Contender
 
-_INSERT = {kind: f"INSERT OR IGNORE INTO [{kind}] VALUES (?, ?)" for kind in KINDS}  # noqa: S608  names of our own
+_INSERT = {kind: f"INSERT OR IGNORE INTO [{kind}] VALUES (?, ?)" for kind in KINDS}  # noqa: S608  fixed names
 
 
 class Sql(Contender):
-    """Each table is its primary key, with an index the other way round."""
+    """Each table consists of its primary key, with an index in the other direction."""
 
     name = "sqlite"
 
     @classmethod
     def version(cls) -> str:
-        """The library's."""
+        """Return the version of the SQLite library."""
         return sqlite3.sqlite_version
 
     def __init__(self) -> None:

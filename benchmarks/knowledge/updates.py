@@ -1,4 +1,4 @@
-"""What an update costs with conditions installed, in memory and in a file, and what it takes to open that again."""
+"""The cost of an update with installed conditions, in memory and in a file, and of opening that file again."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NONE, SOME, SEEN = "without", "with conditions", "with graph"
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """How large the worlds are."""
+    """Sizes of the worlds."""
 
     many: int = 100_000
     conditions: tuple[int, ...] = (1000, 10_000)
@@ -33,7 +33,7 @@ class Sizes:
 
 
 def everyday_rows(pace: Pace, facts: int = 200, conditions: int = 30) -> list[Row]:
-    """A small world as most are, with conditions and without."""
+    """Return the rows of a typical small world, with and without conditions."""
     plain, watched, seen = Kept(facts), Kept(facts), Kept(facts)
     watched.install(watched.conditions(conditions, 5))
     assert seen.kb.graph
@@ -54,7 +54,7 @@ def everyday_rows(pace: Pace, facts: int = 200, conditions: int = 30) -> list[Ro
 
 
 def condition_rows(pace: Pace, sizes: Sizes) -> list[Row]:
-    """Updates with more and more conditions over many facts, kept in three ways."""
+    """Return the rows of updates with increasing numbers of conditions over many facts, kept in three ways."""
     with TemporaryDirectory() as folder:
         kept = {
             ENGINE: Kept(sizes.many),
@@ -81,7 +81,7 @@ def condition_rows(pace: Pace, sizes: Sizes) -> list[Row]:
 
 
 def size_rows(pace: Pace, sizes: Sizes) -> list[Row]:
-    """Updates without conditions over more and more facts."""
+    """Return the rows of updates without conditions over increasing numbers of facts."""
     rows: list[Row] = []
     for facts in sizes.facts:
         bare, kept = Bare(facts), Kept(facts)
@@ -97,12 +97,12 @@ def size_rows(pace: Pace, sizes: Sizes) -> list[Row]:
 
 
 def recovery_rows(sizes: Sizes) -> list[Row]:
-    """Stores of many versions, of a small world and a large one, are opened as after a crash."""
+    """Return the rows of opening stores with many versions, of a small and a large world, as after a crash."""
     return [_recovered(200, sizes), _recovered(sizes.many, sizes)]
 
 
 def _recovered(facts: int, sizes: Sizes) -> Row:
-    """The longest of several openings, because it depends on how much was written since the last snapshot."""
+    """Return the longest of several openings, which depend on the changes since the last snapshot."""
     seconds = []
     with TemporaryDirectory() as folder:
         path = Path(folder) / "many.kb"

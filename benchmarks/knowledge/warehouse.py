@@ -1,4 +1,4 @@
-"""Worlds whose things move from place to place, with conditions installed, for this knowledge base and the floor."""
+"""Worlds with moving objects and installed conditions, for this knowledge base and the floor."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ SHAPES = (
     "(and (on ?x ?p) (in ?p p{0}) (kind{1} ?x) (> (weight ?x) 5))",
     "(not (exists (?x - item) (and (on ?x p{0}) (kind{1} ?x))))",
 )
-"""Every one reads the predicate that all updates change. 0 stands for a number, 1 for one of the kinds."""
+"""Conditions on the predicate that all updates change. 0 is replaced by a number, 1 by a kind."""
 
 Move = tuple[str, str, str]
-"""An item, where it is, where it will be."""
+"""An item, its place, its next place."""
 
 
 class Warehouse:
-    """So many facts: where items are, which of them are clean or of a kind, which place is in which.
+    """A world of about `facts` facts: places of items, items that are clean or of a kind, places in places.
 
-    It moves one item after the other, in leaps, to the next place.
+    Its items move to their next places, one after the other in leaps.
     """
 
     def __init__(self, facts: int) -> None:
@@ -45,7 +45,7 @@ class Warehouse:
         self._moves = self._endless()
 
     def deltas(self) -> Iterator[Delta]:
-        """The world in parts; what a part is about has come before."""
+        """Yield the world in parts, each after the objects that it needs."""
         places = range(self.places)
         inside = tuple(fact("in", f"p{n}", f"p{n // 10}") for n in places)
         yield Delta({f"p{n}": "place" for n in places}, added=inside)
@@ -57,7 +57,7 @@ class Warehouse:
             yield Delta(dict.fromkeys((f"i{n}" for n in numbers), "item"), added=(*on, *are), values=heavy)
 
     def moves(self, number: int) -> list[Move]:
-        """The next so many."""
+        """Return the next moves."""
         return list(islice(self._moves, number))
 
     def _endless(self) -> Iterator[Move]:
@@ -80,7 +80,7 @@ class Bare(Warehouse):
                 self.index.add(one.predicate, one.args)
 
     def job(self) -> Job:
-        """To update it."""
+        """Return the job of updates."""
 
         def run(moves: list[Move]) -> None:
             discard, add = self.index.discard, self.index.add
@@ -92,7 +92,7 @@ class Bare(Warehouse):
 
 
 class Kept(Warehouse):
-    """A knowledge base; with a path in a file."""
+    """A knowledge base, in a file if `path` is given."""
 
     def __init__(self, facts: int, path: Path | None = None, durability: str | None = None) -> None:
         super().__init__(facts)
@@ -102,11 +102,11 @@ class Kept(Warehouse):
             self.kb.apply(delta, "start")
 
     def move(self, item: str, old: str, new: str) -> None:
-        """One update."""
+        """Apply one update."""
         self.kb.apply(Delta(removed=(fact("on", item, old),), added=(fact("on", item, new),)), "bench")
 
     def job(self) -> Job:
-        """To update it."""
+        """Return the job of updates."""
 
         def run(moves: list[Move]) -> None:
             move = self.move
@@ -116,7 +116,7 @@ class Kept(Warehouse):
         return Job(run, prepare=self.moves)
 
     def singly(self, number: int) -> list[float]:
-        """Seconds for each of so many updates, shortest first."""
+        """Return the seconds of each of a number of updates, shortest first."""
         found = []
         for each in self.moves(number):
             start = time.perf_counter()
@@ -125,18 +125,18 @@ class Kept(Warehouse):
         return sorted(found)
 
     def install(self, texts: list[str]) -> float:
-        """Seconds that it takes to install one of them."""
+        """Install the conditions; return the seconds for each."""
         start = time.perf_counter()
         self.installed = [self.kb.install(text) for text in texts]
         return (time.perf_counter() - start) / len(self.installed)
 
     def uninstall(self) -> None:
-        """End the conditions that were installed last."""
+        """Cancel the installed conditions."""
         for condition in self.installed:
             condition.cancel()
 
     def conditions(self, number: int, shapes: int) -> list[str]:
-        """So many of that many shapes, all over the places."""
+        """Return a number of conditions with that number of shapes, spread over the places."""
         return [
             SHAPES[n % len(SHAPES)].format(self._somewhere(n // shapes + n % shapes * 10), n % shapes // len(SHAPES))
             for n in range(number)

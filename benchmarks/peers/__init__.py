@@ -13,7 +13,7 @@ FILES = {
 
 
 def contenders() -> list[Contender]:
-    """Everyone who is installed."""
+    """Return the installed contenders."""
     return [
         import_module(f"peers.{file}").CONTENDER for file, package in FILES.items() if not package or find_spec(package)
     ]

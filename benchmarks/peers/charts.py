@@ -1,4 +1,4 @@
-"""The charts that everyone runs, said once; every contender writes them in its own form."""
+"""The charts of all contenders, each of which writes them in its own form."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ class State:
     """A state; the first one of a scope is its initial one.
 
     Attributes:
-        on: event -> name of the state to go to, in the same scope.
-        states: what is inside, one at a time.
-        regions: what is inside, all together: name -> states.
+        on: event -> name of the target state, in the same scope.
+        states: the substates of a composite state.
+        regions: the regions of an orthogonal state: name -> states.
     """
 
     on: Mapping[str, str] = field(default_factory=dict)
@@ -25,12 +25,12 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """A chart and what is right.
+    """A chart with its expected configurations.
 
     Attributes:
-        name: for people.
+        name: its name in tables.
         states: the top-level states.
-        rounds: after how many pings it is again where it began.
+        rounds: number of pings after which it is in its initial configuration again.
         leaves: number of pings -> names of the innermost active states.
     """
 
@@ -41,12 +41,12 @@ class Chart:
 
 
 def flat() -> Chart:
-    """Two states."""
+    """Return a chart of two states."""
     return Chart("ping-pong", {"a": State({PING: "b"}), "b": State({PING: "a"})}, 2, lambda n: frozenset("ab"[n % 2]))
 
 
 def deep(levels: int = 5) -> Chart:
-    """Two towers; the transitions are at the top: an event leaves as many levels as it enters."""
+    """Return a chart of two nested towers with transitions at the top: an event exits as many levels as it enters."""
 
     def tower(name: str, other: str) -> State:
         inside: dict[str, State] = {f"{name}{levels}": State()}
@@ -59,13 +59,13 @@ def deep(levels: int = 5) -> Chart:
 
 
 def regions(count: int = 4) -> Chart:
-    """Regions that are active together and all react."""
+    """Return a chart of parallel regions that all react."""
     inside = {f"r{n}": {f"x{n}": State({PING: f"y{n}"}), f"y{n}": State({PING: f"x{n}"})} for n in range(1, count + 1)}
     leaves = [frozenset(f"{side}{n}" for n in range(1, count + 1)) for side in "xy"]
     return Chart(f"{count} regions", {"all": State(regions=inside)}, 2, lambda n: leaves[n % 2])
 
 
 def ring(size: int = 1000) -> Chart:
-    """States one after the other, with a way on and a way back."""
+    """Return a chart of states in a ring, with transitions in both directions."""
     states = {f"s{n}": State({PING: f"s{(n + 1) % size}", PONG: f"s{(n - 1) % size}"}) for n in range(size)}
     return Chart(f"ring of {size:,} states", states, size, lambda n: frozenset({f"s{n % size}"}))

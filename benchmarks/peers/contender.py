@@ -1,4 +1,4 @@
-"""What the table asks of everyone: load a chart, start a machine, send events, say where it is."""
+"""The interface of contenders: load a chart, start a machine, send events, return its configuration."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from peers.charts import Chart
 
 
 class Contender(ABC):
-    """One way to run a chart. The loops are everyone's own: a common one would slow down the fast more than the slow.
+    """One way to run a chart, with its own loops: a shared loop would slow down fast contenders more than slow ones.
 
     Attributes:
         name: the column of the table.
-        package: the distribution whose version is printed; empty for code of our own.
+        package: the distribution with the version to print; empty for this project's code.
     """
 
     name: ClassVar[str]
@@ -23,33 +23,33 @@ class Contender(ABC):
 
     @property
     def version(self) -> str:
-        """The installed version; empty for code of our own."""
+        """The installed version; empty for this project's code."""
         return version(self.package) if self.package else ""
 
     @property
     def is_peer(self) -> bool:
-        """Whether somebody else wrote it."""
+        """Whether another project wrote it."""
         return self.package not in {"", "dynamic-state-charts"}
 
     @abstractmethod
     def write(self, chart: Chart) -> Any:
-        """The chart as data in the contender's own form."""
+        """Return the chart as data in the contender's own form."""
 
     @abstractmethod
     def load(self, data: Any) -> Any:
-        """From data, used once, to whatever all machines of the chart share."""
+        """Return the part that all machines of a chart share; the data are used once."""
 
     @abstractmethod
     def start(self, loaded: Any) -> Any:
-        """A machine that has entered its first state."""
+        """Return a machine that has entered its first state."""
 
     @abstractmethod
     def where(self, machine: Any) -> frozenset[str]:
-        """The names of the innermost active states."""
+        """Return the names of the innermost active states."""
 
     @abstractmethod
     def run(self, machine: Any, event: str, times: int) -> None:
-        """Send the event again and again, and run each to completion."""
+        """Send the event a number of times, and run each to completion."""
 
     @abstractmethod
     def run_each(self, machines: Sequence[Any], event: str) -> None:

@@ -18,7 +18,7 @@ KNOWLEDGE = KnowledgeBase(Schema.parse("(define (domain none))"))
 
 
 class Ready(NamedTuple):
-    """A library, the plot of it to run, and a situation for macrosteps that ask nothing of the knowledge base."""
+    """A library, the name of its plot to run, and a situation for macrosteps without queries of the knowledge base."""
 
     library: Library
     plot: str
@@ -26,7 +26,7 @@ class Ready(NamedTuple):
 
 
 def form(chart: Chart) -> dict[str, Any]:
-    """The chart in the form in which people write plots."""
+    """Return the chart in the form in which people write plots."""
     return {"plot": "bench", "receives": {PING: None, PONG: None}, "states": _states(chart.states)}
 
 
@@ -37,14 +37,14 @@ def _states(states: Mapping[str, State]) -> dict[str, Any]:
 def _state(name: str, state: State) -> list[tuple[str, Any]]:
     if state.regions:
         regions = {region: {"states": _states(states)} for region, states in state.regions.items()}
-        # The validator wants the completion wired, although these regions never complete.
+        # The validator requires a transition on completion, although these regions never complete.
         return [(name, {"on": {**state.on, "done": "over"}, "regions": regions}), ("over", {"final": True})]
     inside = {"states": _states(state.states)} if state.states else {}
     return [(name, {"on": dict(state.on), **inside})]
 
 
 def ready(*forms: dict[str, Any]) -> Ready:
-    """Plots from data, all of them validated and the first one compiled."""
+    """Return plots from data, all of them validated and the first one compiled."""
     plots = [ActionPlot.model_validate(each) for each in forms]
     library = Library(plots)
     for plot in plots:
@@ -54,14 +54,14 @@ def ready(*forms: dict[str, Any]) -> Ready:
 
 
 class Running(NamedTuple):
-    """A machine, and what to send with every event."""
+    """A machine, and the situation to send with every event."""
 
     machine: Machine
     situation: KnowledgeSituation
 
 
 class ThisEngine(Contender):
-    """`Machine.send(event, situation)`; the situation is made once, for nothing here asks the knowledge base."""
+    """`Machine.send(event, situation)` with one situation, since no chart here queries the knowledge base."""
 
     name = "this engine"
     package = "dynamic-state-charts"

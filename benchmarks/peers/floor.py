@@ -1,6 +1,6 @@
-"""The least that an object with states does, written by hand: one dictionary look-up for the state, one for the event.
+"""The floor: a minimal hand-written object with two dictionary look-ups, for the state and for the event.
 
-Nothing is entered or left; a configuration of several states is one key of the table, worked out beforehand.
+It has neither entry nor exit. A configuration of several states is one key of the precomputed table.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ class Machine:
 
 
 def table_of(chart: Chart) -> Table:
-    """The chart as reached configurations, each with where every event leads."""
+    """Return the chart as reached configurations, each with the target of every event."""
     if _is_flat(chart):
         return {name: dict(state.on) for name, state in chart.states.items()}
     reached = [chart.leaves(n) for n in range(chart.rounds)]

@@ -1,4 +1,4 @@
-"""The floor without even an object: a local variable and a table, so that nobody thinks we chose the kinder one."""
+"""The floor without an object: a local variable and a table, to show that the choice of floor matters little."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from peers.floor import Table, table_of
 
 @dataclass(slots=True)
 class Place:
-    """Where the loop begins, and where it ended."""
+    """The state before and after the loop."""
 
     table: Table
     state: Any

@@ -1,4 +1,4 @@
-"""sismic: queue the event, execute one macrostep; contracts are switched off, as nobody else has any."""
+"""sismic: queue the event, execute one macrostep; contracts are off, since no other contender has them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

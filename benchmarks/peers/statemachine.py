@@ -33,7 +33,7 @@ class PythonStatemachine(Contender):
         return _states(chart.states)
 
     def load(self, data: dict[str, Any]) -> type[StateChart]:
-        return create_machine_class_from_definition("Bench", states=data)  # takes the data apart
+        return create_machine_class_from_definition("Bench", states=data)  # consumes the data
 
     def start(self, loaded: type[StateChart]) -> StateChart:
         return loaded()

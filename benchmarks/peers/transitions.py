@@ -1,4 +1,4 @@
-"""transitions: one machine for many models, with its queue; the hierarchical machine where states are nested."""
+"""transitions: one machine for many models, with its queue; the hierarchical machine for nested states."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ SEPARATOR = "_"
 
 
 class Model:
-    """What the machine puts its triggers on."""
+    """A model, to which the machine adds its triggers."""
 
 
 def _scope(states: Mapping[str, State]) -> dict[str, Any]:

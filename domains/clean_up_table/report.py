@@ -92,7 +92,7 @@ class Report:
             ("skill failures", self.skill_failures),
             ("recovered by rule", self.recoveries),
             ("candidates chosen", self.candidates_chosen),
-            ("done without for a while", self.excluded),
+            ("excluded for a while", self.excluded),
         ):
             if counts:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))

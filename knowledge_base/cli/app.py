@@ -9,7 +9,7 @@ from knowledge_base.cli import changes, exchange, follow, queries
 app = typer.Typer(
     rich_markup_mode=None,
     no_args_is_help=True,
-    help="A world model: ask what holds, tell what is new, look back, watch, draw.",
+    help="A world model: query it, change it, inspect its past, watch it, draw it.",
 )
 for command in (
     changes.new,

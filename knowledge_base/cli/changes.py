@@ -22,16 +22,18 @@ Facts = Annotated[
     typer.Argument(metavar="FACT...", help="'(on cup1 table)', '(cup cup1)', '(= (weight cup1) 0.2)', any effect."),
 ]
 Gone = Annotated[
-    list[str], typer.Argument(metavar="FACT...", help="'(on cup1 table)'; '(cup cup1)' takes the thing away.")
+    list[str], typer.Argument(metavar="FACT...", help="'(on cup1 table)'; '(cup cup1)' removes the thing.")
 ]
-Author = Annotated[str, typer.Option(help="Who says so; it stands in the history.")]
-Expect = Annotated[int | None, typer.Option(metavar="VERSION", help="Change nothing unless the store is there.")]
+Author = Annotated[str, typer.Option(help="The author of the change, kept in the history.")]
+Expect = Annotated[
+    int | None, typer.Option(metavar="VERSION", help="Change nothing unless this is the store's version.")
+]
 Key = Annotated[str | None, typer.Option(help="A name for this change: the same key again changes nothing.")]
 
 
 def new(
     store: Annotated[Path, typer.Argument(metavar="STORE", help="The file to make.")],
-    domain: Annotated[Path, typer.Option("--domain", metavar="D.pddl", help="What may be said: a PDDL domain.")],
+    domain: Annotated[Path, typer.Option("--domain", metavar="D.pddl", help="The schema: a PDDL domain.")],
     functional: Annotated[
         list[str] | None,
         typer.Option(metavar="PREDICATE", help="Only one of its facts that differ in the last argument alone is true."),
@@ -78,7 +80,7 @@ def retract(
 def compact(
     store: Store,
     keep: Annotated[
-        str | None, typer.Option(metavar="MOMENT", help="Keep what was since this version or time.  [default: now]")
+        str | None, typer.Option(metavar="MOMENT", help="The oldest version or time to keep.  [default: now]")
     ] = None,
     json: Json = False,
 ) -> None:

@@ -28,7 +28,7 @@ STANDARD_OUTPUT = Path("-")
 def import_(
     store: Store,
     source: Source,
-    author: Annotated[str | None, typer.Option(help="Who says so.  [default: SOURCE]")] = None,
+    author: Annotated[str | None, typer.Option(help="The author of the change.  [default: SOURCE]")] = None,
     domain: Domain = None,
 ) -> None:
     """Add the content of another world to a store, as one change; the store's own content stays."""
@@ -44,7 +44,7 @@ def export(
     source: Source,
     to: To = STANDARD_OUTPUT,
     form: Annotated[
-        ExchangeFormat | None, typer.Option("--as", help="The form.  [default: by FILE's ending, else json]")
+        ExchangeFormat | None, typer.Option("--as", help="The format.  [default: by FILE's ending, else json]")
     ] = None,
     domain: Domain = None,
 ) -> None:
@@ -61,8 +61,10 @@ def export(
 
 def draw(
     source: Source,
-    thing: Annotated[str | None, typer.Argument(metavar="[THING]", help="Draw what is around this thing.")] = None,
-    hops: Annotated[int, typer.Option(min=0, help="How many arcs away from THING.")] = 1,
+    thing: Annotated[
+        str | None, typer.Argument(metavar="[THING]", help="Draw the neighbourhood of this thing.")
+    ] = None,
+    hops: Annotated[int, typer.Option(min=0, help="Maximum distance from THING, in arcs.")] = 1,
     to: To = STANDARD_OUTPUT,
     domain: Domain = None,
 ) -> None:

@@ -66,8 +66,8 @@ def check(store: Store, json: Json = False) -> None:
 def watch(
     store: Store,
     pattern: Pattern = None,
-    count: Annotated[int | None, typer.Option(min=1, help="End after so many changes.")] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so many seconds.")] = None,
+    count: Annotated[int | None, typer.Option(min=1, help="End after this number of changes.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after this number of seconds.")] = None,
     json: Json = False,
 ) -> None:
     """Print changes as others commit them, until Ctrl-C."""

@@ -19,7 +19,7 @@ Source = Annotated[
 Store = Annotated[Path, typer.Argument(metavar="STORE", help="A store's file.")]
 Domain = Annotated[
     Path | None,
-    typer.Option("--domain", metavar="D.pddl", help="A problem's domain.  [default: domain.pddl beside it]"),
+    typer.Option("--domain", metavar="D.pddl", help="A problem's domain.  [default: domain.pddl next to it]"),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 

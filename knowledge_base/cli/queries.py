@@ -18,15 +18,17 @@ if TYPE_CHECKING:
     from knowledge_base.pddl import ProblemText
     from knowledge_base.view import View
 
-Expr = Annotated[str, typer.Argument(metavar="EXPR", help="A condition; ?x is asked for.")]
+Expr = Annotated[str, typer.Argument(metavar="EXPR", help="A condition; the answers bind its variables, such as ?x.")]
 Question = Annotated[str, typer.Argument(metavar="EXPR", help="A condition without open variables.")]
 Params = Annotated[
     list[str] | None, typer.Option("--param", "-p", metavar="x=VALUE", help="A value for ?x; may be repeated.")
 ]
-Explain = Annotated[bool, typer.Option("--explain", help="Show how the query will be looked up.")]
-Why = Annotated[bool, typer.Option("--why", help="Show each part with its truth, and what decides.")]
-Limit = Annotated[int | None, typer.Option("--limit", min=1, help="Give so many answers at most, and look no further.")]
-Seconds = Annotated[float | None, typer.Option("--seconds", min=0.0, help="Give the question up after so long.")]
+Explain = Annotated[bool, typer.Option("--explain", help="Show the query plan.")]
+Why = Annotated[bool, typer.Option("--why", help="Show each part with its truth, and the deciding one.")]
+Limit = Annotated[int | None, typer.Option("--limit", min=1, help="Stop after this number of answers.")]
+Seconds = Annotated[
+    float | None, typer.Option("--seconds", min=0.0, help="Stop the query after this number of seconds.")
+]
 NO = 1
 """Exit status of the answer `no`; 2 is a mistake, as for every command."""
 
@@ -79,7 +81,7 @@ def ask(
 
 def show(
     source: Source,
-    thing: Annotated[str | None, typer.Argument(metavar="[THING]", help="Only what is about this thing.")] = None,
+    thing: Annotated[str | None, typer.Argument(metavar="[THING]", help="Only facts about this thing.")] = None,
     domain: Domain = None,
     json: Json = False,
 ) -> None:
@@ -91,7 +93,9 @@ def show(
 def at(
     store: Store,
     when: Annotated[str, typer.Argument(metavar="WHEN", help="A version, or a time such as 2026-11-21T16:40.")],
-    expression: Annotated[str | None, typer.Argument(metavar="[EXPR]", help="Ask this instead of showing all.")] = None,
+    expression: Annotated[
+        str | None, typer.Argument(metavar="[EXPR]", help="Query this instead of showing everything.")
+    ] = None,
     param: Params = None,
     limit: Limit = None,
     seconds: Seconds = None,

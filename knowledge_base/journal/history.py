@@ -124,4 +124,4 @@ def gone(version: int, oldest: int, place: Place | None = None) -> HistoryError:
 
 def too_early(time: float, oldest: int, place: Place | None = None) -> HistoryError:
     """Return the error for a time before the oldest kept version."""
-    return HistoryError(f"time {time} is before all that is kept, which begins with version {oldest}", place=place)
+    return HistoryError(f"time {time} is before the oldest kept version, {oldest}", place=place)

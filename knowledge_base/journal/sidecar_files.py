@@ -135,16 +135,16 @@ def require_no_strangers(store: Path, *, there: bool) -> None:
     """
     old_log, index, log = (store.with_name(store.name + ending) for ending in (OLD_LOG, INDEX, LOG))
     if regular(old_log) is not None:
-        raise foreign(old_log, store, "is none of its files: a store has no log of that kind")
+        raise foreign(old_log, store, "is not one of its files: a store has no log of that kind")
     size = _size(index)  # read first: SQLite begins with the log, and deletes it last
     if there and _size(log) is not None:
-        _require(log, store, _head(log, 12) in (*_LOG_HEADS, b"", None), "is no log of SQLite")
-        _require(index, store, size is None or size % _INDEX_PART in (0, 3), "is no index of SQLite")
+        _require(log, store, _head(log, 12) in (*_LOG_HEADS, b"", None), "is not a log of SQLite")
+        _require(index, store, size is None or size % _INDEX_PART in (0, 3), "is not an index of SQLite")
         return
     for path in (log, index):
-        _require(path, store, there or _size(path) is None, "is left of another one, and may hold its last changes")
+        _require(path, store, there or _size(path) is None, "remains of another store, and may hold its last changes")
     if size is not None and _size(index) is not None and _size(log) is None:
-        _require(index, store, _head(index, 4) in _INDEX_HEADS, "is no index of SQLite")
+        _require(index, store, _head(index, 4) in _INDEX_HEADS, "is not an index of SQLite")
 
 
 def _size(path: Path) -> int | None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def bundles_command(
-    name: Annotated[str | None, typer.Argument(help="Only this one, with all that it has.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Only this bundle, with its content.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Show the bundles of the installed packages: components, plots and planning actions to build a robot of."""
@@ -121,15 +121,15 @@ def plan_command(
         ),
     ],
     engine: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which engine plans.  [default: those that suit it race]")
+        str | None, typer.Option(metavar="NAME", help="The engine.  [default: a race of those that suit the problem]")
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.0, help="Stop posing and planning after this long.")] = 10.0,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Stop after this number of seconds.")] = 10.0,
     parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can run concurrently.")] = False,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete; - is standard output.")
     ] = None,
     explain: Annotated[
-        bool, typer.Option("--explain", help="Say what each step is for, or why there is no plan.")
+        bool, typer.Option("--explain", help="Explain each step's purpose, or why there is no plan.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:  # fmt: skip

@@ -19,14 +19,14 @@ def chains(earlier: Mapping[int, frozenset[int]], kin: Kin) -> tuple[tuple[int, 
         kin: see `Kin`.
     """
     matching = _Matching(earlier)
-    for relatives in (kin, _anybody):
+    for relatives in (kin, _any_pair):
         for second in earlier:
             matching.follow(second, relatives)
     following = {first: second for second, first in matching.before.items()}
     return tuple(_chain(first, following) for first in earlier if first not in matching.before)
 
 
-def _anybody(_first: int, _second: int) -> bool:
+def _any_pair(_first: int, _second: int) -> bool:
     return True
 
 

@@ -373,7 +373,7 @@ def test_closing_inside_a_transaction_drops_it(kb):
 def test_what_cannot_be_written_as_text_is_refused(path):
     with opened(path) as kb:
         for how in ({"author": "\ud800"}, {"author": "a", "key": "\ud800"}):
-            with pytest.raises(InputError, match="no text that can be written"):
+            with pytest.raises(InputError, match="not a text that can be written"):
                 kb.apply(QUIET, **how)
         assert kb.version == 0
 
