@@ -70,7 +70,7 @@ def world_form(state: WorldState) -> Form:
 
 
 def world_of(form: Form, schema: Schema) -> WorldState:
-    """The inverse of `world_form`; `schema` is that of the form, or an extension."""
+    """The inverse of `world_form`; `schema` is the schema of the form, or an extension."""
     return WorldState.of(schema, form["nodes"], _facts(form["facts"]), _values(form["values"]))
 
 

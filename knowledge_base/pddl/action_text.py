@@ -29,10 +29,10 @@ _COMPARED = (
 
 @dataclass(frozen=True, slots=True)
 class ActionText:
-    """A planning action as written; what is left out is `()`, true, or no effect.
+    """A planning action as written; omitted parts are `()`, true, or no effect.
 
-    A durative action has a `duration` and what is `timed` about it; its precondition and effect are what these
-    amount to when nothing else happens meanwhile (see `DurativeParts`).
+    A durative action has a `duration` and `timed` parts; its precondition and effect equal these if nothing else
+    happens during the action (see `DurativeParts`).
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What PDDL and its relatives have and this project does not plan with: refused by name, with who could."""
+"""PDDL constructs that this project does not plan with: refused by name, with engines that support them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _OBJECTS = "planners with object fluents, such as Tamer"
 
 @dataclass(frozen=True, slots=True)
 class _Construct:
-    """What it means, in a few words, and the engines that can do it."""
+    """Its meaning in a few words, and the engines that support it."""
 
     meaning: str
     engines: str
@@ -64,9 +64,9 @@ def refused(construct: _Construct, called: str, place: Place | None) -> Unsuppor
 
 
 def refuse_forms(node: Node) -> None:
-    """Raise `UnsupportedConstructError` for the first form in a condition or effect that nothing here judges.
+    """Raise `UnsupportedConstructError` for the first form in a condition or effect that is not evaluated.
 
-    A predicate may have the name of such a form: what tells them apart is that its arguments are groups.
+    A predicate may have the name of such a form; the arguments of a form are groups.
     """
     if isinstance(node, Word):
         if node.folded() == "#t" and not node.quoted:

@@ -30,12 +30,12 @@ _SECTIONS = (
 )
 
 MOST_IMPLIED = 50
-"""Undeclared types that are taken to be types of their own; each is compared with all that are declared."""
+"""Number of undeclared parents that count as types; each is compared with every declared type."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeclarationText:
-    """A predicate or function as declared: `(on ?a ?b - item)`; `result` is what a function is worth."""
+    """A predicate or function as declared: `(on ?a ?b - item)`; `result` is the type of a function's value."""
 
     name: str
     parameters: tuple[TypedVariable, ...]
@@ -45,7 +45,7 @@ class DeclarationText:
 
 @dataclass(frozen=True, slots=True)
 class AxiomText:
-    """One `:derived` section: `head` holds wherever the condition does (PDDL 2.2)."""
+    """One `:derived` section: `head` holds if the condition holds (PDDL 2.2)."""
 
     head: DeclarationText
     condition: Expression
@@ -71,10 +71,9 @@ class DomainText:
     source: str | None = field(default=None, compare=False)
 
     def implied_types(self) -> tuple[TypedName, ...]:
-        """Types that are named only as what others are below: they are types of their own.
+        """Types that are named only as parents of others.
 
-        One that is written much like a declared type is not among them: that is a typing error. More than
-        `MOST_IMPLIED` are none, either.
+        A name close to a declared type is a typing error and is not among them. More than `MOST_IMPLIED` give none.
         """
         declared = {"object", *(name for name, _, _ in self.types)}
         used: dict[str, Place] = {}
@@ -86,7 +85,7 @@ class DomainText:
         return tuple(TypedName(name, (), place) for name, place in used.items() if not _misspelt(name, declared))
 
     def remarks(self) -> Iterator[str]:
-        """The notes of the files, and what deserves a look in all that they declare together."""
+        """The notes of the files, and notes about their declarations together."""
         yield from self.notes
         for name, _, place in self.implied_types():
             yield f"{place}: the type '{name}' is not declared and taken to be one of its own"
@@ -139,7 +138,7 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
 
 
 def _misspelt(name: str, valid: Collection[str]) -> bool:
-    """Whether a name is much like a valid one, and not because one goes on where the other ends (kiln, kiln8)."""
+    """Whether a name is close to a valid one, and neither is the beginning of the other (kiln, kiln8)."""
     close = difflib.get_close_matches(name, valid, cutoff=0.8)
     return any(not other.startswith(name) and not name.startswith(other) for other in close)
 
@@ -162,7 +161,7 @@ def _declarations(nodes: Sequence[Node]) -> list[DeclarationText]:
 
 
 def _functions(nodes: Sequence[Node]) -> list[DeclarationText]:
-    """Declarations, which `- TYPE` after them makes worth that; without it they are numeric, as in PDDL 2.1."""
+    """Declarations of functions; `- TYPE` after them is the type of their values, else numeric as in PDDL 2.1."""
     found: list[DeclarationText] = []
     untyped: list[DeclarationText] = []
     position = 0
@@ -194,7 +193,7 @@ def _result(after: Sequence[Node], dash: Word) -> str:
     kind = word(after[0], "a type")
     if kind.folded() not in UNSET:
         if nearest(kind.folded(), UNSET) is not None:
-            message = "a function is worth a value, not a thing"
+            message = "the result of a function is a value, not an object"
             raise ParseError(message, place=kind.place, found=kind.text, valid=UNSET)
         raise refused(OBJECT_FLUENTS, f"- {kind.text}", kind.place)
     return kind.folded()

@@ -1,4 +1,4 @@
-"""A domain as a PDDL file, which `parse_domain` reads back: nothing but places and notes is lost."""
+"""A domain as a PDDL file, which `parse_domain` reads back without its places and notes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _T = TypeVar("_T")
 
 
 def domain_to_text(domain: DomainText) -> str:
-    """The domain as text; types above others come before them, since not every reader takes them in any order.
+    """The domain as text; parents come before their subtypes, since some readers need that order.
 
     Raises:
         InputError: a name that PDDL cannot spell, such as one with blanks or capitals.
@@ -55,7 +55,7 @@ def _section(keyword: str, lines: Sequence[str], *, together: bool = False) -> s
 
 
 def _from_the_top(types: Iterable[TypedName]) -> list[TypedName]:
-    """Each after what it is a kind of."""
+    """Parents before their subtypes."""
     named = {one.name: one for one in types}
     order = TopologicalSorter({name: one.types for name, one in named.items()}).static_order()
     return [named[name] for name in order if name in named]
@@ -78,7 +78,7 @@ def _parameter(parameter: TypedVariable) -> str:
 
 
 def action_to_text(action: ActionText) -> str:
-    """One action as it stands in the file."""
+    """One action as text of a file."""
     durative = action.duration is not None and action.timed is not None
     lines = [f"  ({DURATIVE_ACTION if durative else ACTION} {action.name}"]
     lines.append(f":parameters ({' '.join(map(_parameter, action.parameters))})")
@@ -93,7 +93,7 @@ def action_to_text(action: ActionText) -> str:
 
 
 def axiom_to_text(axiom: AxiomText) -> str:
-    """One rule for a derived predicate as it stands in the file."""
+    """One rule for a derived predicate as text of a file."""
     return f"  (:derived {_declaration(axiom.head)}\n    {to_text(axiom.condition)})"
 
 

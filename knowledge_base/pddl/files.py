@@ -1,7 +1,7 @@
 """Files that people name: read up to a bound, or refused with a message that helps.
 
-All readers of texts come here. A device or pipe is read like a file, up to the same bound; a pipe that stays silent is
-refused, so that no reader waits without end.
+All readers of texts come here. A device or pipe is read like a file, up to the same bound. A silent pipe is refused, so
+that no reader waits forever.
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from knowledge_base.errors import InputError, ParseError, Place
 MAX_BYTES = 16 * 1024 * 1024
 """Of a PDDL file: a million facts. Reading takes about 90 µs for each, and 100 bytes of memory for each byte."""
 WRITER_S = 3.0
-"""Seconds that a pipe is given until somebody writes into it."""
+"""Seconds to wait for a writer of a pipe."""
 SILENCE_S = 30.0
-"""Seconds that a pipe or terminal whose writer is there may stay silent."""
+"""Seconds of silence that a pipe or terminal with a writer may have."""
 _PIECE = 1 << 20
 _LOOK_S = 0.02
 
 
 def read_text(path: Path, errors: str = "strict", most: int | None = None) -> str:
-    """The text of a UTF-8 file, without a byte order mark; `errors` is what becomes of other bytes, as for `open`.
+    """The text of a UTF-8 file, without a byte order mark; `errors` handles other bytes, as for `open`.
 
     Args:
         path: a file, device or pipe.
         errors: as for `open`.
-        most: bytes that are read at most; `MAX_BYTES` if nothing is said.
+        most: bytes that are read at most; `MAX_BYTES` by default.
 
     Raises:
-        InputError: there is no such file (the nearest file beside it is named), it cannot be read, it has more bytes
-            than that, or it is a pipe that stays silent.
+        InputError: the file is missing (the nearest name in the folder is suggested), unreadable or too long, or a
+            silent pipe.
         ParseError: it is not UTF-8.
     """
     return decoded(read_bytes(path, MAX_BYTES if most is None else most), path, errors)
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """All that is in a file, device or pipe, `most` bytes at most; errors as for `read_text`."""
+    """The bytes of a file, device or pipe, `most` at most; errors as for `read_text`."""
     return b"".join(_pieces(path, most))
 
 
 def decoded(data: bytes, path: Path, errors: str = "strict") -> str:
-    """The text that the bytes of a file are; raises `ParseError` as `read_text`."""
+    """The text of a file's bytes; raises `ParseError` as `read_text`."""
     try:
         return data.decode("utf-8-sig", errors)
     except UnicodeDecodeError as error:
@@ -67,7 +67,7 @@ def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> I
         path: a file, device or pipe.
         most: bytes that are read at most.
         longest: bytes of a line at most.
-        errors: what becomes of other bytes, as for `open`.
+        errors: handles other bytes, as for `open`.
 
     Raises:
         InputError: as `read_text`, and for a line that is too long.
@@ -82,7 +82,7 @@ def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> I
             number += 1
             yield _line(b"".join(held), path, number, longest, errors)
             held, size = [following], len(following)
-        if size > longest:  # what follows makes it no shorter
+        if size > longest:  # it only grows
             break
     if size or not number:
         yield _line(b"".join(held), path, number + 1, longest, errors)
@@ -111,7 +111,7 @@ def _pieces(path: Path, most: int) -> Iterator[bytes]:
 
 
 def _not_utf8(error: UnicodeDecodeError, path: Path, line: int = 1) -> ParseError:
-    """The error for bytes that are no text; `line` is that of the first byte."""
+    """The error for bytes that are not UTF-8; `line` is the line of the first byte."""
     before = error.object[: error.start]
     place = Place(str(path), line + before.count(b"\n"), error.start - before.rfind(b"\n"))
     message = f"the file is not UTF-8: it cannot have the byte 0x{error.object[error.start]:02x} here"
@@ -121,9 +121,9 @@ def _not_utf8(error: UnicodeDecodeError, path: Path, line: int = 1) -> ParseErro
 def text_and_source(text_or_path: str | Path, source: str | None) -> tuple[str, str | None]:
     """The text meant by a reader's argument, and the name to call it by in messages.
 
-    A `Path` is a file. A string is PDDL text when it begins with `(` or `;` or has several lines, and the
-    name of a file otherwise: no PDDL text of one line begins with anything else. What is not UTF-8 in a file
-    comes as half characters, which are refused outside of comments (old files have authors' names there).
+    A `Path` is a file. A string is PDDL text if it begins with `(` or `;` or has several lines, else a file's name.
+    Bytes of a file that are not UTF-8 become half characters, which are refused outside of comments: old files have
+    authors' names there.
     """
     if isinstance(text_or_path, str) and ("\n" in text_or_path or text_or_path.lstrip()[:1] in ("", "(", ";")):
         return text_or_path, source
@@ -132,7 +132,7 @@ def text_and_source(text_or_path: str | Path, source: str | None) -> tuple[str, 
 
 
 def files_beside(path: Path) -> list[str]:
-    """The names of the files with the same ending in the same folder: what may have been meant."""
+    """The names of the files with the same ending in the same folder, to suggest."""
     try:
         return [p.name for p in path.parent.iterdir() if p.suffix == path.suffix]
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""A PDDL problem file: what is there, what holds, and what is wanted, checked against a schema."""
+"""A PDDL problem file: objects, first state and goal, checked against a vocabulary."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from knowledge_base.spelling import is_number
 
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
 TOTAL_TIME = Call("total-time")
-"""In a metric: how long the whole plan takes. No domain declares it."""
+"""The duration of the whole plan, in a metric. No domain declares it."""
 _TOTAL_TIME_DECLARED = Signature(TOTAL_TIME.function, result="number")
 _DIRECTIONS = ("minimize", "maximize")
 
@@ -48,7 +48,7 @@ class DomainVocabulary(Vocabulary, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """What makes a plan better than another: the value of `term` at its end; `TOTAL_TIME` may occur in it."""
+    """The measure of plans: the value of `term` at the end of the plan; `TOTAL_TIME` may occur in it."""
 
     direction: Literal["minimize", "maximize"]
     term: Term
@@ -60,14 +60,14 @@ class ProblemText:
 
     Attributes:
         name: the problem's name.
-        domain: the name of the domain it says it is for.
-        objects: the things in the order of the file, with their types.
-        init: what holds at first; what is not said does not hold.
-        values: what functions are worth at first.
+        domain: the name of its domain, as the file says.
+        objects: the objects in the order of the file, with their types.
+        init: the facts of the first state; all others are false.
+        values: values of functions in the first state.
         goal: the condition wanted; true when the file has none.
-        has_goal: whether the file says what is wanted.
-        metric: what the best plan is, if the file says so.
-        notes: what deserves a look though it changes nothing, each with its place.
+        has_goal: whether the file has a goal.
+        metric: the measure of plans, if the file has one.
+        notes: remarks that change nothing, each with its place.
     """
 
     name: str
@@ -90,19 +90,19 @@ def read_problem(
 ) -> ProblemText:
     """Read a PDDL problem: a `Path` or a file's name, or the text itself.
 
-    Negative facts in `:init` are accepted and say nothing new; so is `:length`, which no planner heeds.
+    Negative facts in `:init` and `:length` are accepted and ignored.
 
     Args:
         text_or_path: a file, or text that begins with `(` or a comment.
         schema: the schema of its domain.
         source: the name of the text in messages.
-        domain: the name of that domain. A problem that says it is for another one is read all the same if it
-            fits, with a note: files in the wild are renamed.
+        domain: the name of that domain. A problem for another domain is read too if it fits, with a
+            note: files in the wild are renamed.
 
     Raises:
         InputError: the file cannot be read.
         ParseError: the form is wrong.
-        UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
+        UnsupportedConstructError: the file uses a part of PDDL that this project does not plan with.
         UnknownNameError: an undeclared type, predicate, function or object; it is for another domain.
         SchemaError: a wrong number of arguments, a wrong type, an object declared in two ways.
     """
@@ -198,7 +198,7 @@ def _metric(definition: Definition, schema: DomainVocabulary, objects: Mapping[s
 
 
 def _with_total_time(term: Term) -> Term:
-    """The term, with `total-time` as a function also where it stands without parentheses."""
+    """The term, with `total-time` as a function also without parentheses."""
     match term:
         case Constant(TOTAL_TIME.function):
             return replace(TOTAL_TIME, place=term.place)
@@ -232,7 +232,7 @@ class _Init:
             case Atom(predicate, args):
                 self.facts[Fact(predicate, _values(args))] = None
             case Not(Atom()):
-                pass  # what is not said does not hold
+                pass  # facts that are missing are false
             case Comparison("=", Call(function, args), said) if (content := _content(said)) is not None:
                 fluent = Fact(function, _values(args))
                 require_content(content, self.schema.result(function), fluent, said.place)
@@ -256,7 +256,7 @@ def _refuse_timed(node: Node) -> None:
 
 
 def _content(said: Term) -> Content | None:
-    """A value as written, `(geometry 0.4 0.1)` too; `None` for what has to be worked out on a world."""
+    """A value as written, `(geometry 0.4 0.1)` too; `None` for a term that needs a world."""
     match said:
         case Constant(value):
             return value

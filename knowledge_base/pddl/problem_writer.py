@@ -1,4 +1,4 @@
-"""A world as a PDDL problem file, which `read_problem` reads back: nothing but the version is lost."""
+"""A world as a PDDL problem file, which `read_problem` reads back without the version."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def problem_to_text(
     """The world as the start of a problem.
 
     Args:
-        state: the world; constants of its schema are the domain's affair and not listed.
-        name: what the problem is called.
+        state: the world; the domain lists the constants of its schema.
+        name: of the problem.
         domain: the name of its domain.
-        goal: what is wanted.
-        metric: what the best plan is.
+        goal: of the problem.
+        metric: the measure of plans.
 
     Raises:
         InputError: a name that PDDL cannot spell, such as one with blanks or capitals, or a number that is

@@ -41,7 +41,7 @@ REQUIREMENTS = frozenset(
         ":multi-agent",
     }
 )
-"""What PDDL 1.2 to 3.1 and its relatives can require; only what is really used is judged."""
+"""Requirements of PDDL 1.2 to 3.1 and its relatives; only constructs in use are checked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Definition:
     sections: tuple[tuple[str, Group], ...]
 
     def single(self, keyword: str) -> Group | None:
-        """The only section with that keyword, or `None` when it is left out.
+        """The only section with that keyword, or `None` if it is missing.
 
         Raises:
             ParseError: there are two.
@@ -64,7 +64,7 @@ class Definition:
         return found[0] if found else None
 
     def nodes(self, keyword: str) -> Sequence[Node]:
-        """What stands in that section after its keyword; nothing when it is left out."""
+        """The content of that section after its keyword; empty if it is missing."""
         group = self.single(keyword)
         return group.items[1:] if group else ()
 
@@ -73,7 +73,7 @@ class Definition:
         return tuple(word(node, "a requirement").folded() for node in self.nodes(":requirements"))
 
     def notes(self) -> Iterator[str]:
-        """What deserves a look though it changes nothing: requirements that nobody knows, each with its place."""
+        """Remarks that change nothing: unknown requirements, each with its place."""
         for node in self.nodes(":requirements"):
             found = word(node, "a requirement")
             if found.folded() not in REQUIREMENTS:
@@ -128,7 +128,7 @@ def _define(nodes: list[Node], source: str | None) -> Group:
 def _name(group: Group, kind: str) -> tuple[str, Place]:
     head = group.head()
     if head != kind:
-        misspelt = head not in ("domain", "problem")  # the other kind of file is no typing error
+        misspelt = head not in ("domain", "problem")  # the other kind of file is not a typing error
         raise ParseError(
             f"a {kind} file is expected, this defines a '{head}'",
             place=group.place,
