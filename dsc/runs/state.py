@@ -81,7 +81,7 @@ class RunState:
         self._places: dict[_Key, list[int]] = {}  # the earliest first
         self._activations: dict[int, set[_Key]] = {}
         self._cancelled: list[int] = []  # places of items that the last macrostep cancelled
-        self._in_force: dict[_Key, int] = {}  # places of parameters and modes
+        self._in_effect: dict[_Key, int] = {}  # places of parameters and modes
         self._outbox: dict[int, Told] = {}  # by place: commands that a component may not have taken
         self._last_place = 0
         self._memories: dict[str, str] = {}
@@ -97,7 +97,7 @@ class RunState:
         for one in kept.pending:
             self._note(one.what, one.place)
             if one.reports and isinstance(one.what, SetParameter | SwitchMode):
-                self._in_force[_key(one.what)] = one.place
+                self._in_effect[_key(one.what)] = one.place
             form = awaited_form(one.what, self._short)
             kind = type(one.what).__name__
             self._rows[one.place] = SnapshotRow(kind, one.step, one.at, form, one.reports, one.cause, one.cancelled)
@@ -108,7 +108,7 @@ class RunState:
         """Note the machine's frames and the other state of the reactor after a macrostep."""
         state = reactor.machine.state
         if state.root is not self._root:
-            self._reach_frames(state.root)
+            self._update_frames(state.root)
         serial = None if state.root is None else state.root.serial
         # Most events change none of this; of outcome events there are only ever more.
         settings = reactor.settings.values()
@@ -162,12 +162,12 @@ class RunState:
                 del self._outbox[place]
                 if any(told is one for one in refused):
                     self._drop_row(place)
-                    if self._in_force.get(_key(told)) == place:  # again, after a restart
-                        del self._in_force[_key(told)]
+                    if self._in_effect.get(_key(told)) == place:  # again, after a restart
+                        del self._in_effect[_key(told)]
                 elif isinstance(told, SendMessage):
                     self._drop_row(place)
                 else:
-                    self._put_in_force(_key(told), place)
+                    self._put_in_effect(_key(told), place)
 
     def ask(self, output: Iterable[Output], step: int, now: float, reactor: ReactorState) -> None:
         """Note the actions, timers and commands that a macrostep starts or cancels."""
@@ -193,7 +193,7 @@ class RunState:
         self._note(what, place)
         self._put_row(place, SnapshotRow(type(what).__name__, step, at, awaited_form(what, self._short), 0, cause))
 
-    def _reach_frames(self, root: FrameState | None) -> None:
+    def _update_frames(self, root: FrameState | None) -> None:
         before, now = self._frames, _by_serial(root)
         self._root, self._frames = root, now
         news: dict[int, Form | None] = {}
@@ -232,10 +232,10 @@ class RunState:
             self._put_row(place, self._rows[place]._replace(cancelled=True))
             self._cancelled.append(place)
 
-    def _put_in_force(self, key: _Key, place: int) -> None:
+    def _put_in_effect(self, key: _Key, place: int) -> None:
         """A component took the command: it replaces the one in effect before."""
-        before = self._in_force.get(key)
-        self._in_force[key] = place
+        before = self._in_effect.get(key)
+        self._in_effect[key] = place
         if before == place:  # sent again after a restart
             return
         if before is not None:
