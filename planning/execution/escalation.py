@@ -146,9 +146,10 @@ class Escalation:
 
     def _end(self, run: PlanRun) -> tuple[PlanStep, ...] | None:
         """The fewest last steps of the successor, or of the plan without one, that lead to the goal."""
+        world, progress = self._knowledge.snapshot(), run.progress  # its reads need no lock
         if run.successor is None:
-            return run.progress.shortest_end(self._knowledge)
-        return shortest_end(run.successor.steps, run.progress.domain, self._knowledge, run.progress.goal)
+            return progress.shortest_end(world)
+        return shortest_end(run.successor.steps, progress.domain, world, progress.goal)
 
     def _chosen(
         self, run: PlanRun, failed: PlanStep | None, end: tuple[PlanStep, ...] | None, why: str
@@ -173,7 +174,8 @@ class Escalation:
     def _continued(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None) -> Outcome:
         """Continue with `steps` without a planner call; their first one prefers other candidates to `instead_of`."""
         name = self._recorded(run, steps, why, instead_of)
-        order = self.plotting.order(Plan(steps), run.goal)
+        known = None if run.successor is None else run.successor.order(steps, self._knowledge.version)
+        order = self.plotting.order(Plan(steps), run.goal, known)
         progress = PlanProgress(steps, run.progress.domain, run.progress.goal, order.before)
         again = PlanRun(name, run.goal, progress, run.attempt, run.holder, run.seconds, run.replans, replaces=run.name)
         return self.found(again, order, self.plotting.form(again, order, instead_of))

@@ -13,7 +13,7 @@ from typing import Any
 from knowledge_base.conditions.condition import Condition, Firing
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Change
-from knowledge_base.language.evaluation import holds
+from knowledge_base.language.evaluation import World, holds
 from knowledge_base.language.expression import Atom, Expression
 from knowledge_base.language.printer import to_text
 from knowledge_base.store import KnowledgeBase
@@ -98,7 +98,7 @@ class Monitor:
         is_own: Callable[[str], bool],
         hear: Callable[[News], None],
     ) -> None:
-        self._course = progress
+        self._progress = progress
         self._domain = domain
         self._knowledge = knowledge
         self._is_own = is_own
@@ -106,12 +106,13 @@ class Monitor:
         self._links: dict[Expression, Condition] = {}
         self._to_come: dict[Expression, Condition] = {}
         self._whole: Callable[[], None] = lambda: None
+        self._is_broken = False
         self._goal = self._install(progress.goal, self._goal_fired)
 
     def look(self, author: str) -> None:
         """Judge the plan as a whole, whoever changed the world (`author`, as far as that is known)."""
         self.update()
-        progress, world = self._course, self._knowledge
+        progress, world = self._progress, self._knowledge
         if _true(progress.goal, world):
             self._hear(GoalReached(author))
         elif len(progress.running) > 1:  # nobody is interrupted for the sake of a shorter plan
@@ -138,7 +139,7 @@ class Monitor:
 
     def update(self) -> None:
         """Watch what is needed now, and what later steps will bring in case that somebody else does."""
-        progress = self._course
+        progress = self._progress
         needed, later = progress.needed(), progress.needed_later()
         self._whole()
         if needed is None or later is None:
@@ -183,32 +184,37 @@ class Monitor:
 
     def _came(self, _: Expression, firing: Firing) -> None:
         if firing.truth and self._foreign(firing) is not None:
-            self._course.early = True
+            self._progress.early = True
 
     def _link_fired(self, e: Expression, firing: Firing) -> None:
         author = None if firing.truth else self._foreign(firing)
-        if author is None or _true(self._course.goal, self._knowledge):  # that the goal is reached is heard by itself
+        if author is None or _true(self._progress.goal, self._knowledge):  # that the goal is reached is heard by itself
             return
-        progress, world = self._course, self._knowledge
-        if e in (progress.needed() or {}) and e in (progress.needed_later() or {}):
-            # Whatever the step at work has done by now; if a later step can be the next one, it will be.
+        progress = self._progress
+        later = e in (progress.needed() or {}) and e in (progress.needed_later() or {})
+        if later and self._is_broken:  # one change may break many links
+            return
+        world = self._knowledge.snapshot()  # its reads need no lock
+        if later:
+            # The effects of the running step do not matter; a later step that can be the next one will be.
             if shortest_end(progress.coming(), self._domain, world, progress.goal) is None:
                 self._hear(self._broken(author, firing.version, e))
-        elif not progress.stands(world):  # the step at work itself is hit
+        elif not progress.stands(world):  # the change breaks the running step
             end = shortest_end(progress.coming(), self._domain, world, progress.goal)
             self._hear(self._broken(author, firing.version, e) if end is None else Shorter(end))
 
     def _changed(self, change: Change) -> None:
-        if not self._is_own(change.author) and not self._course.stands(self._knowledge):
+        if not self._is_own(change.author) and not self._progress.stands(self._knowledge):
             self._hear(self._broken(change.author, change.version))
 
     def _broken(self, author: str, version: int, fallen: Expression | None = None) -> Broken:
-        progress = self._course
+        progress, world = self._progress, self._knowledge.snapshot()
+        self._is_broken = True
         now, later = progress.needed() or {}, progress.needed_later() or {}
         needed = {**now, **{one: user for one, user in later.items() if one not in now}}
         if fallen is None:
-            fallen = next((one for one in needed if not _true(one, self._knowledge)), None)
-        why = validate(Plan(progress.remaining_steps), self._domain, self._knowledge, progress.goal).why
+            fallen = next((one for one in needed if not _true(one, world)), None)
+        why = validate(Plan(progress.remaining_steps), self._domain, world, progress.goal).why
         if fallen is None:
             return Broken(why, "", len(progress.steps) + 1, author, version)
         return Broken(why, to_text(fallen), needed[fallen], author, version)
@@ -220,7 +226,7 @@ def _brought(step: PlanStep, domain: PlanningDomain) -> list[Expression]:
     return [part for part in expected if isinstance(part, Atom)]
 
 
-def _true(e: Expression, world: KnowledgeBase) -> bool:
+def _true(e: Expression, world: World) -> bool:
     try:
         return holds(e, world)
     except InputError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import aclosing
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dsc.calls import Outcome
@@ -139,10 +140,10 @@ class Monitoring:
             case Broken():
                 outcome = _invalid(news.needed, news.why, news.author)
             case Found():
-                outcome = self._follow(news.answer, news.steps, news.kept)
+                outcome = self._follow(news.answer, Successor(news.steps, kept=news.kept, found=news))
             case Better(answer):
                 better = self._better(answer.plan)
-                outcome = None if better is None else self._follow(answer, better, 0)
+                outcome = None if better is None else self._follow(answer, Successor(better))
         return outcome
 
     def _changed(self, change: Change) -> None:
@@ -229,11 +230,11 @@ class Monitoring:
         self._install().update()  # the monitor has just looked at these steps, as if the running one were done
         return None
 
-    def _follow(self, answer: PlanFound, steps: tuple[PlanStep, ...], kept: int) -> Outcome | None:
+    def _follow(self, answer: PlanFound, successor: Successor) -> Outcome | None:
         """Replace the plan by a new one, after the running step if the new one begins with that too."""
         run, name = self._run, self._escalation.runs.new_name()
         self._records.found(answer, name)
-        if not run.follow(Successor(steps, name, kept)):
+        if not run.follow(replace(successor, name=name)):
             return self._replaced("a new plan begins in another way")
         self._look("earlier")
         return None

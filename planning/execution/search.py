@@ -189,10 +189,11 @@ class Search:
 
     def _judged(self, plan: Plan, goal: Expression) -> tuple[Validation, PartialOrder | None]:
         """Whether the plan leads to the goal, and its order, for which it is carried out in thought only once."""
+        world = self._knowledge.snapshot()  # its reads need no lock
         if not plan.schedule:
             with contextlib.suppress(InputError):
-                return Validation(valid=True), deordered(plan, self._domain, self._knowledge, goal)
-        return validate(plan, self._domain, self._knowledge, goal), None
+                return Validation(valid=True), deordered(plan, self._domain, world, goal)
+        return validate(plan, self._domain, world, goal), None
 
     async def _in_time(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
         try:
