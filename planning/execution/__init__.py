@@ -1,1 +1,1 @@
-"""Execution of plans: monitoring, repair, replacement, and giving up."""
+"""Execution of plans: monitoring, repair and replacement."""

@@ -72,7 +72,7 @@ class Choices:
 
 @dataclass(frozen=True, slots=True)
 class Escalation:
-    """Continues a plan without a planner call, requests a new plan, or gives up.
+    """Continues a plan without a planner call, requests a new plan, or abandons the goal.
 
     Attributes:
         derivation: of the planning domain.

@@ -1,4 +1,4 @@
-"""A plan that does not hold any more is mended where that takes little: what comes next stays as it was."""
+"""LocalRepair keeps the end of a broken plan and plans only the way to that end, if it is short."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from planning.strips import Problem
 from planning.validation import validate
 
 MOST_LONGER = 2
-"""A mended plan is taken if it has at most so many steps more than what was left."""
+"""The number of steps by which a repaired plan may be longer than the remaining one."""
 _MOST_UNMET = 3
-"""An end of a plan that lacks more than so many conditions is not worth asking about."""
+"""The number of unmet conditions up to which an end of a plan is tried."""
 _MOST_LEFT_OUT = 2
-"""So many of the first steps may be done in another way than planned."""
+"""The number of first steps that a repair may replace."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,24 +51,24 @@ def local_repair(
     goal: Expression,
     patience: WorkLimit | None = None,
 ) -> LocalRepair | None:
-    """How to mend what is left of a plan, if that promises to take little.
+    """Return the repair of a plan that promises the least work; `None` if all need too much.
 
     Of the ends of the plan the one that is nearest to being possible is kept; the problem is to reach what it needs.
 
     Args:
-        before: the plan as far as it came.
-        excluded: steps that shall not be taken.
+        before: the plan, with its done, running and remaining steps.
+        excluded: steps that the repair must omit.
         domain: has the steps' conditions and effects.
         world: the present.
-        goal: what the plan is for.
+        goal: the goal of the plan.
         patience: for how long.
 
     Raises:
-        OutOfPatienceError: it takes too long.
+        WorkLimitError: it takes too long.
     """
     derived = derivation(domain)
-    closed, left = derived.world(world), before.remaining  # once: the plan may go on meanwhile
-    if derived.recursive:  # its conditions are those of another state of the world
+    closed, left = derived.world(world), before.remaining  # once: the plan may continue meanwhile
+    if derived.recursive:  # its conditions belong to another state of the world
         before = before.renewed(derived.domain, derived.expand(goal))
     ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))
     known = ((before.steps_of(end), before.needed_by(end)) for end in ends)
@@ -83,20 +83,20 @@ def local_repair(
         return None
     try:
         problem = build_problem(domain, world, And(tuple(needed)), patience=patience)
-    except InputError:  # what the end needs cannot be asked for
+    except InputError:  # no problem has these conditions as its goal
         return None
     return None if problem.unreachable else LocalRepair(end, problem)
 
 
 class _Truths:
-    """What holds of what is needed, asked once: one end of a plan needs most of what a shorter one does."""
+    """Truth values of conditions, each evaluated once: the ends of a plan share most of their conditions."""
 
     def __init__(self, world: World) -> None:
         self._world = world
         self._known: dict[int, bool] = {}  # by identity: conditions live as long as the plan that they are about
 
     def unmet(self, needed: Iterable[Expression]) -> list[Expression]:
-        """What does not hold of what is needed, as soon as it is too much no more of it."""
+        """The conditions that do not hold, at most one more than `_MOST_UNMET`."""
         return list(islice((one for one in needed if not self._holds(one)), _MOST_UNMET + 1))
 
     def _holds(self, condition: Expression) -> bool:
@@ -110,7 +110,7 @@ def _true(condition: Expression, world: World) -> bool:
     if isinstance(condition, Atom) and condition.predicate in world.schema.predicates:
         args = [term.value for term in condition.args if isinstance(term, Constant)]
         if len(args) == len(condition.args) and condition.predicate not in world.schema.computed:
-            return world.holds(condition.predicate, tuple(args))  # most are such: asked once, not worth preparing
+            return world.holds(condition.predicate, tuple(args))  # most are such, and a compiled test does not pay
     try:
         return holds(condition, world)
     except InputError:

@@ -1,7 +1,7 @@
-"""Watching a plan that is carried out: what its steps need of the world is installed in the knowledge base.
+"""Monitor installs the causal links of a plan's remaining steps as conditions in the knowledge base.
 
-A change that touches nothing of it costs nothing. What the running step or a rule changes is judged when the step has
-ended, that is when the next one begins; what anybody else changes is judged at once (S4.2).
+A change that touches no condition costs nothing. The monitor validates changes by the running step or a rule when the
+next step begins, and changes by other authors immediately (S4.2).
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from planning.validation import validate
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """What is left of the plan does not lead to the goal any more.
+    """The remaining steps no longer lead to the goal.
 
     Attributes:
-        why: what does not hold when its turn comes, in PDDL.
+        why: the condition that does not hold when its step comes, in PDDL.
         needed: the condition on the present that is broken, as text; empty if it has no single one.
         user: number of the first step that needs it; one more than the plan has for the goal.
-        author: who changed it.
+        author: of the change.
         version: the knowledge base's version since when.
     """
 
@@ -46,14 +46,14 @@ class Broken:
 
 @dataclass(frozen=True, slots=True)
 class Shorter:
-    """Fewer steps than are left lead to the goal."""
+    """Fewer steps than the remaining ones lead to the goal."""
 
     steps: tuple[PlanStep, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class GoalReached:
-    """The goal holds, and steps are left."""
+    """The goal holds before the last step."""
 
     author: str
 
@@ -62,7 +62,7 @@ News = Broken | Shorter | GoalReached
 
 
 def news_form(news: News) -> dict[str, Any]:
-    """As plain data."""
+    """Plain data."""
     match news:
         case Broken():
             return {"broken": asdict(news)}
@@ -81,13 +81,13 @@ def news_from(form: Mapping[str, Any]) -> News:
 
 
 class Monitor:
-    """Watches one plan until it is closed.
+    """Watches the causal links of one plan until it is closed.
 
     Args:
-        progress: how far the plan is; whoever begins a step there calls `look` then.
+        progress: of the plan; the caller that begins a step there calls `look` then.
         domain, knowledge: as everywhere.
         is_own: whether a change by this author is the running step's own doing.
-        hear: is told what is new, in the moment in which it becomes so.
+        hear: receives the news of a change during its commit.
     """
 
     def __init__(
@@ -110,12 +110,12 @@ class Monitor:
         self._goal = self._install(progress.goal, self._goal_fired)
 
     def look(self, author: str) -> None:
-        """Judge the plan as a whole, whoever changed the world (`author`, as far as that is known)."""
+        """Validate the plan as a whole after a change by `author`."""
         self.update()
         progress, world = self._progress, self._knowledge
         if _true(progress.goal, world):
             self._hear(GoalReached(author))
-        elif len(progress.running) > 1:  # nobody is interrupted for the sake of a shorter plan
+        elif len(progress.running) > 1:  # a shorter plan interrupts no step
             if not progress.stands(world):
                 self._hear(self._broken(author, world.version))
         else:
@@ -130,7 +130,7 @@ class Monitor:
                 self._hear(Shorter(end))
 
     def close(self) -> None:
-        """Watch no longer."""
+        """Remove all conditions."""
         self._whole()
         for condition in (*self._links.values(), *self._to_come.values(), self._goal):
             if condition is not None:
@@ -138,7 +138,7 @@ class Monitor:
         self._links, self._to_come, self._goal = {}, {}, None
 
     def update(self) -> None:
-        """Watch what is needed now, and what later steps will bring in case that somebody else does."""
+        """Install the conditions needed now, and the effects of later steps, which another author may cause first."""
         progress = self._progress
         needed, later = progress.needed(), progress.needed_later()
         self._whole()
@@ -167,13 +167,13 @@ class Monitor:
     def _install(self, e: Expression, fired: Callable[[Expression, Firing], None]) -> Condition | None:
         try:
             condition = self._knowledge.install(e)
-        except InputError:  # it is about something that is not there, so that it is false and cannot become true
+        except InputError:  # it names a missing object, and so stays false
             return None
         condition.subscribe(lambda firing: fired(e, firing), falls=True)
         return condition
 
     def _foreign(self, firing: Firing) -> str | None:
-        """Who made the change, if it was somebody else."""
+        """The author of the change, unless that is the running step."""
         (change,) = self._knowledge.changes(since=firing.version - 1, until=firing.version)
         return None if self._is_own(change.author) else change.author
 
@@ -188,7 +188,9 @@ class Monitor:
 
     def _link_fired(self, e: Expression, firing: Firing) -> None:
         author = None if firing.truth else self._foreign(firing)
-        if author is None or _true(self._progress.goal, self._knowledge):  # that the goal is reached is heard by itself
+        if author is None or _true(
+            self._progress.goal, self._knowledge
+        ):  # the condition of the goal reports a reached goal
             return
         progress = self._progress
         later = e in (progress.needed() or {}) and e in (progress.needed_later() or {})
@@ -221,7 +223,7 @@ class Monitor:
 
 
 def _brought(step: PlanStep, domain: PlanningDomain) -> list[Expression]:
-    """The facts that a step adds, as far as that does not depend on the world."""
+    """The facts that a step adds in every world."""
     expected = conjuncts(expectation(domain.action(step).effect, domain.bindings(step)))
     return [part for part in expected if isinstance(part, Atom)]
 

@@ -1,4 +1,4 @@
-"""What happens to plans, as records of the trace (`plan.*`) and in sentences for people."""
+"""PlanRecords writes the records `plan.*` of a trace; `why_broken` puts one into a sentence."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
     from planning.plan import PlanFound, PlanStep
 
 _CUT_SHORT = {"reproducible": False}
-"""Said where a limit of real time had a part: the same seed may then give another run."""
+"""A mark for answers that a limit of real time influenced: the same seed may give another run."""
 
 
 class PlanRecords:
-    """Writes what happens to plans into a trace."""
+    """Writes the life of plans into a trace."""
 
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
 
     def asked(self, goal: str, version: int) -> None:
-        """A plan is looked for."""
+        """Record the start of a search."""
         self._trace.record("plan.asked", goal=goal, version=version)
 
     def found(self, answer: PlanFound, name: str) -> None:
-        """There is a plan; engines that were asked as well and failed are named."""
+        """Record a plan, and the engines that failed in the same race."""
         more: dict[str, Any] = {} if answer.reproducible else dict(_CUT_SHORT)
         if answer.failures:
             more["failures"] = [{"engine": one.engine, "message": one.message} for one in answer.failures]
@@ -40,10 +40,10 @@ class PlanRecords:
         self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine, **more)
 
     def ordered(self, name: str, order: PartialOrder) -> None:
-        """The plan of that name is going to be carried out: its steps, and its causal links.
+        """Record the steps and the causal links of a plan that is about to run.
 
-        A link says which step, from 1, brings about what for which; 0 is what holds already, one past the last the
-        goal. What holds already and only the goal needs is left out: it may be as much as the goal has parts.
+        A link has a provider, a fact and a user; steps count from 1. Provider 0 is the present world, and the user
+        after the last step is the goal. Links from 0 to the goal are omitted, since a goal may have many parts.
         """
         goal = len(order.steps) + 1
         kept = [link for link in order.links if (link.provider, link.user) != (PRESENT, goal)]
@@ -56,11 +56,11 @@ class PlanRecords:
         )
 
     def none(self, kind: str, reason: str) -> None:
-        """There is none."""
+        """Record a search without a plan."""
         self._trace.record("plan.none", kind=kind, reason=reason, **(_CUT_SHORT if kind == "timed_out" else {}))
 
     def broken(self, progress: PlanProgress, news: Broken) -> None:
-        """What is left of a plan does not lead to the goal any more: who changed what that which step needs."""
+        """Record that the remaining steps no longer lead to the goal, with the broken link and the author."""
         user = str(progress.steps[news.user - 1]) if news.user <= len(progress.steps) else "the goal"
         self._trace.record(
             "plan.broken",
@@ -72,32 +72,32 @@ class PlanRecords:
         )
 
     def replaced(self, old: str, new: str, kept: int) -> None:
-        """A new plan takes the place of one on its way, whose last `kept` steps it keeps."""
+        """Record that a new plan replaces a running one, whose last `kept` steps it keeps."""
         self._trace.record("plan.replaced", plot=new, after=old, kept=kept)
 
     def resumed(self, old: str, new: str, step: PlanStep, why: str, instead_of: str | None) -> None:
-        """The same plan goes on at a step; not with the candidate `instead_of` if there is another one that fits."""
+        """Record that a plan resumes at a step, with another candidate than `instead_of` if one fits."""
         other = {} if instead_of is None else {"instead_of": instead_of}
         self._trace.record("plan.resumed", plot=new, after=old, step=str(step), why=why, **other)
 
     def skipped(self, name: str, steps: Iterable[PlanStep], why: str) -> None:
-        """Steps of the plan of that name are left out since the goal is reached without them."""
+        """Record skipped steps, which the goal does not need."""
         self._trace.record("plan.skipped", plot=name, steps=[str(step) for step in steps], why=why)
 
     def gave_up(self, name: str, reason: str) -> None:
-        """No plan is tried any more."""
+        """Record that the goal is abandoned."""
         self._trace.record("plan.gave_up", plot=name, reason=reason)
 
     def excluded(self, step: PlanStep, seconds: float, why: str) -> None:
-        """New plans do without a step for a while."""
+        """Record that new plans omit a step for some seconds."""
         self._trace.record("plan.excluded", step=str(step), seconds=seconds, why=why)
 
     def readmitted(self, steps: Iterable[PlanStep]) -> None:
-        """There is no plan without these steps."""
+        """Record that new plans may use excluded steps again, since none exists without them."""
         self._trace.record("plan.readmitted", steps=sorted(str(step) for step in steps))
 
     def rejected(self, step: PlanStep | None, reason: str, engine: str) -> None:
-        """The simulation foresees that a plan fails, at a step."""
+        """Record that the simulation predicts the failure of a plan, at a step."""
         self._trace.record("plan.rejected", step=None if step is None else str(step), reason=reason, engine=engine)
 
 
@@ -105,12 +105,12 @@ _texts: IdentityCache[Expression, str] = IdentityCache()
 
 
 def _text(fact: Expression) -> str:
-    """Kept by identity: plans one after the other have most of their steps in common, and these their conditions."""
+    """Kept by identity: successive plans share most of their steps, and these their conditions."""
     return _texts.find(fact, None) or _texts.keep(fact, None, to_text(fact))
 
 
 def why_broken(broken: Mapping[str, Any]) -> str:
-    """In a sentence: why a plan was given up, from the data of its record `plan.broken`."""
+    """Explain the record `plan.broken` in a sentence, from its data."""
     link, author = broken["link"], broken["author"]
     if not link["fact"]:
         return f"the plan no longer leads to the goal: {broken['reason']} (version {broken['version']}, {author})"

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 
 
 STOPPING = 10.0
-"""Seconds in which a planner that was told to stop has to; ending an engine's processes takes less than one."""
+"""Seconds in which a cancelled planner must stop; the processes of an engine end within one."""
 
 _Result = TypeVar("_Result")
 
 
 class LateError(Exception):
-    """There was no answer in time.
+    """A planner did not answer in time.
 
     Attributes:
-        obeyed: the work has stopped when it was told to.
+        obeyed: whether the work stopped when it was cancelled.
     """
 
     def __init__(self, *, obeyed: bool) -> None:
@@ -42,15 +42,15 @@ class LateError(Exception):
 
 
 async def bounded(work: Awaitable[_Result], seconds: float, name: str) -> _Result:
-    """What the work comes to within that time, or when it is told to stop; it is told so, too, when nobody waits.
+    """Return the result of the work within a bound of real time; cancel the work at that bound or with the caller.
 
     Args:
-        work: what a planner does.
-        seconds: how long it may take.
-        name: of who does it, to be blamed.
+        work: of a planner.
+        seconds: the bound.
+        name: of the planner, for complaints.
 
     Raises:
-        LateError: there is nothing.
+        LateError: the work has no result.
     """
     task = asyncio.ensure_future(_contained(work))
     try:
@@ -88,7 +88,7 @@ async def _ends(task: asyncio.Future[Any], seconds: float) -> bool:
 
 
 async def _stopped(task: asyncio.Future[Any], name: str) -> bool:
-    """Tell the work to stop; whether it has."""
+    """Cancel the work; return whether it stopped."""
     task.cancel()
     try:
         ended = await _ends(task, STOPPING)
@@ -102,9 +102,9 @@ async def _stopped(task: asyncio.Future[Any], name: str) -> bool:
 
 
 def _throw_away(task: asyncio.Future[Any], name: str) -> None:
-    """Let the work not be gone on with."""
+    """Abandon work that ignores its cancellation."""
     blame(name, "it goes on although it was told to stop")
-    task.add_done_callback(lambda task: task.cancelled() or task.exception())  # nobody else will look at it
+    task.add_done_callback(lambda task: task.cancelled() or task.exception())  # marks its exception as retrieved
     if isinstance(task, asyncio.Task):
         with contextlib.suppress(Exception):
             task.get_coro().close()
@@ -112,16 +112,16 @@ def _throw_away(task: asyncio.Future[Any], name: str) -> None:
 
 
 def blame(name: str, what: str) -> None:
-    """Say what a planner does wrong that changes no answer, in the way of asyncio: to the loop's handler."""
+    """Report a fault of a planner that changes no answer to the exception handler of the loop."""
     asyncio.get_running_loop().call_exception_handler({"message": f"planner {name}: {what}"})
 
 
 class Improvements:
-    """An asynchronous iterator, to be closed.
+    """Better plans after the first one: an asynchronous iterator that the caller closes.
 
     Args:
-        better: what the planner gives (`Improving.plans`).
-        name: of the planner, to be blamed.
+        better: plans of the planner (`Improving.plans`).
+        name: of the planner, for complaints.
     """
 
     def __init__(self, better: AsyncGenerator[PlanningOutcome, None], name: str) -> None:
@@ -135,27 +135,27 @@ class Improvements:
         return await bounded(anext(self._better), math.inf, self._name)
 
     async def aclose(self) -> None:
-        """No better plan is of use any more."""
+        """Stop the planner."""
         try:
             await bounded(self._better.aclose(), STOPPING, self._name)
-        except LateError:  # it has been blamed if it did not obey
+        except LateError:  # reported already if it did not obey
             return
-        except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
+        except Exception as error:  # noqa: BLE001  no fault of a planner may end the run
             blame(self._name, f"it cannot be closed: {described(error)}")
 
 
 PATIENCE = 90.0
-"""Seconds of real time beyond its own for a planner that does not keep to it; starting an engine may take a minute."""
+"""Seconds of real time that a planner may exceed its own bound; an engine may need a minute to start."""
 
 Answer = tuple[PlanningOutcome, Improvements | None]
-"""What it says, and what may follow if it goes on; to be closed."""
+"""The answer of a planner, and its better plans, which the caller closes."""
 
 
 class PlannerCalls:
-    """A planner, and the clock of the run that asks it.
+    """Calls of one planner, bounded in real time and in the time of the run.
 
     Attributes:
-        name: of the planner's class, by which it is blamed.
+        name: of the planner's class, for complaints.
     """
 
     def __init__(self, planner: Planner, clock: LoopClock) -> None:
@@ -164,14 +164,14 @@ class PlannerCalls:
         self.name = type(planner).__name__
 
     def give_up_at(self, seconds: float) -> asyncio.Timeout:
-        """A bound for all asking in a block, in simulated time.
+        """Bound all calls of a block in simulated time.
 
-        That is held while anybody searches; a planner that is itself simulated may let it pass, but not for ever.
+        A search holds that time; a planner that is itself simulated may let it pass up to this bound.
         """
         return self._clock.timeout_at(self._clock.now() + seconds + PATIENCE if self._clock.simulated else math.inf)
 
     async def solve(self, problem: Problem, seconds: float, *, going_on: bool = True) -> Answer:
-        """The planner's answer, and what may follow if it goes on (not in simulated time, which is the same twice)."""
+        """Return the planner's answer, and its better plans in real time; simulated runs must be repeatable."""
         if going_on and not self._clock.simulated and isinstance(self._planner, Improving):
             plans = self._planner.plans(problem, seconds)
             better = Improvements(plans, self.name)
@@ -183,7 +183,7 @@ class PlannerCalls:
         return await self._bounded(self._planner.solve(problem, seconds), seconds), None
 
     async def _bounded(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
-        """The answer, or that there was none in time or none at all; in real time, whatever the clock says."""
+        """Return the answer, or the failure to answer, within a bound of real time."""
         engine = self.name
         try:
             with self._clock.hold():
@@ -192,7 +192,7 @@ class PlannerCalls:
             if late.obeyed:
                 return TimedOut(engine, seconds)
             return EngineFailed(engine, "no answer in time, and it goes on although it was told to stop")
-        except Exception as error:  # noqa: BLE001  whatever a planner does wrong must not end the run
+        except Exception as error:  # noqa: BLE001  no fault of a planner may end the run
             return EngineFailed(engine, described(error))
         if isinstance(answer, PlanningOutcome):
             return answer

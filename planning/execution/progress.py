@@ -1,4 +1,4 @@
-"""A plan being carried out: what is done, at work and left, and whether what is left still leads to the goal."""
+"""PlanProgress holds the done, running and remaining steps of a plan, and tests whether they lead to the goal."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from planning.problem.costs import TOTAL_COST
 from planning.quantities import worth
 
 _MOST_RUNNING = 3
-"""Of so many steps at work, each is looked at as not begun and as done; of more, only all of them."""
+"""The number of running steps up to which each subset of them is tried as done; of more, only none and all."""
 
 
 def leads_to(steps: Iterable[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> bool:
-    """Whether the steps, taken in this order from `world`, reach the goal; `world` stays as it is."""
-    ahead: Overlay | None = None  # not sooner than it is needed: of a plan's ends, most fail at their first step
+    """Whether the steps, taken in this order from `world`, reach the goal; `world` stays unchanged."""
+    ahead: Overlay | None = None  # lazily: of a plan's ends, most fail at their first step
     try:
         for step in steps:
             if not domain.applicable(step, ahead or world):
@@ -32,7 +32,7 @@ def leads_to(steps: Iterable[PlanStep], domain: PlanningDomain, world: World, go
             ahead = ahead or Overlay(world)
             ahead.apply(domain.effects(step, ahead))
         return holds(goal, ahead or world)
-    except InputError:  # something is not there any more, or cannot be computed
+    except InputError:  # an object is missing, or a value cannot be computed
         return False
 
 
@@ -45,7 +45,7 @@ def shortest_end(
 
 
 def thinned(steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> tuple[PlanStep, ...]:
-    """A plan without steps that are of no use: each is left out, with what then cannot be done, if the goal is reached.
+    """Return a plan without useless steps: each is omitted, with the steps that need it, if the goal is still reached.
 
     Action elimination (Nakhost & Müller 2010); the result is a plan whenever `steps` are one.
     """
@@ -62,7 +62,7 @@ def thinned(steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goa
 def _possible(
     first: Iterable[PlanStep], then: Iterable[PlanStep], domain: PlanningDomain, world: World
 ) -> Iterator[PlanStep]:
-    """Those of `then` that can be taken after `first`, the others left out."""
+    """The steps of `then` that are applicable after `first`, one after the other."""
     ahead = Overlay(world)
     for step in first:
         ahead.apply(domain.effects(step, ahead))
@@ -73,7 +73,7 @@ def _possible(
 
 
 def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
-    """What the steps, taken in this order from `world`, add to `(total-cost)`; their number if it is not declared."""
+    """Return the `(total-cost)` of the steps, in this order from `world`; their number if it is not declared."""
     if TOTAL_COST.function not in domain.schema.functions:
         return len(steps)
     ahead = Overlay(world)
@@ -84,19 +84,19 @@ def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> 
 
 
 class PlanProgress:
-    """How far a plan is; steps are spoken of by their number, from 1.
+    """The done, running and remaining steps of a plan, by their number from 1.
 
-    A step is done, or left out by a rule, when one that has to come after it has begun: nobody begins a step too early.
+    A step is done, or omitted by a rule, when a step that must follow it has begun: no plot begins a step too early.
 
     Args:
         steps: the plan's steps.
         domain: has their conditions and effects, without derived predicates.
-        goal: what they are for, in the same way.
-        before: pairs of steps of which the first has to be done when the second begins; each pair of the
-            sequence if left out.
+        goal: of the plan, in the same way.
+        before: pairs of steps of which the first must be done when the second begins; each pair of the
+            sequence by default.
 
     Attributes:
-        early: somebody else has brought about what a later step would bring, so that steps may be of no use.
+        early: whether another author has caused an effect of a later step, so that steps may be useless.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class PlanProgress:
         self.early = False
 
     def to_json(self) -> dict[str, Any]:
-        """The steps, their order, and how far they are; what is done follows from that."""
+        """The steps, their order, and the numbers of those that have begun; the done ones follow."""
         before = None if self._before is None else sorted(map(list, self._before))
         steps = [step.to_json() for step in self.steps]
         return {"steps": steps, "before": before, "begun": sorted(self._begun), "early": self.early}
@@ -132,17 +132,17 @@ class PlanProgress:
         return progress
 
     def renewed(self, domain: PlanningDomain, goal: Expression) -> PlanProgress:
-        """Just as far, with conditions written for another state of the world."""
+        """The same progress, with conditions written for another state of the world."""
         progress = PlanProgress(self.steps, domain, goal, self._before)
         progress._begun, progress._done = set(self._begun), set(self._done)
         return progress
 
     def take_in_order(self, before: AbstractSet[tuple[int, int]]) -> None:
-        """The steps wait for each other in this way as well; nothing has begun yet."""
+        """Add pairs to the order, before the first step begins."""
         self._before = None if self._before is None else self._before | before
 
     def begin(self, number: int) -> None:
-        """A step has begun."""
+        """Begin a step."""
         self._begun.add(number)
         agenda = [number]
         while agenda:
@@ -158,28 +158,28 @@ class PlanProgress:
 
     @property
     def running(self) -> tuple[int, ...]:
-        """The steps that have begun and are not known to be done."""
+        """The steps that have begun, without those that are certainly done."""
         return tuple(sorted(self._begun - self._done))
 
     @property
     def remaining(self) -> tuple[int, ...]:
-        """The steps that are not done, those at work among them, in an order in which they can be taken."""
+        """The steps that are not done, with the running ones, in an executable order."""
         return tuple(number for number in range(1, len(self.steps) + 1) if number not in self._done)
 
     @property
     def remaining_steps(self) -> tuple[PlanStep, ...]:
-        """The steps with the numbers of `left`."""
+        """The steps with the numbers of `remaining`."""
         return self.steps_of(self.remaining)
 
     def needed(self) -> Mapping[Expression, int] | None:
-        """What must hold now, with who needs it first; `None` if that cannot be written as conditions.
+        """The conditions that must hold now, with the first user of each; `None` if regression cannot write them.
 
-        A step at work may have done its part already, so that what later steps need of it counts as well.
+        The effects of a running step may hold already, so that later steps need them too.
         """
         return self._needs.before(self.remaining)
 
     def needed_by(self, numbers: tuple[int, ...]) -> Mapping[Expression, int] | None:
-        """As `needed`, if only the steps with these numbers, in this order, were left."""
+        """As `needed`, if only the steps with these numbers remained, in this order."""
         return self._needs.before(numbers)
 
     def steps_of(self, numbers: Iterable[int]) -> tuple[PlanStep, ...]:
@@ -187,15 +187,15 @@ class PlanProgress:
         return tuple(self.steps[number - 1] for number in numbers)
 
     def needed_later(self) -> Mapping[Expression, int] | None:
-        """As `needed`, as if everything at work were done."""
+        """As `needed`, if all running steps were done."""
         return self._needs.before(self._after(self.running))
 
     def stands(self, world: World) -> bool:
-        """Whether the goal is reached from `world`; each step at work may not have begun or be done."""
+        """Whether the goal is reached from `world`; each running step counts as not begun or as done."""
         return any(leads_to(steps, self.domain, world, self.goal) for steps in self._ways_on())
 
     def shortest_end(self, world: World) -> tuple[PlanStep, ...] | None:
-        """The fewest last steps that lead to the goal from `world`, each step at work among them or not."""
+        """The fewest last steps that lead to the goal from `world`, with any of the running steps."""
         ends = (shortest_end(steps, self.domain, world, self.goal) for steps in self._ways_on())
         return min((end for end in ends if end is not None), key=len, default=None)
 
@@ -204,7 +204,7 @@ class PlanProgress:
         return self.steps_of(self._after(self.running))
 
     def _ways_on(self) -> Iterator[tuple[PlanStep, ...]]:
-        """What may be left to do."""
+        """The step sequences that may remain, for each choice of running steps that are done."""
         running = self.running
         sizes = range(len(running) + 1) if len(running) <= _MOST_RUNNING else (0, len(running))
         finished = itertools.chain.from_iterable(itertools.combinations(running, size) for size in sizes)

@@ -42,7 +42,7 @@ _CHANGING = {"increase": "+", "decrease": "-", "scale-up": "*", "scale-down": "/
 
 
 class UnregressableError(Exception):
-    """A number changes for many things at once, by an amount of their own: no condition before says as much."""
+    """An effect changes a number for many objects by different amounts, which no condition before can express."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +60,10 @@ def leaves(effect: Effect) -> tuple[Leaf, ...]:
 
 
 def regressed(e: Expression, changes: Sequence[Leaf]) -> Expression:
-    """What must hold before these changes are made so that `e` holds after them.
+    """Return the condition that must hold before these changes so that `e` holds after them.
 
     Raises:
-        UnregressableError: see there.
+        UnregressableError: the changes have no such condition.
     """
     match e:
         case Atom():
@@ -169,7 +169,7 @@ def _decided(operator: str, left: Term, right: Term) -> Expression | None:
 
 
 def _values(term: Term, changes: Sequence[Leaf]) -> list[tuple[Expression, Term]]:
-    """What the term's value after the changes is before them, by cases that exclude each other."""
+    """The value of a term after the changes, as terms before them, by cases that exclude each other."""
     match term:
         case Call(function, args):
             cases: list[tuple[Expression, Term]] = [(TRUE, term)]
@@ -209,9 +209,9 @@ class CausalNeeds:
     """The causal links of a plan's steps from the present, by regression.
 
     Args:
-        steps: the plan's steps; they are spoken of by their number, from 1.
+        steps: the plan's steps, numbered from 1.
         domain: has their conditions and effects.
-        goal: what they are for; it counts as the user after the last step.
+        goal: of the plan; it counts as the user after the last step.
 
     Raises:
         InputError: a step names no action of the domain.
@@ -219,7 +219,7 @@ class CausalNeeds:
 
     def __init__(self, steps: Sequence[PlanStep], domain: PlanningDomain, goal: Expression) -> None:
         self._steps = [_Regressing.of(domain.ground(step)) for step in steps]
-        self._names: dict[int, frozenset[str]] = {}  # by identity: all conditions live as long as what was found
+        self._names: dict[int, frozenset[str]] = {}  # by identity: all conditions live as long as `_found`
         wanted = dict.fromkeys(conjuncts(goal), len(steps) + 1)
         self._found: dict[tuple[int, ...], _Found | None] = {(): _Found(wanted, tuple(filter(_is_open, wanted)))}
 
@@ -263,12 +263,12 @@ class CausalNeeds:
         return _Found(needed, (*kept, *fresh))
 
     def _touched(self, step: _Regressing, after: _Found) -> tuple[list[Expression], list[Expression]]:
-        """Of what later steps need: what the step brings about in any case, and what else it may have to do with.
+        """Split the needs of later steps: those that the step always causes, and others that it may touch.
 
         That is little; the rest is taken over as it is.
         """
         plain, changed_here = step.plain, step.changed
-        if plain is None:  # what it changes depends on the world: everything about the same predicates
+        if plain is None:  # its changes depend on the world: everything about the same predicates
             return [], [one for one in after.needed if not changed_here.isdisjoint(self._about(one))]
         touched = [one for one in after.open if not changed_here.isdisjoint(self._about(one))]
         if not after.needed.keys().isdisjoint(plain.deletes):
@@ -286,7 +286,7 @@ class CausalNeeds:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """What is needed before some steps, with its first user; and which of it is no ground fact, in order."""
+    """The needs before some steps, with the first user of each; and those that are more than ground facts, in order."""
 
     needed: Mapping[Expression, int]
     open: tuple[Expression, ...]
@@ -294,12 +294,12 @@ class _Found:
 
 @dataclass(frozen=True, slots=True)
 class _Regressing:
-    """What has to be known of a step to see what is needed before it.
+    """The parts of a step that regression needs.
 
     Attributes:
         needed: its own conditions, as an ordered set.
-        open: those of them that are no ground facts.
-        changes: what it changes.
+        open: its conditions that are more than ground facts.
+        changes: its effects.
         changed: predicates and functions of that.
         plain: the ground facts among it, if there are no other changes.
     """
@@ -327,14 +327,14 @@ _regressing: IdentityCache[GroundStep, _Regressing] = IdentityCache(size=1024)
 
 @dataclass(frozen=True, slots=True)
 class _Plain:
-    """The ground facts that a step makes true and false, whatever the world is like."""
+    """The ground facts that a step makes true and false in every world."""
 
     adds: tuple[Expression, ...]
     deletes: tuple[Expression, ...]
 
 
 def _plain(changes: Iterable[Leaf]) -> _Plain | None:
-    """What is changed in any case, if there are no other changes."""
+    """The changes that a step makes in every world; `None` if it may make others."""
     adds: dict[Expression, None] = {}
     deletes: dict[Expression, None] = {}
     for one in changes:

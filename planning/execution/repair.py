@@ -1,4 +1,4 @@
-"""Attempt chooses the escalation step for a failed plan, between the rules of a plot and giving up (S1.4, S4.2).
+"""Attempt chooses the escalation step for a failed plan, after the rules of a plot and before `gave_up` (S1.4, S4.2).
 
 The same failure in the same situation never gets the same answer twice. Each answer and their number are bounded.
 """

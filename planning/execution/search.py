@@ -41,13 +41,13 @@ if TYPE_CHECKING:
 
 
 class Foresight(Protocol):
-    """A simulation that knows more than the planning domain does, e.g. the physics of a ready world."""
+    """A simulation that knows more than the planning domain does, e.g. the physics of a ready world (S1.10)."""
 
     def foresee(self, plan: Plan, world: World) -> Validation:
-        """What will come of the plan when it is carried out from `world`, the world as the robot believes it to be.
+        """Simulate the plan from `world`, the world that the robot believes in.
 
-        A plan that is not valid is rejected, and its failing step left out of the next one. Called in a thread of its
-        own; must end by itself and change nothing.
+        The search rejects a plan that is not valid, and omits its failing step from the next one. The call runs in its
+        own thread; it must end and change nothing.
         """
         ...
 
@@ -55,12 +55,12 @@ class Foresight(Protocol):
 EXCLUDED_SECONDS = 120.0
 """Seconds of run time for which new plans omit a step that failed repeatedly."""
 MAX_ATTEMPTS = 3
-"""How often to plan anew because the world changed while the planner worked."""
+"""The number of searches for one plan while the world changes."""
 MAX_REJECTED = 5
-"""How many plans the simulation may reject."""
+"""The number of plans that the simulation may reject."""
 _IN_CONCERT = "there is only a plan with several steps at a time that need each other, which is not carried out yet"
 LOCAL_REPAIR_SECONDS = 2.0
-"""Real time for finding out how to mend a plan, at most."""
+"""Bound of real time for a local repair."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +69,9 @@ class Found:
 
     Attributes:
         answer: the plan, and where it comes from.
-        kept: how many steps at the end of the plan before it keeps.
-        better: what comes of a planner that goes on; to be closed.
-        order: which steps wait for which, found out while the plan was validated; `None` for one with a schedule.
+        kept: the number of last steps that it shares with the plan before.
+        better: better plans of the planner; the caller closes them.
+        order: its partial order, computed by the validation; `None` for a plan with a schedule.
         version: of the knowledge that it was validated on.
     """
 
@@ -87,7 +87,7 @@ class Found:
         return self.answer.plan.steps
 
     async def close(self) -> None:
-        """No better plan is wanted."""
+        """Close the better plans."""
         if self.better is not None:
             await self.better.aclose()
 
@@ -101,11 +101,11 @@ class NotFound:
 
 
 class Search:
-    """Finds plans for goals, and remembers which steps to do without for a while.
+    """Finds plans for goals, and remembers the excluded steps.
 
     Args:
-        domain, knowledge, planner, clock: as everywhere.
-        records: hears what is excluded, readmitted and rejected.
+        domain, knowledge, planner, clock: as in the planning component.
+        records: receives excluded, readmitted and rejected steps.
         foresight: has to agree with a plan before it counts.
     """
 
@@ -127,12 +127,12 @@ class Search:
         self._excluded: dict[PlanStep, float] = {}
 
     def exclude(self, step: PlanStep, why: str) -> None:
-        """Do without a step for a while."""
+        """Exclude a step from new plans for some seconds."""
         self._excluded[step] = self._clock.now() + EXCLUDED_SECONDS
         self._records.excluded(step, EXCLUDED_SECONDS, why)
 
     def remember(self) -> list[Any]:
-        """Which steps to do without until when, as plain data."""
+        """The excluded steps and the ends of their exclusion, as plain data."""
         return [[step.to_json(), until] for step, until in self._excluded.items()]
 
     def recall(self, memory: Iterable[Any]) -> None:
@@ -142,16 +142,16 @@ class Search:
     async def plan(
         self, goal: Expression, seconds: float, before: PlanProgress | None, sleep: Callable[[float], Awaitable[None]]
     ) -> Found | NotFound:
-        """A plan for the goal from the world as it is when it is found.
+        """Return a plan for the goal that is valid in the present world when it is found.
 
         Args:
-            goal: what shall hold.
+            goal: a condition.
             seconds: real time for one search.
-            before: the plan that it takes the place of; what is left of it is mended if that takes little.
-            sleep: lets the simulated time of a search pass, which has begun earlier if the run was broken off.
+            before: the plan that it replaces, and that a local repair may keep in part.
+            sleep: passes the simulated time of a search; an interrupted search has begun earlier.
 
         Raises:
-            InputError: the goal names what is not there, or uses what no engine can do.
+            InputError: the goal names a missing object, or needs more than any engine supports.
         """
         rejected: dict[PlanStep, str] = {}
         changed = 0
@@ -188,7 +188,7 @@ class Search:
                 return NotFound("failed", f"the world changes faster than plans are made: {verdict.why}")
 
     def _judged(self, plan: Plan, goal: Expression) -> tuple[Validation, PartialOrder | None]:
-        """Whether the plan leads to the goal, and its order, for which it is carried out in thought only once."""
+        """Validate the plan and compute its order, in one pass over its steps."""
         world = self._knowledge.snapshot()  # its reads need no lock
         if not plan.schedule:
             with contextlib.suppress(InputError):
@@ -210,7 +210,7 @@ class Search:
         rejected: dict[PlanStep, str],
         snapshot: WorldState,
     ) -> Found | NotFound:
-        """One plan for the world as it was."""
+        """Return a plan for the world of the snapshot."""
         budget = WorkLimit(seconds)
         repaired = None if before is None else await self._repaired(goal, seconds / 2, before, snapshot)
         if isinstance(repaired, Found):
@@ -233,19 +233,19 @@ class Search:
 
     async def _posed(self, goal: Expression, snapshot: WorldState, patience: WorkLimit) -> Problem:
         durations = not self._clock.simulated and bool(timing())
-        with self._clock.hold():  # grounding takes its time as well: in a thread, so that a stop is obeyed
+        with self._clock.hold():  # a thread, so that a cancellation ends the wait
             return await aside(
                 lambda: build_problem(self._domain, snapshot, goal, durations=durations, patience=patience), patience
             )
 
     async def _why_not(self, goal: Expression, snapshot: WorldState, patience: WorkLimit) -> tuple[str, ...]:
-        """What is missing for the goal; nothing if that takes too long to find out."""
+        """The conditions missing for the goal; none if their search takes too long."""
         with self._clock.hold(), contextlib.suppress(WorkLimitError):
             return await aside(lambda: why_unsolvable(self._domain, snapshot, goal, patience), patience)
         return ()
 
     async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> Answer:
-        """The planner's answer, without the excluded steps if there is a plan without them."""
+        """Return the planner's answer, without the excluded steps if a plan without them exists."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
         answer, better = await self._planner.solve(without(problem, {*excluded, *rejected}), seconds)
         if isinstance(answer, ProvenUnsolvable) and excluded and not problem.unreachable:
@@ -257,7 +257,7 @@ class Search:
     async def _repaired(
         self, goal: Expression, seconds: float, before: PlanProgress, snapshot: WorldState
     ) -> Found | TimedOut | None:
-        """What was left of the plan before, mended; `TimedOut` if a limit of real time cut in."""
+        """Return the local repair of the plan before; `TimedOut` at a limit of real time."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
         try:
             with self._clock.hold():
@@ -296,7 +296,7 @@ class Search:
 def _unknown(
     answer: NoneFound | TimedOut | EngineFailed | NobodyCan, domain: PlanningDomain, goal: Expression, seconds: float
 ) -> NotFound:
-    """No plan, and no proof that there is none."""
+    """Describe an answer without a plan and without a proof."""
     match answer:
         case NoneFound(reason=reason):
             return NotFound("unsolvable", reason)
