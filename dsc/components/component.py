@@ -1,4 +1,4 @@
-"""What is deployed: something with skills, parameters, modes and a life."""
+"""Component: a deployed part of the robot with skills, parameters, modes and a life cycle."""
 
 from __future__ import annotations
 
@@ -28,24 +28,27 @@ from knowledge_base.errors import UnknownNameError
 ALWAYS = ""
 """Stands for every mode in `Component.needs`."""
 TAKES = "__dsc_takes__"
-"""Where `takes` notes what it declares."""
+"""The attribute in which `takes` notes its declaration."""
 
 
 class Component:
-    """Base of all components.
+    """Base class of components.
+
+    Hooks to override: `start`, `stop` and `activate` for the life; `configure` and `switch` for the ports; `status`,
+    `abandon`, `forget`, `remember` and `recall` for restarts; `needed` and `reach` for other components; `diagnose`.
 
     Attributes:
-        name: how charts address it; it may be chosen at deployment.
-        domain: what it brings to the planning domain: a PDDL file, or PDDL text; `None` for nothing.
-        concurrent: whether it can carry out several skills at once. Steps of a plan that use one which cannot never
-            overlap; what plots start side by side is their own affair.
+        name: the name in charts; it may be chosen at deployment.
+        domain: its part of the planning domain: a PDDL file, or PDDL text; `None` for nothing.
+        concurrent: whether it can execute several skills together. If not, steps of a plan that use it never overlap;
+            plots may still start them in parallel.
         modes: the sub-states it has while Alive, besides `neutral`; if it names none, any may be asked for.
-        declares: its parameters with type, range and who may change them; if it names none, any may be set.
+        declares: its parameters with type, range and the roles that may change them; if empty, any may be set.
         relations: conditions between its parameters that always hold.
         needs: mode -> a tuple of names of the components it needs then; `ALWAYS`: in every mode.
-        activations: who has activated its events.
+        activations: the activations of its events.
         pushes, streams: its push ports, and what it takes from those of others, by name; see `dsc.components.streams`.
-        life: where it is in its life; `self.life.become(Life.FATAL_ERROR, "no power")` when the device is gone.
+        life: its life cycle; call `self.life.become(Life.FATAL_ERROR, "no power")` when the device is gone.
     """
 
     name: str = ""
@@ -67,7 +70,7 @@ class Component:
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
         self.parameters: dict[str, Any] = dict(unsaid(self.declares))
-        self._judged = False  # the parameters that are being set are known to fit together
+        self._judged = False  # the new parameters were validated as one set
         self.life = LifeCycle()
         self.activations = EventActivations()
         self.pushes: dict[str, Push] = {}
@@ -82,7 +85,7 @@ class Component:
 
     @property
     def mode(self) -> str:
-        """The sub-state of Alive that it is in, `neutral` at rest; whom it needs may depend on it."""
+        """The sub-state of Alive, `neutral` when idle; the needs may depend on it."""
         return self.life.mode
 
     @mode.setter
@@ -114,13 +117,13 @@ class Component:
         return declared.carry_out(self, body, call, arguments)
 
     def body(self, skill_name: str) -> SkillBody:
-        """What carries out a skill of that name, which exists."""
+        """The function that executes a declared skill."""
         return cast(SkillBody, getattr(self, skill_name))
 
     async def configure(self, parameter: str, value: object) -> None:
         """The *param* port: set a named parameter; override to react.
 
-        Of a declared one, `None` takes back what was said. What relies on it is unbound, see `Parameter.depends_on`.
+        `None` resets a declared one. Parameters that rely on it are unbound, see `Parameter.depends_on`.
 
         Raises:
             UnknownNameError: the component declares its parameters, and this is none.
@@ -131,9 +134,9 @@ class Component:
         self.parameters.update(after)
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
-        """Have the parameters that were in force before a restart: judged as one set, then each set by `configure`.
+        """Restore the parameters of before a restart: validate them as one set, then `configure` each.
 
-        They come in the order in which they were said last, as what is said anew unbinds what relies on it.
+        They come in the order of their last changes, as each change unbinds the parameters that rely on it.
 
         Raises:
             UnknownNameError, InputError: as `configure`; if one value does not fit, none is set.
@@ -150,16 +153,16 @@ class Component:
             self._judged = False
 
     def check_parameter(self, parameter: str, value: object, who: Who | None = None) -> None:
-        """Whether a parameter may have that value now; nothing is changed.
+        """Validate a parameter's value without setting it.
 
         Args:
             parameter: its name.
-            value: what it shall be.
-            who: somebody who wants to change it; nobody in particular if left out.
+            value: the value to validate.
+            who: the role that changes it; without one, roles are not validated.
 
         Raises:
             UnknownNameError: the component declares its parameters, and this is none.
-            InputError: the value does not fit what is declared, or a relation, or it is not for `who` to say.
+            InputError: the value does not fit what is declared, or a relation, or the role may not change it.
         """
         if not self.declares and who is None:  # it takes anything from plots, and nothing from others
             return
@@ -182,7 +185,7 @@ class Component:
         return changed(self.name, self.declares, values, {parameter: value})
 
     async def switch(self, mode: str) -> None:
-        """The *state* port: enter a mode (`neutral` is at rest); override to react."""
+        """The *state* port: enter a mode (`neutral` when idle); override to react."""
         self.mode = mode
 
     async def take(self, port: str, message: Mapping[str, Any]) -> None:
@@ -199,7 +202,7 @@ class Component:
         await getattr(self, port)(**message)
 
     def update(self, event: str, *values: Any) -> None:
-        """Put a new value before all who have activated the event; those who come later are told it, too.
+        """Test a new value for each activation of the event, and for later ones at their beginning.
 
         Raises:
             UnknownNameError: the component has no such event.
@@ -210,21 +213,20 @@ class Component:
         self.activations.update(event, values)
 
     async def start(self) -> None:
-        """From Init to Alive: override to open devices; what is raised means FatalError."""
+        """From Init to Alive: override to open devices; an error leads to FatalError."""
 
     async def stop(self) -> None:
         """To Shutdown: override to close devices."""
 
     async def activate(self, active: bool) -> None:  # noqa: FBT001
-        """A state or somebody active needs it from now on, or nobody any more (S1.9, S4.1).
+        """Become active for a state or an active component, or inactive (S1.9, S4.1).
 
-        Override it to take resources and to free them. It is called between `start` and the first skill, again with
-        `True` if it was started anew meanwhile, and with `False` only if it was with `True`; what it raises means
-        FatalError.
+        Override it to take resources and to free them. The first call comes between `start` and the first skill, and
+        a restart repeats it. `False` only follows `True`. An error leads to FatalError.
         """
 
     async def change_mode(self, mode: str) -> None:
-        """What `switch` in a chart does: a mode, or `init` (start anew) and `shutdown`.
+        """Execute a chart's `switch`: enter a mode, restart (`init`) or shut down (`shutdown`).
 
         Raises:
             UnknownNameError: the component says which modes it has, and this is none.
@@ -251,28 +253,27 @@ class Component:
         return await never
 
     async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
-        """What became of an action that this process did not start; override to ask the robot.
+        """The status of an action that another process started; override to ask the robot.
 
-        `RUNNING` and `NOT_BEGUN` let the skill be executed with that id; it then awaits the action's end, or
-        does it. What may be done about an `UNKNOWN` one, the skill's `after_crash` says.
+        After `RUNNING` and `NOT_BEGUN` the skill is executed with that id: it awaits the end of the action, or begins
+        it. After `UNKNOWN` the skill's `after_crash` decides.
         """
         return Status.UNKNOWN
 
     async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
-        """Stop an action, if it still goes on, that was cancelled just before the run was broken off.
+        """Stop an action that was cancelled just before a crash, if it still runs.
 
-        Whether the cancellation has reached the robot is not known. Override it where actions go on when this
-        process dies; those that are part of it have ended with it.
+        The cancellation may not have reached the robot. Override it if actions survive this process.
 
         Returns:
-            How it ended, if it had before it could be stopped: what it observed then is so.
+            Its end, if it ended before it could be stopped: these observations are true.
         """
         return None
 
     async def forget(self, action_id: str) -> None:
-        """Nobody will ask for the action's end any more: it has been taken and, with a store, is kept.
+        """Forget the end of an action: it was taken and, with a store, is kept.
 
-        Override it where ends are remembered for that.
+        Override it if ends are remembered for `status`.
         """
 
     def remember(self) -> Any:

@@ -11,11 +11,10 @@ from knowledge_base.language.inputs import require_several, shown
 
 
 def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
-    """All of them, if these are components, each with a name of its own.
+    """Validate components: their instances, unique names and needs; return them.
 
     Raises:
-        InputError: it is no list of them, something in it is none, e.g. a class instead of its instance, or what one
-            needs is not said rightly.
+        InputError: the argument is not a list, an item is not a component instance, or its needs are malformed.
         SchemaError: two have one name.
     """
     require_several(components, "components")
@@ -36,7 +35,7 @@ def _require_needs(component: Component) -> None:
     """Raise an error unless a component's `needs` are names, for modes that it has.
 
     Raises:
-        InputError: what is needed in a mode is no tuple of names, e.g. one name without the comma.
+        InputError: the needs in a mode are not a tuple of names, e.g. one name without the comma.
         UnknownNameError: the component says which modes it has, and one is none.
     """
     name, needs = component.name, component.needs
@@ -53,11 +52,11 @@ def _require_needs(component: Component) -> None:
 
 
 def require_deployed(components: Collection[Component], besides: Iterable[str] = ()) -> None:
-    """Raise `UnknownNameError` for a component that another needs, in whatever mode, and that is not deployed.
+    """Raise `UnknownNameError` for a component that another needs, in any mode, and that is not deployed.
 
     Args:
-        components: all that there will be; who can reach others elsewhere is believed.
-        besides: names of others that there will be.
+        components: all components; those that reach others elsewhere are not validated.
+        besides: names of further components.
     """
     deployed = {*(component.name for component in components), *besides}
     for component in components:

@@ -1,4 +1,4 @@
-"""Heartbeats carry the activation tree over a transport: active components say whom they need (S1.9, S4.1)."""
+"""Heartbeats carry the activation tree over a transport: active components name their needs (S1.9, S4.1)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SILENCE = 3.0
 """Seconds without a heartbeat after which a component counts as gone: some may be lost."""
 
 Changed = Callable[[bool], Awaitable[None]]
-"""Is told that the component has become active, or inactive: to take its resources and to free them."""
+"""Called when the component becomes active, to take its resources, or inactive, to free them."""
 
 
 class Heartbeat:
@@ -25,8 +25,8 @@ class Heartbeat:
     Args:
         endpoint: its address.
         needs: names of the components it needs at present; asked at each beat, so it may depend on its state.
-        changed: is told when it becomes active or inactive.
-        root: active without anybody needing it, as the sequencer is.
+        changed: called when it becomes active or inactive.
+        root: active without an activator, as the sequencer is.
     """
 
     def __init__(
@@ -43,16 +43,16 @@ class Heartbeat:
         endpoint.hear("heartbeat", self._heard)
 
     def alive(self, name: str) -> bool:
-        """Whether a component is active and was heard of lately."""
+        """Whether a component is active and has sent a heartbeat lately."""
         return _now() - self._heard_at.get(name, -math.inf) < SILENCE
 
     @property
     def activators(self) -> frozenset[str]:
-        """Who needs it at present."""
+        """Names of the components that need it at present."""
         return frozenset(self._activators)
 
     def stir(self) -> None:
-        """Beat at once: its needs have changed."""
+        """Beat immediately: its needs have changed."""
         self._stirred.set()
 
     async def run(self) -> None:
@@ -78,12 +78,12 @@ class Heartbeat:
         if active == self.active:
             return
         self.active = active
-        if not active:  # who depends on us need not wait for our silence
+        if not active:  # dependants need not wait for silence
             self._endpoint.broadcast("heartbeat", {"needs": []})
         await self._changed(active)
 
     def need(self, sender: str) -> None:
-        """Somebody says, otherwise than by a heartbeat, that it is active and needs this component."""
+        """Add an active component that needs this one, without its heartbeat."""
         self._heard(sender, {"needs": [self._endpoint.address]})
 
     def _heard(self, sender: str, said: Any) -> None:

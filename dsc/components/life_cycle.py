@@ -21,7 +21,7 @@ class Life(StrEnum):
 
 
 NEUTRAL = "neutral"
-"""The mode at rest."""
+"""The mode of an idle component."""
 _NEXT = {
     Life.INIT: {Life.ALIVE, Life.SHUTDOWN, Life.FATAL_ERROR},
     Life.ALIVE: {Life.INIT, Life.SHUTDOWN, Life.FATAL_ERROR},

@@ -121,7 +121,7 @@ class Dispatcher:
         return self.timers.waiting or any(math.isfinite(one.due) for one in self._running.values())
 
     def dispatch(self, output: Output) -> None:
-        """Carry out one output of the machine.
+        """Execute one output of the machine.
 
         Raises:
             UnknownNameError: no component of that name is deployed.
@@ -291,7 +291,7 @@ class Dispatcher:
         self._fault(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
 
     def _answer(self, running: _Running, outcome: Outcome) -> None:
-        """Post the end of a skill, one time; until that has succeeded its time limit stands."""
+        """Post the end of a skill, one time; its time limit ends only after that."""
         if not running.answered:
             if running.reports is not None:
                 running.reports.flush()

@@ -1,4 +1,4 @@
-"""What is handed in to a run where types are not checked: judged once, with one line of error."""
+"""Input checks: untyped input to a run is validated one time, with one line of error."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def require_parts(library: object, knowledge: object, clock: object, trace: obje
 
 
 def event(said: object) -> Event:
-    """The event with attributes of its own.
+    """The event with copied attributes.
 
     Raises:
-        InputError: it is none, only the executive fires it, or an attribute is no plain data.
+        InputError: it is not an event, only the executive fires it, or an attribute is not plain data.
     """
     plain = isinstance(said, Event) and said.attributes is NO_ATTRIBUTES  # as most are
     if not isinstance(said, Event) or not (plain or isinstance(said.attributes, Mapping)):
@@ -63,7 +63,7 @@ def change(delta: Delta, author: str, knowledge: KnowledgeBase) -> KnowledgeMess
 def parameter(
     owner: str, name: str, value: object, components: Mapping[str, Component], library: Library
 ) -> ParameterMessage:
-    """What an operator says a parameter is worth.
+    """An operator's setting of a parameter.
 
     Raises:
         UnknownNameError: there is no such component or plot, or it declares no such parameter.
@@ -83,10 +83,10 @@ def parameter(
 
 
 def arguments(plot: ActionPlot, given: object) -> Mapping[str, Any]:
-    """What a plot is begun with, if it may be handed to it.
+    """The arguments of a plot, validated.
 
     Raises:
-        InputError: it is no mapping, a value is no plain data, or a number or truth value is wanted and it is none.
+        InputError: it is not a mapping, a value is not plain data, or a number or truth value is of another type.
     """
     if not isinstance(given, Mapping):
         raise InputError(f"arguments are a mapping of parameters' names to values, not {shown(given)}")

@@ -48,7 +48,7 @@ def _conforming(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
     event, attributes, observed = outcome.event, outcome.attributes, outcome.observed
     if not isinstance(event, str):
         raise InputError(f"it ended with the event {shown(event)}, which is no text")
-    event = str.__str__(event)  # a subclass, e.g. an `Enum`, has a comparison of its own
+    event = str.__str__(event)  # a subclass, e.g. an `Enum`, may compare differently
     declared = NO_ATTRIBUTES if event == OBSERVED else outcomes.get(event)
     if declared is None:
         raise InputError(f"it ended with '{event}', which it does not declare")
@@ -73,7 +73,7 @@ def _plain(event: str, attributes: Mapping[str, Any], declared: Declared) -> dic
 
     Raises:
         UnknownNameError: one is not declared.
-        InputError: one is missing, is of another type, or is no plain data.
+        InputError: one is missing, is of another type, or is not plain data.
     """
     if attributes.keys() != declared.keys():
         _refuse_names(event, attributes, declared)
@@ -104,7 +104,7 @@ def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase) -> Skill
             worlds.insert(0, after := knowledge.overlay())
             after.apply(said.observed)
         _require_objects(said.event, said.attributes, message.declared or {}, *worlds)
-    except Exception as error:  # noqa: BLE001  # what a skill hands over may be anything, e.g. not hashable
+    except Exception as error:  # noqa: BLE001  # an outcome may contain anything, e.g. unhashable values
         outcome = broken(message.start, described(error, named=not isinstance(error, InputError)))
         return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)
     return message
@@ -154,7 +154,7 @@ def _require_objects(event: str, attributes: Mapping[str, Any], declared: Declar
     """Require that each attribute of an object type names an object of one of these worlds.
 
     Raises:
-        InputError: it is no name, there is no such thing, or it is of another type.
+        InputError: it is not a name, there is no such object, or it is of another type.
     """
     schema = worlds[0].schema
     for name, wanted in declared.items():

@@ -1,4 +1,4 @@
-"""What a message does to machine and knowledge, and what is recorded of it; nothing leaves from here."""
+"""Reactor: a message changes machine and knowledge, and its macrostep is recorded; nothing leaves from here."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_CANCELLED = 1_000
 CHART = "chart"
 """Author of what a plot tells the knowledge base."""
 StepListener = Callable[[Step], None]
-"""Is told every macrostep; must not block."""
+"""Called with each macrostep; must not block."""
 
 
 class Reactor:
@@ -37,12 +37,12 @@ class Reactor:
     Attributes:
         machine: the chart's state.
         emitted: outcome events of the plot so far.
-        problem: why the run cannot go on, or what went wrong in its last step.
+        problem: the reason to end the run, or the error of its last step.
         in_vain: periods that passed without any effect since anything else happened.
-        settings: what an operator has said about plots, by plot and parameter.
+        settings: an operator's settings of plots, by plot and parameter.
         caused_by: the records of the skills that were started and may still say something, by action id; of cancelled
             ones the latest `MOST_CANCELLED`.
-        listeners: are told every macrostep, before its actions leave.
+        listeners: called with each macrostep, before its actions leave.
     """
 
     def __init__(self, library: Library, knowledge: KnowledgeBase, trace: Trace) -> None:
@@ -60,7 +60,7 @@ class Reactor:
         self._cancelled: deque[str] = deque()
 
     def restore(self, kept: Kept) -> None:
-        """Be as after the last macrostep of a run that was broken off."""
+        """Restore the state after the last macrostep of an interrupted run."""
         self.machine.state = kept.state
         self.emitted = list(kept.emitted)
         self.in_vain = set(kept.in_vain)
@@ -74,7 +74,7 @@ class Reactor:
         self.tracer.known_plots.update(record.data["hash"] for record in kept.records if record.type == "plot")
 
     def start(self, plot: str, arguments: Mapping[str, Any], serials: int = 0) -> tuple[Output, ...]:
-        """Enter the plot; what has to be carried out then. `serials` is the last serial number given out before.
+        """Enter the plot; return the outputs. `serials` is the last serial number given out before.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
@@ -92,7 +92,7 @@ class Reactor:
             return ()
 
     def react(self, message: Message) -> tuple[Output, ...]:
-        """Let the machine take the message; what has to be carried out then."""
+        """Let the machine take the message; return the outputs."""
         try:
             event = self._received(message)
             before = self.machine.state
@@ -112,7 +112,7 @@ class Reactor:
         return output
 
     def leave(self) -> tuple[Output, ...]:
-        """Wherever the run ends, exit actions put the components at rest; a finished machine has nothing to leave."""
+        """Leave the active states at the end of a run: exit actions stop the components; return the outputs."""
         if self.machine.state.root is None:
             return ()
         try:
@@ -122,7 +122,7 @@ class Reactor:
             return ()
 
     def _received(self, message: Message) -> Event | None:
-        """Apply what the message observed; the event the machine shall see, if any."""
+        """Apply the observations of a message; return its event for the machine, if any."""
         if isinstance(message, LateMessage):
             message = message.message
         if isinstance(message, KnowledgeMessage):
@@ -145,7 +145,7 @@ class Reactor:
         return event
 
     def _set_default(self, setting: ParameterMessage) -> None:
-        """The plot has another default from now on, wherever it is entered anew."""
+        """Change the default of a plot's parameter for later entries."""
         self.settings[setting.owner, setting.name] = setting
         self.library = self.library.with_default(setting.owner, setting.name, setting.value, "operator")
         self.machine.chart = self.library
@@ -216,7 +216,7 @@ class Reactor:
             self.in_vain.add((message.timer.activation, message.timer.index))
 
     def _unhandled(self, message: Message, event: Event) -> None:
-        """An answer that its own, still active state does not take would leave that state waiting for ever."""
+        """End the run if an active state ignores its own skill's answer: it would wait without end."""
         if not isinstance(message, SkillMessage) or not message.final or event.to is None:
             return
         if self.machine.state.has_activation(event.to):
@@ -226,6 +226,6 @@ class Reactor:
 
 
 def _is_vain(step: Step) -> bool:
-    """Whether nothing came of it but the next period; in the same state and world, nothing ever will."""
+    """Whether its only output is the next period; in the same state and world, that never changes."""
     only_timers = all(isinstance(output, StartTimer) for output in step.output)
     return only_timers and not step.knowledge and not step.emitted

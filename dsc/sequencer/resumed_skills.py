@@ -20,7 +20,7 @@ class InterruptedSkill:
 
     Attributes:
         began: second of run time at which it was started.
-        reports: how many of its intermediate events were taken.
+        reports: the number of its intermediate events that were taken.
     """
 
     began: float

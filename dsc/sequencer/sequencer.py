@@ -34,12 +34,12 @@ _MOST_GROUPED = 100
 
 @dataclass(frozen=True, slots=True)
 class RunEnd:
-    """How a run ended.
+    """The end of a run.
 
     Attributes:
         finished: the plot reached its final state.
         emitted: outcome events of the plot, in order.
-        problem: why it ended without reaching it, or what went wrong in its last step; else `None`.
+        problem: the reason of an end elsewhere, or the error of its last step; else `None`.
     """
 
     finished: bool
@@ -48,7 +48,7 @@ class RunEnd:
 
     @property
     def reached(self) -> bool:
-        """Whether it finished and no goal of its own was left open, by `no_plan` or `gave_up`."""
+        """Whether it finished, and none of its goals ended with `no_plan` or `gave_up`."""
         return self.finished and not any(event.name in {NO_PLAN, GAVE_UP} for event in self.emitted)
 
 
@@ -60,11 +60,11 @@ class Sequencer:
         knowledge: the world model; changed only by the plot's `tell`s and by what components observe.
         components: the skills, by the names the plots use.
         clock: run time; must be made inside the loop that runs the sequencer.
-        trace: hears everything; a fresh one if left out.
-        open_ended: whether events may still come from outside when nothing is going on; if not, such a
-            run ends with a problem instead of waiting for ever.
-        store: keeps the run, so that it can be taken up again after a crash; its knowledge is `knowledge`.
-        part_of: stands before the action ids that components see; an id of another run, if this one is part of it.
+        trace: records everything; a fresh one by default.
+        open_ended: whether events may come from outside while nothing is pending; if not, such a run ends with a
+            problem.
+        store: keeps the run, so that it can resume after a crash; its knowledge is `knowledge`.
+        part_of: a prefix of the action ids that components receive; an id of the run of which this one is a part.
 
     Attributes:
         library, knowledge, clock, trace, store: as given.
@@ -117,14 +117,14 @@ class Sequencer:
         self._inbox.rearrange(order)
 
     def working_for(self, action_id: str) -> frozenset[str]:
-        """Names of the components that carry out skills for the content of the state that started `action_id`."""
+        """Names of the components whose skills run inside the state that started `action_id`."""
         started = self.dispatcher.started()
         owner = next((start.activation for start in started if start.action_id == action_id), None)
         inside = frozenset() if owner is None else self.machine.state.activations_inside(owner)
         return frozenset(start.component for start in started if start.activation in inside)
 
     def diagnose(self) -> dict[str, Any]:
-        """How the run is going, as plain data: active states, actions under way, how much waits to be taken."""
+        """The status of the run as plain data: active states, running actions, the number of waiting messages."""
         return {
             "component": "sequencer",
             "finished": self.machine.state.finished,
@@ -142,22 +142,21 @@ class Sequencer:
         With a store, one that comes later is kept from now on, any other from when it is taken.
 
         Args:
-            event: what happened.
+            event: its name and attributes.
             after: seconds until it comes; meanwhile the run does not end for want of things to come.
 
         Raises:
-            InputError: the event is one that only the executive itself fires, e.g. `done`, or an attribute is no
-                plain data.
+            InputError: only the executive itself fires the event, e.g. `done`, or an attribute is not plain data.
             StoreError: it could not be kept.
         """
         self._hand_in(input_checks.event(event), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
-        """Hand in a change of knowledge that somebody else made; from the loop's own thread.
+        """Hand in a change of knowledge from outside; from the loop's own thread.
 
         Args:
-            delta: what is different now.
-            author: who says so.
+            delta: the change.
+            author: its author.
             after: as for `post`.
 
         Raises:
@@ -167,15 +166,15 @@ class Sequencer:
         self._hand_in(input_checks.change(delta, author, self.knowledge), after)
 
     def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
-        """Hand in what an operator says a parameter is worth from now on; from the loop's own thread.
+        """Hand in an operator's setting of a parameter; from the loop's own thread.
 
-        A component is told before its next skill begins. A plot has it wherever it is entered from then on and nobody
-        hands it another value. Both are kept with the run.
+        A component takes it before its next skill begins. A plot uses it at later entries without another value for
+        it. Both are kept with the run.
 
         Args:
             owner: the component, or the plot, that has the parameter.
             name: of the parameter.
-            value: within its range; of a component, `None` takes back what was said.
+            value: within its range; of a component, `None` resets it.
             after: as for `post`.
 
         Raises:
@@ -186,11 +185,11 @@ class Sequencer:
         self._hand_in(input_checks.parameter(owner, name, value, self.dispatcher.components, self.library), after)
 
     async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
-        """Run the plot until it ends, or until nothing can happen any more.
+        """Run the plot until it ends, or until a deadlock.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
-            StoreError: the store cannot be written; what was committed before can be resumed.
+            StoreError: the store cannot be written; the run can resume from its last commit.
         """
         given = input_checks.arguments(self.library.plot(plot), {} if arguments is None else arguments)
 
@@ -200,10 +199,10 @@ class Sequencer:
         return await self._until_end(begin)
 
     async def resume(self, kept: Kept) -> RunEnd:
-        """Go on with a run after its last macrostep, as if nothing had been.
+        """Continue a run after its last macrostep.
 
         Args:
-            kept: what the store gave; clock and trace go on from it.
+            kept: the run from the store; clock and trace continue from it.
 
         Raises:
             StoreError: the store cannot be written.
@@ -232,7 +231,7 @@ class Sequencer:
                     reactor.problem = problem
                     break
                 self._take(message)
-        except asyncio.CancelledError:  # somebody wants it to end; a crash would not come here
+        except asyncio.CancelledError:  # cancelled from outside; a crash does not get here
             reactor.problem = reactor.problem or "it was cancelled"
             self._leave()
             self._keep_end()
@@ -306,7 +305,7 @@ class Sequencer:
     def _may_group(self, message: Message, output: Collection[Output]) -> bool:
         """Whether the next macrostep may share the commit of this one.
 
-        It does not if an output leaves between them, nor with answers of components, each of which is kept at once.
+        It does not if an output leaves between them, nor with answers of components, each of which is kept immediately.
         """
         waiting = self._inbox.waiting
         if output or self._before_events or not waiting:
@@ -321,7 +320,7 @@ class Sequencer:
         return output
 
     def _leave(self) -> None:
-        """Nothing is dispatched that could not be committed: a store that was lost has somebody else's run."""
+        """Dispatch nothing that could not be committed: another process owns the run of a lost store."""
         if self.store is None:
             output = self._reactor.leave()
         elif self.store.lost or not self.store.begun or self.machine.state.root is None:

@@ -14,13 +14,16 @@ from knowledge_base.errors import InputError
 
 
 class ComponentActivation:
-    """Sees to it that who is needed is kept going.
+    """Gives each required component a supervisor, and releases the others.
 
-    What a component does that takes no resources and needs nobody is no affair of ours, unless somebody needs it.
+    A component without resources and without needs takes part only if another one needs it.
 
     Args:
-        registry: who is there.
-        used: names of those that carry out something, or put things in order after it.
+        registry: the deployed components.
+        used: names of the components whose skills run or clean up.
+
+    Attributes:
+        concerned: names of the components that take part.
     """
 
     def __init__(self, registry: ComponentRegistry, used: Callable[[], Iterable[str]]) -> None:
@@ -38,11 +41,11 @@ class ComponentActivation:
 
     @property
     def on(self) -> frozenset[str]:
-        """Names of those that are alive and switched on."""
+        """Names of the components that are alive and active."""
         return frozenset(supervisor.name for supervisor in self._supervisors.values() if supervisor.on)
 
     def deployed(self, component: Component) -> None:
-        """A component is about to be there, maybe in place of another one."""
+        """Add a component before the registry has it; it may replace another one."""
         before = self._registry.components.get(component.name, component)
         if before is not component:
             before.life.leave(self.look)
@@ -67,7 +70,7 @@ class ComponentActivation:
             asyncio.get_running_loop().call_soon(self._supervise)
 
     def switched(self, name: str, mode: str) -> None:
-        """A state puts a component in a mode."""
+        """Note the mode into which a state switches a component."""
         if mode in {NEUTRAL, Life.SHUTDOWN}:
             self._in_mode.pop(name, None)
         elif mode != Life.INIT:
@@ -75,7 +78,7 @@ class ComponentActivation:
         self.changed(name)
 
     async def close(self) -> None:
-        """Switch everything off, and wait for that, though not for ever."""
+        """Release all supervisors, and wait for them within bounds."""
         self._closed = True
         for component in self._registry.components.values():
             component.life.leave(self.look)
@@ -89,37 +92,37 @@ class ComponentActivation:
     # -- for skills and supervisors ---------------------------------------------------------------------------
 
     def supervisor(self, component: Component) -> Supervisor:
-        """Who keeps a component going that is used; from now on, whom it needs is kept going, too."""
+        """The supervisor of a component in use; the components that it needs have theirs from now on."""
         if self._looking or component.name not in self._supervisors:
             self._supervise()
         return self._supervisors[component.name]
 
-    def resting_on(self, component: Component) -> Iterator[Supervisor]:
-        """The supervisors of all that a component needs in its present mode, what these need before them; then its own.
+    def supervisors_of(self, component: Component) -> Iterator[Supervisor]:
+        """The supervisors of the components that one needs in its mode, dependencies first; then its own.
 
         Raises:
-            InputError: components need each other in a circle.
+            InputError: components need each other in a cycle.
         """
         for name in self._closure(component.name, {}, ()):
             if name in self._supervisors:
                 yield self._supervisors[name]
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Call the listener whenever something about a component is different."""
+        """Call the listener after each change of a component."""
         self._listeners.add(listener)
 
     def leave(self, listener: Callable[[], None]) -> None:
-        """Call it no longer."""
+        """Stop calling the listener."""
         self._listeners.discard(listener)
 
     def announce(self) -> None:
-        """Something about a component is different: who is needed is looked for, and who listens is told."""
+        """A component has changed: update the supervisors, then call the listeners."""
         self.look()
         for listener in tuple(self._listeners):
             listener()
 
     async def until(self, holds: Callable[[], bool]) -> None:
-        """Wait until something holds that is asked anew whenever something about a component is different."""
+        """Wait until `holds` is true; evaluate it after each change of a component."""
         changed = asyncio.Event()
         self.listen(changed.set)
         try:
@@ -134,12 +137,10 @@ class ComponentActivation:
         return self._registry.components[name] if needing is None else await self._registry.find(name, needing)
 
     async def supported(self, component: Component) -> None:
-        """Wait until all that the component needs in its present mode is on."""
-        await self.until(
-            lambda: all(name in self._supervisors and self._supervisors[name].on for name in component.needed())
-        )
+        """Wait until the dependencies of a component in its present mode are active."""
+        await self.until(lambda: self.on.issuperset(component.needed()))
 
-    # -- who is needed ------------------------------------------------------------------------------------
+    # -- required components ------------------------------------------------------------------------------------
 
     def _supervise(self) -> None:
         self._looking = False
@@ -153,7 +154,7 @@ class ComponentActivation:
         self._keep_only(needed)
 
     def _add_needed(self, name: str, needing: Component | None, needed: dict[str, Component | None]) -> None:
-        """Who needs whom, those that need before those that are needed."""
+        """Add a component with the one that needs it, then its own dependencies."""
         if name not in needed:
             needed[name] = needing
             component = self._registry.known(name)
@@ -162,7 +163,7 @@ class ComponentActivation:
 
     def _closure(self, name: str, found: dict[str, None], above: tuple[str, ...]) -> dict[str, None]:
         if name in above:
-            raise InputError(f"components need each other in a circle: {' -> '.join((*above, name))}")
+            raise InputError(f"components need each other in a cycle: {' -> '.join((*above, name))}")
         component = self._registry.known(name)
         for other in () if component is None else component.needed():
             self._closure(other, found, (*above, name))

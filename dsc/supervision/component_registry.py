@@ -1,4 +1,4 @@
-"""Who is deployed, and whether what a component needs is there: waited for, lost, started anew (S2.12)."""
+"""Registry of the deployed components, and of those reached elsewhere because one of these needs them (S2.12)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from knowledge_base.errors import UnknownNameError
 
 
 class NotAliveError(Exception):
-    """A component that is needed is not alive, and why."""
+    """A required component is not alive; the message has the reason."""
 
 
 class ComponentRegistry:
-    """Who is deployed, and who was reached elsewhere because these need them.
+    """The deployed components, and those that were reached elsewhere.
 
     Attributes:
         components: the deployed ones, by name.
@@ -57,7 +57,7 @@ class ComponentRegistry:
             await self._deployed.wait()
 
     def state_of(self, name: str) -> str:
-        """How a component is, in words."""
+        """The state of a component, in words."""
         component = self.known(name)
         if component is None:
             return str(UnknownNameError(f"component '{name}', which is not there", found=name, valid=self.components))

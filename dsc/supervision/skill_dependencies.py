@@ -1,4 +1,4 @@
-"""What one skill rests on: its component, and all that this needs, as long as the skill goes on (S2.12)."""
+"""Dependencies of one skill: its component, and the components that this needs, while the skill runs (S2.12)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ _Result = TypeVar("_Result")
 
 
 class SkillDependencies:
-    """For one skill of a component, which counts as used."""
+    """Waits for the dependencies of a skill, and watches them while it runs.
+
+    Attributes:
+        concerned: whether the skill's component takes part in activation; if not, only its own life counts.
+    """
 
     def __init__(self, registry: ComponentRegistry, activation: ComponentActivation, component: Component) -> None:
         self._registry = registry
@@ -28,34 +32,34 @@ class SkillDependencies:
 
     @property
     def missing(self) -> str:
-        """What is being waited for, in words; empty if nothing is."""
+        """The dependency that the skill waits for, in words; else empty."""
         if not self._waits:
             return ""
-        name = next((one.name for one in self._activation.resting_on(self._component) if not one.on), "")
+        name = next((one.name for one in self._activation.supervisors_of(self._component) if not one.on), "")
         return name and self._registry.state_of(name)
 
     async def ready(self) -> None:
-        """Wait until all that the component needs in its present mode is alive and switched on, and it is itself.
+        """Wait until the component and its dependencies in its present mode are alive and active.
 
-        What it needs is started, and started anew after a crash; so is the component, once.
+        Supervisors start the dependencies, also after a crash. The component is started one time.
 
         Raises:
-            NotAliveError: the component itself cannot start, or is in Shutdown; what it needs is waited for instead.
-            InputError: components need each other in a circle.
+            NotAliveError: the component itself cannot start, or is in Shutdown.
+            InputError: components need each other in a cycle.
         """
         if self.concerned:
-            await self._kept()
+            await self._supervised()
         elif self._component.life.state is not Life.ALIVE:
             await self._component.life.come_alive(self._component.start)
         if self._component.life.state is not Life.ALIVE:
             raise NotAliveError(self._registry.state_of(self._component.name))
 
-    async def _kept(self) -> None:
+    async def _supervised(self) -> None:
         supervisor = self._activation.supervisor(self._component)
         before = supervisor.failures
 
         def settled() -> bool:
-            supervisors = list(self._activation.resting_on(self._component))
+            supervisors = list(self._activation.supervisors_of(self._component))
             for one in supervisors:
                 if one.problem is not None:
                     raise one.problem
@@ -66,10 +70,10 @@ class SkillDependencies:
         self._waits = False
 
     async def carrying(self, work: Awaitable[_Result]) -> _Result:
-        """Do the skill's work as long as everything is alive that it rests on, in whatever mode it is.
+        """Await the skill's work while the component and its dependencies in any mode are alive.
 
         Raises:
-            NotAliveError: something was lost; the work has been cancelled.
+            NotAliveError: one of them is lost; the work was cancelled.
         """
         me = asyncio.current_task()
         lost: list[str] = []
@@ -77,7 +81,7 @@ class SkillDependencies:
         def look() -> None:
             name = self._lost()
             if name is not None and not lost and me is not None:
-                said = self._registry.state_of(name)  # as it is now: it may be started anew before we are heard
+                said = self._registry.state_of(name)  # now: it may restart before the cancellation arrives
                 lost.append(said if name == self._component.name else f"it needs {said}")
                 me.cancel()
 
@@ -102,6 +106,6 @@ class SkillDependencies:
             return self._component.name
         if not self.concerned:
             return None
-        with suppress(InputError):  # of a mode that makes a circle, the next skill hears
-            return next((one.name for one in self._activation.resting_on(self._component) if one.lost), None)
+        with suppress(InputError):  # a cycle of needs in this mode fails the next skill
+            return next((one.name for one in self._activation.supervisors_of(self._component) if one.lost), None)
         return None

@@ -1,4 +1,4 @@
-"""Keeps one component going while it is needed: alive, started anew after a crash, and switched on (S1.9, S2.12)."""
+"""Supervisor of one required component: starts it, activates it, restarts it after a crash (S1.9, S2.12)."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from dsc.components.component import Component
 from dsc.components.life_cycle import Life
 
 PAUSE = 1.0
-"""Seconds after which a component that could not start is started anew; twice as many each time it cannot."""
+"""Seconds before a failed component is restarted; doubled after each failure."""
 LONGEST = 30.0
-"""Seconds between two attempts at most."""
+"""The most seconds between two attempts."""
 
 
 class Surroundings(Protocol):
-    """What a supervisor has to know of the others."""
+    """The other components, as a supervisor sees them."""
 
     async def find(self, name: str, needing: Component | None) -> Component:
-        """The component of that name, which may be deployed late."""
+        """Wait for the component of that name."""
         ...
 
     async def supported(self, component: Component) -> None:
-        """Wait until all that the component needs in its present mode is on."""
+        """Wait until the dependencies of a component in its present mode are active."""
         ...
 
     def announce(self) -> None:
-        """Something about a component is different."""
+        """A component has changed."""
         ...
 
 
@@ -38,9 +38,9 @@ class Supervisor:
 
     Attributes:
         name: of the component.
-        component: itself, once it is there.
-        failures: how often it could not be brought to life, or not be switched on.
-        problem: what went wrong when it was looked for.
+        component: itself, as soon as it was found.
+        failures: the number of failed attempts to start or activate it.
+        problem: the error of the search for it.
     """
 
     def __init__(self, name: str, needing: Component | None, others: Surroundings) -> None:
@@ -50,43 +50,43 @@ class Supervisor:
         self.problem: Exception | None = None
         self._others = others
         self._on = False
-        self._was_on = False
+        self._was_active = False
         self._after: Collection[asyncio.Task[None]] = ()
-        self._switched = False
+        self._activated = False
         self.task: asyncio.Task[None] | None = None
         self._needing = needing
 
     def begin(self, after: asyncio.Task[None] | None) -> None:
-        """Keep it going from now on, once an earlier supervisor of it is done."""
+        """Begin supervision, after the task of an earlier supervisor."""
         self.task = asyncio.get_running_loop().create_task(self._run(after))
 
     def release(self, after: Collection[asyncio.Task[None]]) -> None:
-        """Nobody needs it any more: it is switched off, after those that have needed it."""
+        """End supervision: the component becomes inactive, after those that have needed it."""
         assert self.task is not None  # noqa: S101
         self._after = after
         self.task.cancel()
 
     @property
     def on(self) -> bool:
-        """Whether it is alive and switched on."""
+        """Whether it is alive and active."""
         return self._on and self.component is not None and self.component.life.state is Life.ALIVE
 
     @property
     def lost(self) -> bool:
-        """Whether it was there and is not any more, or cannot be."""
+        """Whether it has failed, was shut down, or has gone back to Init."""
         life = None if self.component is None else self.component.life.state
-        return life in {Life.FATAL_ERROR, Life.SHUTDOWN} or (life is Life.INIT and self._was_on)
+        return life in {Life.FATAL_ERROR, Life.SHUTDOWN} or (life is Life.INIT and self._was_active)
 
     async def _run(self, after: asyncio.Task[None] | None) -> None:
         try:
             if after is not None:
                 await asyncio.wait([after], timeout=GRACE)
             await self._supervise()
-        except Exception as error:  # noqa: BLE001  # of who finds components; told to those who need it
+        except Exception as error:  # noqa: BLE001  # an error of `reach`; skills that need it raise it
             self.problem = error
             self._others.announce()
         finally:
-            await self._switch_off()
+            await self._deactivate()
 
     async def _supervise(self) -> None:
         self.component = component = await self._others.find(self.name, self._needing)
@@ -99,28 +99,28 @@ class Supervisor:
             pause = PAUSE if lasted > PAUSE else await _rested(component, pause)
 
     async def _once(self, component: Component) -> float:
-        """One life of it; the seconds for which it was on."""
+        """Start and activate it; return the seconds for which it was active."""
         await component.life.come_alive(component.start)
         if component.life.state is Life.ALIVE:
-            self._switched = True
+            self._activated = True
             await component.life.become_active(id(self), component.activate, active=True)
         if component.life.state is not Life.ALIVE:
             self.failures += 1
             self._others.announce()
             return 0.0
         began = asyncio.get_running_loop().time()
-        self._on = self._was_on = True
+        self._on = self._was_active = True
         self._others.announce()
         await component.life.until(lambda life: life is not Life.ALIVE)
         self._on = False
         return asyncio.get_running_loop().time() - began
 
-    async def _switch_off(self) -> None:
+    async def _deactivate(self) -> None:
         self._on = False
         if self.component is None:
             return
         self.component.life.leave(self._others.announce)
-        if not self._switched:
+        if not self._activated:
             return
         if self._after:
             await asyncio.wait(self._after, timeout=GRACE)
@@ -133,9 +133,9 @@ class Supervisor:
 
 
 async def _rested(component: Component, pause: float) -> float:
-    """Wait before a component that has just failed is started anew, unless it is back before; the next pause.
+    """Wait before a failed component restarts, unless it recovers earlier; return the next pause.
 
-    One that was shut down stays so until somebody says otherwise.
+    A component in Shutdown stays there until it is switched to `init`.
     """
     before = component.life.state
     with suppress(TimeoutError):

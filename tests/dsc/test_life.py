@@ -277,7 +277,7 @@ def test_components_that_need_each_other_are_refused():
         needs: ClassVar = {ALWAYS: ("egg",)}
 
     end, _ = drive("egg", Egg(), Hen())
-    assert "in a circle: egg -> hen -> egg" in why(end)
+    assert "in a cycle: egg -> hen -> egg" in why(end)
 
 
 def test_a_life_has_its_order():
