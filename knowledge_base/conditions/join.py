@@ -124,7 +124,8 @@ class DeltaJoin:
 
         Most changes end here. A part that cannot be computed is left to the evaluation of the whole condition.
         """
-        if any(args[i] != args[j] for i, j in self._occurrence.equal):
+        equal = self._occurrence.equal
+        if equal and any(args[i] != args[j] for i, j in equal):
             return False
         if self._settled is None:
             return True

@@ -139,7 +139,7 @@ class ReadWriteLock:
         patience_s: how long the first in line lets others go first, in seconds.
     """
 
-    __slots__ = ("__enter__", "__exit__", "_alone", "_apart", "_as_alone", "_as_changing", "_lock")
+    __slots__ = ("__enter__", "__exit__", "_alone", "_apart", "_as_alone", "_as_changing", "_first_apart", "_lock")
 
     __enter__: Enter
     __exit__: Exit
@@ -147,7 +147,8 @@ class ReadWriteLock:
     def __init__(self, patience_s: float = PATIENCE_S) -> None:
         self._lock = FairLock(patience_s)  # marked by a thread that changes something
         self._alone = FairLock(patience_s)
-        self._apart = FairLock(patience_s)  # had by the first that waits until no thread is alone
+        self._apart: set[object] = set()  # who waits until no thread is alone, and then for the lock
+        self._first_apart = FairLock(patience_s)  # had by one of these
         self.__enter__ = self._lock.__enter__
         self.__exit__ = self._lock.__exit__
         self._as_changing = _Passage(self._begin_changing, self._lock.__exit__)
@@ -156,7 +157,7 @@ class ReadWriteLock:
     @property
     def waiting(self) -> tuple[int, int]:
         """Number of threads in line, and of threads that wait apart."""
-        return self._lock.length, self._alone.length + self._apart.length
+        return self._lock.length, self._alone.length + self._first_apart.length
 
     def changing(self) -> AbstractContextManager[None]:
         """No other thread asks or changes anything.
@@ -201,18 +202,25 @@ class ReadWriteLock:
         try:
             self._lock.__enter__()
             entered = True
-            if not (again or alone or (self._apart.is_free() and self._alone.is_free())):
+            if not (again or alone or (not self._apart and self._alone.is_free())):
                 self._lock.release()
-                entered = False
-                with self._apart:
-                    with self._alone:
-                        pass
-                    self._lock.__enter__()
-                    entered = True
+                self._wait_apart()
         except BaseException:
             if entered:
                 self._lock.let_go()
             raise
+
+    def _wait_apart(self) -> None:
+        """Wait until no thread is alone, and then for the lock, in order of arrival."""
+        me = object()
+        try:
+            self._apart.add(me)
+            with self._first_apart:
+                with self._alone:
+                    pass
+                self._lock.__enter__()
+        finally:
+            self._apart.discard(me)
 
 
 class _Passage:
