@@ -38,7 +38,7 @@ def question_rows(everyone: list[type[Contender]], size: int, pace: Pace) -> lis
         asked = [words(arcs, n) for n in islice((n * 7919 % size for n in count(1)), ASKED)]
         _agree(case, worlds.values(), method, asked)
         figures = measure({name: _asking(one, method, asked) for name, one in worlds.items()}, pace)
-        rows.append(compared(f"{case}, {about}", figures, bound=2))
+        rows.append(compared(f"{case}, {about}", figures, bound=3))
         if hasattr(worlds.get(ENGINE), f"{method}_by_text"):
             rows.append(_by_text(f"{case}, by its text, {about}", worlds[FLOOR], worlds[ENGINE], method, asked, pace))
     moves = measure({name: _moving(one, arcs) for name, one in worlds.items()}, pace)
