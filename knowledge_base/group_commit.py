@@ -1,4 +1,4 @@
-"""What is committed in a block, and what the block itself writes, as one transaction of the file."""
+"""Group commit: the changes of a block, and its own rows, as one transaction of the file."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from knowledge_base.world.read_write_lock import ReadWriteLock
 class GroupCommit:
     """See `KnowledgeBase.together`; may be used again and again, by one thread at a time.
 
-    An interrupt may come as it is to be left, before a line of it is run. Then it is broken off when it is forgotten.
+    An interrupt may come as the block is left, before a line of `__exit__` runs. Then `__del__` rolls the block back.
 
     Args:
-        turn: that of the world.
+        lock: that of the world.
         require_free: raises if this thread may not begin now.
-        history: what writes.
+        history: writes the file.
     """
 
-    def __init__(self, turn: ReadWriteLock, require_free: Callable[[], None], history: History) -> None:
+    def __init__(self, lock: ReadWriteLock, require_free: Callable[[], None], history: History) -> None:
         self._group: AbstractContextManager[sqlite3.Connection] | None = None  # inside
-        self._alone = turn.alone()
+        self._alone = lock.alone()
         self._require_free = require_free
         self._history = history
 

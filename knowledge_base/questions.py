@@ -1,4 +1,4 @@
-"""Questions as people write them, read and checked once."""
+"""Questions by their text: parsed and checked once, then evaluated."""
 
 from __future__ import annotations
 
@@ -33,10 +33,9 @@ def _keep(kept: dict[_K, _T], key: _K, made: _T) -> None:
 
 
 class Questions:
-    """Reads texts and checks them against the schema and the things that are known, always of the same schema.
+    """Parses texts and checks them against the schema and the known things; always of the same schema.
 
-    A question that passed is not checked again: what it names may be removed later, and then nothing holds
-    of it.
+    A question that passed is not checked again. A thing that it names may be removed later; then nothing holds of it.
     """
 
     def __init__(self) -> None:
@@ -48,11 +47,11 @@ class Questions:
     def given(
         self, text: str | Expression, params: Mapping[str, Value] | None, world: World, free: Free
     ) -> Mapping[str, Value]:
-        """What people give a question, by the names that it has for it; looked at once for each set of names.
+        """Parameters by the names that the question has for them; fitted once for each set of names.
 
         Raises:
             UnknownNameError: the question has no such variable.
-            InputError: as for `condition` or `query`; these are no parameters.
+            InputError: as for `condition` or `query`; or these are no parameters.
         """
         if params is None:
             return {}
@@ -82,7 +81,7 @@ class Questions:
         return found.holds(world, params)
 
     def answers(self, text: str | Expression, params: Mapping[str, Value], world: World) -> list[dict[str, Value]]:
-        """Who makes the query true of `world`; errors as for `query`."""
+        """The values that make the query true of `world`; errors as for `query`."""
         key = (text if isinstance(text, str) else id(text), *params)
         found = self._queried.get(key)
         if found is None:
@@ -105,7 +104,7 @@ class Questions:
         return self._checked(text, params, world, "error")
 
     def query(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
-        """The query, whose free variables not in `params` are asked for.
+        """The query, which asks for its free variables that are not in `params`.
 
         Raises:
             InputError: as for `condition`, or a variable occurs only under `not` or in a comparison.

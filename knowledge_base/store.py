@@ -357,10 +357,10 @@ class KnowledgeBase(View):
             UnknownNameError: an undeclared function, or a thing that is not there.
             SchemaError: a wrong number of arguments, a wrong type, or there is a source for it already.
             InputError: the reference is empty.
-            ConflictError: this thread is inside a transaction.
+            ConflictError: this thread is inside a transaction or a question.
             StoreError: the knowledge base is closed.
         """
-        with self._lock:
+        with self._lock.changing():
             self._require_free()
             return self._sources.bind(Fact(function, args), reference)
 

@@ -1,4 +1,4 @@
-"""A world of one version, asked in all ways: the reading half of the knowledge base, and its past worlds."""
+"""View: all questions about a world, present or past."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 _TOGETHER = 100
-"""Answers of a stream that are found with one turn at the lock."""
+"""Answers that a stream finds each time it takes the lock."""
 
 
 class View:
-    """A world that may be asked from several threads; each answer is a finished list about one version.
+    """Questions about a world, from several threads; each answer is a finished list about one version.
 
     It is itself a `World` (`schema`, `holds`, `match`, `value`, `objects`, `type_of`).
     """
@@ -42,20 +42,20 @@ class View:
 
     @property
     def schema(self) -> Schema:
-        """What may be said."""
+        """Schema of the world."""
         return self._state.schema
 
     @property
     def version(self) -> int:
-        """How many changes were committed before."""
+        """Number of changes committed before."""
         return self._version
 
     @property
     def graph(self) -> Graph:
         """The world as a graph, read-only; see `world.graph` for its form.
 
-        It is made when it is first asked for. That of a `KnowledgeBase` follows every commit from then on; other
-        threads must not commit while it is being walked.
+        The first access makes it. That of a `KnowledgeBase` follows every commit from then on; other threads must not
+        commit while it is being walked.
         """
         with self._lock:
             if self._graph is None:
@@ -74,11 +74,11 @@ class View:
         Args:
             text: a condition such as `(and (on ?o ?table) (cup ?o))`.
             params: variables that have a value already; they are not part of the answers.
-            limit: how many answers are wanted at most; nothing behind them is looked at.
-            bounds: what the question may take before it is given up.
+            limit: at most so many answers; the search ends with the last of them.
+            bounds: work, seconds and cancellation that end the search with an error.
 
         Raises:
-            OutOfBoundsError: it takes more, or was cancelled.
+            OutOfBoundsError: the search exceeds its bounds, or was cancelled.
             ParseError: the text is no condition.
             UnknownNameError: an undeclared predicate, function or type, a thing that is not there, or a parameter
                 that the text does not have.
@@ -96,8 +96,8 @@ class View:
     ) -> Iterator[Binding]:
         """The answers of `query` in the same order, without a list of them all; each when it is found.
 
-        Others may ask and change the knowledge between two answers. An error about candidates that cannot be computed
-        comes after all answers.
+        Other threads may ask and change the knowledge between two answers. An error about candidates that cannot be
+        computed comes after all answers.
 
         Raises:
             ConflictError: a change was committed before the last answer; `at` gives a world that stays as it is.
@@ -163,7 +163,7 @@ class View:
             return explain(self._questions.condition(text, params, self._state), world, params)
 
     def explain_query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> QueryPlan:
-        """How the query would run on the world as it is: what is looked up, in which order; errors as for `query`."""
+        """The look-ups of the query in the order in which they would run now; errors as for `query`."""
         with self._lock:
             params = self._questions.given(text, params, self._state, "answers")
             return plan_query(self._questions.query(text, params, self._state), self._state, params)
@@ -188,10 +188,10 @@ class View:
         """All of it as a PDDL problem for the domain of that name, which is not written.
 
         Args:
-            domain: what the domain is called.
-            name: what the problem is called.
-            goal: what is wanted, if anything.
-            metric: what the best plan is, if that is said.
+            domain: name of the domain.
+            name: name of the problem.
+            goal: condition to reach, if any.
+            metric: quantity that the best plan minimises or maximises, if any.
 
         Raises:
             InputError: as for `ask`, for the goal; and a name or number that PDDL cannot spell.
@@ -211,7 +211,7 @@ class View:
             return list(self._state.facts)
 
     def values(self) -> dict[Fact, Content]:
-        """What functions were set to."""
+        """Values that functions were set to."""
         with self._lock:
             return dict(self._state.values)
 
@@ -231,7 +231,7 @@ class View:
             return self._state.estimate(predicate, pattern)
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """What the function is worth; until it is set 0, `""`, `False` or `()`, as is its type.
+        """Value of the function; until it is set 0, `""`, `False` or `()`, by its type.
 
         Raises:
             UnknownNameError: there is no such function.
@@ -240,7 +240,7 @@ class View:
             return self._state.value(function, args)
 
     def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
-        """Where what the function is worth comes from, if a source feeds it."""
+        """Reference of the source that feeds the function, if there is one."""
         with self._lock:
             return self._state.reference(function, args)
 
