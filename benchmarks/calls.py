@@ -150,7 +150,7 @@ def table(found: dict[str, Count]) -> str:
 
 
 def _count(flow: Flow, rounds: int) -> Count:
-    for _ in range(2):  # fills tables and caches, and generates source
+    for _ in range(2):  # fills tables and caches
         flow(Counter(profiled=False))
     counter = Counter(profiled=True)
     flow(counter)
