@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from dsc import ActionPlot, Component, Outcome, Record, SkillCall, skill
-from dsc.chance import uniform
+from dsc import ActionPlot, Component, Outcome, Record, SkillCall, skill, uniform
 from knowledge_base import Delta, Fact, fact
 from planning import Executive, Planner
 

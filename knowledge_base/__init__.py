@@ -32,10 +32,14 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Value as Value
     from knowledge_base.facts import fact as fact
     from knowledge_base.language.explanation import Explanation as Explanation
+    from knowledge_base.language.parser import parse_condition as parse_condition
+    from knowledge_base.language.parser import parse_effect as parse_effect
+    from knowledge_base.language.printer import to_text as to_text
     from knowledge_base.language.query_plan import QueryPlan as QueryPlan
     from knowledge_base.language.query_plan import QueryStep as QueryStep
     from knowledge_base.language.question_bounds import Bounds as Bounds
     from knowledge_base.language.vocabulary import Signature as Signature
+    from knowledge_base.pddl.problem_text import read_problem as read_problem
     from knowledge_base.prepared import Binding as Binding
     from knowledge_base.sources import DataSource as DataSource
     from knowledge_base.store import KnowledgeBase as KnowledgeBase
@@ -53,12 +57,13 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Binding": "prepared",
         "Bounds": "language.question_bounds",
         "Change": "facts",
-        "TimerClock": "conditions.damping",
         "Computed": "world.computation",
         "Condition": "conditions.condition",
         "ConditionCancelledError": "errors",
         "ConflictError": "errors",
         "Content": "facts",
+        "DamagedStoreError": "errors",
+        "DataSource": "sources",
         "Delta": "facts",
         "Explanation": "language.explanation",
         "Fact": "facts",
@@ -77,9 +82,8 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "SchemaError": "errors",
         "SchemaMismatchError": "errors",
         "Signature": "language.vocabulary",
-        "DataSource": "sources",
-        "DamagedStoreError": "errors",
         "StoreError": "errors",
+        "TimerClock": "conditions.damping",
         "Transaction": "transaction",
         "UnknownNameError": "errors",
         "UnsupportedConstructError": "errors",
@@ -89,5 +93,9 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "WorldState": "world.state",
         "computed": "world.computation",
         "fact": "facts",
+        "parse_condition": "language.parser",
+        "parse_effect": "language.parser",
+        "read_problem": "pddl.problem_text",
+        "to_text": "language.printer",
     },
 )

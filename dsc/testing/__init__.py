@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dsc.testing.invariants import one_history as one_history
     from dsc.testing.invariants import replays as replays
     from dsc.testing.invariants import violations as violations
+    from dsc.testing.lossy import LossyTransport as LossyTransport
     from dsc.testing.predicates import chose as chose
     from dsc.testing.predicates import configured as configured
     from dsc.testing.predicates import consumed as consumed
@@ -59,6 +60,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
         "Interleaving": "interleaving",
         "Invariant": "invariants",
         "KeptRun": "invariants",
+        "LossyTransport": "lossy",
         "Rehearsal": "rehearsal",
         "ScriptedSkills": "scripted",
         "chose": "predicates",
