@@ -51,11 +51,12 @@ def dispatch_before_commit(monkeypatch):
     later, step, end = _Later(), RunStore.step, RunStore.end
 
     def put_off(self, *args):
-        connection = self.writing.connection
+        writing, connection, cursor = self.writing, self.writing.connection, self.writing._cursor
         later.written(connection)
-        later.real, self.writing.connection = connection, later
+        later.real = connection
+        writing.connection = writing._cursor = later
         step(self, *args)
-        self.writing.connection = connection
+        writing.connection, writing._cursor = connection, cursor
 
     def kept(self, **how):
         later.written(self.writing.connection)
@@ -78,7 +79,7 @@ def _forgetting(take_up, later):
 
 def no_fence(monkeypatch):
     """Whoever writes a run goes on writing it, whoever has taken it over."""
-    monkeypatch.setattr(RunWriter, "_require", lambda self, right: None)
+    monkeypatch.setattr(RunWriter, "require_right", lambda self: None)
     monkeypatch.setattr(writer, "_STEP", writer._STEP.replace("FROM fence WHERE epoch = ?", "WHERE ? > 0"))
 
 

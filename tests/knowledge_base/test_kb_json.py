@@ -47,7 +47,7 @@ def test_it_goes_on_from_the_version_it_was_written_at():
     again = KnowledgeBase.from_json(kb.to_json())
     assert again.apply(Delta(removed=(Fact("quiet"),)), author="b").version == 2
     assert again.at(version=1).ask("(quiet)")
-    with pytest.raises(InputError, match="version 0 is not kept"):
+    with pytest.raises(InputError, match="version 0 is no longer kept"):
         again.at(version=0)
 
 
