@@ -176,7 +176,7 @@ export class Session {
 
 /** Of the protocol, and of the trace: what the page was made for. */
 const FORMAT = "dsc-view/1";
-const VERSION = 1;
+const VERSION = 2;
 
 function strange({ format, header }: Hello): string | null {
   if (format !== FORMAT) return `The program speaks ${String(format)}, this page ${FORMAT}: load it again.`;
