@@ -133,6 +133,13 @@ def test_the_glossary_names_code_that_exists():
         pkgutil.resolve_name(name)
 
 
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda page: page.stem)
+def test_pages_name_modules_and_names_that_exist(page):
+    prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+    for name in re.findall(r"`((?:dsc|planning|knowledge_base|domains)(?:\.\w+)+)[`(]", prose):
+        pkgutil.resolve_name(name)
+
+
 UNITS = {"": 1, " s": 1, " MiB": 1 << 20, " GiB": 1 << 30}
 
 
