@@ -1,0 +1,9 @@
+from knowledge_base.pddl.action_text import ActionText as ActionText
+from knowledge_base.pddl.domain_text import DomainText as DomainText
+from knowledge_base.pddl.domain_text import parse_domain as parse_domain
+from knowledge_base.pddl.domain_text import read_domain as read_domain
+from knowledge_base.pddl.problem_text import Metric as Metric
+from knowledge_base.pddl.problem_text import ProblemText as ProblemText
+from knowledge_base.pddl.problem_text import parse_problem as parse_problem
+from knowledge_base.pddl.problem_text import read_problem as read_problem
+from knowledge_base.pddl.problem_writer import problem_to_text as problem_to_text
