@@ -11,11 +11,10 @@ from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
 from dsc.model.plot import ActionPlot
-from dsc.primitive import primitive_plot
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import skill
+from dsc.skills import primitive_plot, skill
 from dsc.trace import Trace, write_to
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.facts import Delta, fact

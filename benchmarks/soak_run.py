@@ -36,8 +36,7 @@ from dsc.events import Event
 from dsc.runs.archive import has_run
 from dsc.sequencer.sequencer import Sequencer
 from dsc.testing.crashes import Crashes
-from dsc.testing.faults import USUAL, Fault, Faults
-from dsc.testing.interleaving import Interleaving
+from dsc.testing.faults import USUAL, Fault, Faults, Interleaving
 from dsc.testing.invariants import executed_once, kept_run
 from knowledge_base.errors import DamagedStoreError
 from planning import PlannerProcess

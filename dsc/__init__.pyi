@@ -7,7 +7,7 @@ from dsc.chance import uniform as uniform
 from dsc.components.component import ALWAYS as ALWAYS
 from dsc.components.component import Component as Component
 from dsc.components.endpoint import Endpoint as Endpoint
-from dsc.components.factories import component_of as component_of
+from dsc.components.endpoint import LocalTransport as LocalTransport
 from dsc.components.heartbeat import Heartbeat as Heartbeat
 from dsc.components.life_cycle import Life as Life
 from dsc.components.parameters import Parameter as Parameter
@@ -16,9 +16,9 @@ from dsc.components.ports import query as query
 from dsc.components.ports import takes as takes
 from dsc.components.remote import Host as Host
 from dsc.components.remote import RemoteComponent as RemoteComponent
+from dsc.components.robot import component_of as component_of
 from dsc.components.streams import Push as Push
 from dsc.components.streams import Stream as Stream
-from dsc.components.transport import LocalTransport as LocalTransport
 from dsc.dynamic.library import Library as Library
 from dsc.engine.machine import Machine as Machine
 from dsc.errors import ChangedError as ChangedError
@@ -28,7 +28,6 @@ from dsc.errors import UncertainActionError as UncertainActionError
 from dsc.events import Event as Event
 from dsc.model.plot import ActionPlot as ActionPlot
 from dsc.model.profile import Profile as Profile
-from dsc.primitive import primitive_plot as primitive_plot
 from dsc.profiles import configure as configure
 from dsc.reflection import MODELS as MODELS
 from dsc.reflection import design_facts as design_facts
@@ -41,6 +40,7 @@ from dsc.sequencer.clock import run_simulated as run_simulated
 from dsc.sequencer.replay import replay as replay
 from dsc.sequencer.sequencer import RunEnd as RunEnd
 from dsc.sequencer.sequencer import Sequencer as Sequencer
+from dsc.skills import primitive_plot as primitive_plot
 from dsc.skills import skill as skill
 from dsc.text.cloning import cloned as cloned
 from dsc.text.cloning import cloned_profile as cloned_profile

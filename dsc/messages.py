@@ -20,7 +20,7 @@ class SkillMessage:
         outcome: event, attributes and observed facts.
         final: whether the skill has ended with it.
         goes_on: whether the skill only counts as ended, and is to be cancelled.
-        conflated: number of older reports of the same event that it replaces, see `dsc.components.reports`.
+        conflated: number of older reports of the same event that it replaces, see `dsc.calls`.
         declared: the declared types of the outcome's attributes; `None` if there are none to validate.
     """
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import IO, Any, NamedTuple
 
-from dsc.json_text import text_of
+from pydantic_core import PydanticSerializationError, to_json
 
 FORMAT = "dsc-trace"
 VERSION = 2
@@ -100,3 +100,16 @@ def write_to(stream: IO[str]) -> Listener:
         stream.write(record.to_line() + "\n")
 
     return write
+
+
+def text_of(value: Any) -> str:
+    """JSON without spaces, on one line; numbers that JSON lacks (`Infinity`) are written as Python reads them.
+
+    Raises:
+        TypeError: something in it is no plain data.
+        RecursionError: it is nested too deeply.
+    """
+    try:
+        return to_json(value, inf_nan_mode="constants").decode()
+    except PydanticSerializationError:  # half a character, which no encoding has; or nested more than 255 times
+        return json.dumps(value, separators=(",", ":"))

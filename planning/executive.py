@@ -12,7 +12,7 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from dsc.components.component import Component
-from dsc.components.component_checks import require_deployed, require_instances
+from dsc.components.robot import require_deployed, require_instances
 from dsc.components.streams import require_wired
 from dsc.dynamic.candidate_selection import ACHIEVE
 from dsc.dynamic.library import Library

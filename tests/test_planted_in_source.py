@@ -16,10 +16,9 @@ import pytest
 
 from dsc.calls import Outcome, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint, encoded
+from dsc.components.endpoint import Endpoint, LocalTransport, encoded
 from dsc.components.hosted import HostedActions
 from dsc.components.remote import Host, RemoteComponent
-from dsc.components.transport import LocalTransport
 from dsc.dynamic.library import Library
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated

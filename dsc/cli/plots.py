@@ -62,7 +62,7 @@ def check(
 
     A plot may use the other plots in its folder. Exit status: 0 nothing found, or warnings alone, 2 findings.
     """
-    from dsc.components.factories import robot_of
+    from dsc.components.robot import robot_of
     from dsc.text.plot_folder import Neighbours
 
     neighbours = Neighbours()

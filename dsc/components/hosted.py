@@ -11,11 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from dsc.calls import OBSERVED, Clock, Outcome, SkillCall
+from dsc.calls import OBSERVED, Clock, Outcome, Reports, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, encoded
 from dsc.components.hooks import contained
-from dsc.components.reports import Reports
 from knowledge_base.errors import InputError, described
 from knowledge_base.exchange import delta_form, delta_of
 from knowledge_base.language.inputs import require_delta, require_time, shown

@@ -19,13 +19,11 @@ from typing import Any
 
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError
+from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError, Transport
 from dsc.components.heartbeat import Heartbeat
 from dsc.components.hosted import HostedActions, outcome_of
 from dsc.components.life_cycle import Life
-from dsc.components.publication import RENEWED, Publisher, Subscription
-from dsc.components.remote_streams import HostedStreams, ports_form, ports_of
-from dsc.components.transport import Transport
+from dsc.components.publication import RENEWED, HostedStreams, Publisher, Subscription, ports_form, ports_of
 from dsc.skills import SkillSignature
 from knowledge_base.errors import InputError, described, text_of
 from knowledge_base.language.inputs import require_text

@@ -23,7 +23,6 @@ from dsc.engine.steps import (
     SwitchMode,
 )
 from dsc.events import Event
-from dsc.json_text import text_of
 from dsc.messages import LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage, Told
 from dsc.runs.archive import RunArchive, RunRow
 from dsc.runs.encoding import (
@@ -40,6 +39,7 @@ from dsc.runs.encoding import (
     frame_news,
 )
 from dsc.runs.snapshot import SnapshotRow
+from dsc.trace import text_of
 
 _Key = tuple[str, str]
 """Kind and name of something pending."""

@@ -9,14 +9,13 @@ from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output
-from dsc.json_text import text_of
 from dsc.messages import LateMessage, Message, Told
 from dsc.runs.archive import RunArchive, archive, unfinished
 from dsc.runs.design_changes import require_unchanged
 from dsc.runs.encoding import Kept, Shortener, message_form
 from dsc.runs.state import ReactorState, RunState, read
 from dsc.runs.writer import RunWriter
-from dsc.trace import Record
+from dsc.trace import Record, text_of
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.store import KnowledgeBase
 

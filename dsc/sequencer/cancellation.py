@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from dsc.components.abandonment import GRACE, give_up, give_up_after
+from dsc.components.hooks import GRACE, give_up, give_up_after
 from dsc.sequencer.clock import LoopClock
 
 

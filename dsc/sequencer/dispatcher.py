@@ -16,13 +16,11 @@ from functools import partial
 from typing import Any
 
 from dsc.blocking import DeadlineError
-from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
-from dsc.components.abandonment import GRACE, give_up
+from dsc.calls import Clock, Ended, Outcome, Reports, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.component_checks import require_instances
-from dsc.components.hooks import contained, is_own
+from dsc.components.hooks import GRACE, contained, give_up, is_own
 from dsc.components.life_cycle import Life
-from dsc.components.reports import Reports
+from dsc.components.robot import require_instances
 from dsc.components.streams import Wiring
 from dsc.engine.steps import (
     Cancel,

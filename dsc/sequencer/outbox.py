@@ -7,9 +7,8 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Collection, Iterable, Sequence
 from functools import partial
 
-from dsc.components.abandonment import GRACE
 from dsc.components.component import Component
-from dsc.components.hooks import contained
+from dsc.components.hooks import GRACE, contained
 from dsc.components.life_cycle import Life
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
 from dsc.messages import Told

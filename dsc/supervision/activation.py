@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Collection, Iterable, Iterator
 
-from dsc.components.abandonment import GRACE, give_up
 from dsc.components.component import Component
+from dsc.components.hooks import GRACE, give_up
 from dsc.components.life_cycle import NEUTRAL, Life
 from dsc.supervision.component_registry import ComponentRegistry
 from dsc.supervision.supervisor import Supervisor

@@ -7,8 +7,8 @@ from collections.abc import Collection
 from contextlib import suppress
 from typing import Protocol
 
-from dsc.components.abandonment import GRACE
 from dsc.components.component import Component
+from dsc.components.hooks import GRACE
 from dsc.components.life_cycle import Life
 
 PAUSE = 1.0

@@ -1,11 +1,12 @@
-from dsc.testing.answers import Answer as Answer
-from dsc.testing.answers import Call as Call
 from dsc.testing.coverage import Coverage as Coverage
 from dsc.testing.crashes import Crashes as Crashes
 from dsc.testing.dry_run import DryRun as DryRun
 from dsc.testing.faults import Fault as Fault
 from dsc.testing.faults import Faults as Faults
-from dsc.testing.interleaving import Interleaving as Interleaving
+from dsc.testing.faults import Interleaving as Interleaving
+from dsc.testing.faults import LossyTransport as LossyTransport
+from dsc.testing.fixtures import ends_with as ends_with
+from dsc.testing.fixtures import world as world
 from dsc.testing.invariants import Invariant as Invariant
 from dsc.testing.invariants import KeptRun as KeptRun
 from dsc.testing.invariants import claims_nothing_false as claims_nothing_false
@@ -16,7 +17,6 @@ from dsc.testing.invariants import knows as knows
 from dsc.testing.invariants import one_history as one_history
 from dsc.testing.invariants import replays as replays
 from dsc.testing.invariants import violations as violations
-from dsc.testing.lossy import LossyTransport as LossyTransport
 from dsc.testing.predicates import chose as chose
 from dsc.testing.predicates import configured as configured
 from dsc.testing.predicates import consumed as consumed
@@ -31,6 +31,6 @@ from dsc.testing.predicates import took as took
 from dsc.testing.predicates import trail as trail
 from dsc.testing.rehearsal import Rehearsal as Rehearsal
 from dsc.testing.rehearsal import rehearse as rehearse
+from dsc.testing.scripted import Answer as Answer
+from dsc.testing.scripted import Call as Call
 from dsc.testing.scripted import ScriptedSkills as ScriptedSkills
-from dsc.testing.stubs import ends_with as ends_with
-from dsc.testing.worlds import world as world

@@ -15,7 +15,7 @@ from dsc.model.plot import ActionPlot
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
 from dsc.sequencer.outcome_checks import late
 from dsc.sequencer.reactor import CHART
-from dsc.testing.worlds import change_of, world
+from dsc.testing.fixtures import change_of, world
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase

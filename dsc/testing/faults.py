@@ -1,15 +1,16 @@
-"""Faults around any component, planner or sequencer: each a function of the seed and of its subject (S0.15).
+"""Faults of components, planners, sequencers and networks, and the order of simultaneous messages (S0.15).
 
-No draw depends on the number of earlier draws. A resumed run, whose actions keep their ids, therefore meets the same
-faults again. A seed suffices to reproduce a failure.
+Each is a function of the seed and of its subject; no draw depends on the number of earlier draws. A resumed run, whose
+actions keep their ids, therefore meets the same faults again. A seed suffices to reproduce a failure.
 """
 
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from enum import StrEnum
@@ -19,9 +20,11 @@ from typing import Any, NoReturn, TypeVar
 from dsc.calls import Outcome, SkillCall
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
+from dsc.components.endpoint import LocalTransport
 from dsc.components.life_cycle import Life, LifeCycle
-from dsc.engine.steps import Start, Step
+from dsc.engine.steps import SendLater, Start, Step
 from dsc.events import Event
+from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.sequencer import Sequencer
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -235,3 +238,93 @@ async def _never(call: SkillCall) -> NoReturn:
         raise InjectedError("it was to hang, and has no deadline")
     await asyncio.get_running_loop().create_future()
     raise AssertionError
+
+
+class Interleaving:
+    """Shuffles messages of one moment of simulated time by a seed.
+
+    Before each macrostep it waits for all messages of the moment, and draws the source of the next one. Messages of one
+    source keep their order, as every communication pattern promises. Sources are the events and the answer of one
+    action, the chart's timers, the changes of one author, and events from outside. Messages of different sources may
+    come in any order, such as an answer and its timeout.
+
+    Args:
+        seed: of all draws.
+
+    Attributes:
+        turned: number of messages taken before an earlier one.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self.turned = 0
+        self._seed = seed
+        self._turn = 0
+
+    def attach(self, sequencer: Sequencer) -> None:
+        """Shuffle the messages of this sequencer; call it before its run starts or is resumed."""
+
+        async def settle() -> None:
+            await sequencer.clock.settled()
+            sequencer.rearrange(self._shuffled)
+
+        sequencer.wait_before_events(settle)
+
+    def _shuffled(self, waiting: Iterable[Message]) -> Iterable[Message]:
+        """Move one source to the front and keep the order of the others; the next macrostep draws again."""
+        messages = list(waiting)
+        sources = list(dict.fromkeys(map(_source, messages)))
+        if len(sources) > 1:
+            self._turn += 1
+            turn = str(self._turn)
+            first = min(sources, key=lambda source: uniform(self._seed, source, turn))
+            self.turned += first != sources[0]
+            messages.insert(0, messages.pop(next(n for n, one in enumerate(messages) if _source(one) == first)))
+        return messages
+
+
+def _source(message: Message) -> str:
+    """Return the source of a message; messages of one source keep their order."""
+    match message:
+        case LateMessage():
+            return _source(message.message)
+        case SkillMessage():
+            return f"action {message.start.action_id}"
+        case KnowledgeMessage():
+            return f"author {message.author}"
+        case TimerMessage() | SendLater():
+            return "timers"
+        case ParameterMessage():
+            return "operator"
+        case Event():
+            return "outside"
+
+
+class LossyTransport(LocalTransport):
+    """Loses, doubles, delays and so reorders frames; the same seed gives the same faults in simulated time.
+
+    Args:
+        seed: of all draws.
+        loss: chance that a frame is lost.
+        double: chance that one arrives twice.
+        delay: upper bound of a frame's delay in seconds.
+    """
+
+    def __init__(self, seed: int, *, loss: float = 0.2, double: float = 0.2, delay: float = 0.1) -> None:
+        super().__init__()
+        self._seed = seed
+        self._loss = loss
+        self._double = double
+        self._delay = delay
+        self._sent: Counter[str] = Counter()
+
+    def send(self, sender: str, to: str, frame: bytes) -> None:
+        """Send a frame with a separate draw of its faults: the same frame sent again has other faults."""
+        name = hashlib.blake2b(f"{sender} {to} ".encode() + frame, digest_size=8).hexdigest()
+        self._sent[name] += 1
+        subject = f"{name} {self._sent[name]}"
+        if uniform(self._seed, subject, "loss") < self._loss:
+            return
+        doubled = uniform(self._seed, subject, "double") < self._double
+        for copy in range(1 + doubled):
+            late = self._delay * uniform(self._seed, subject, f"delay {copy}")
+            asyncio.get_running_loop().call_later(late, self.deliver, sender, to, frame)

@@ -11,9 +11,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Protocol
 
 from dsc.engine.steps import Microstep, SetParameter, Start, Step, SwitchMode, Taken
+from dsc.events import AFTER, EVERY
+from dsc.model.actions import Trigger, flat
 from dsc.model.plot import ActionPlot
-from dsc.testing.vocabulary import KnownNames
-from knowledge_base.errors import InputError
+from dsc.model.states import AnyState, State
+from dsc.model.transitions import TransitionSource
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Fact
 from knowledge_base.language.effect import Add, AllOf, Delete, Effect, NumericEffect
 from knowledge_base.language.expression import Atom, Call, Constant
@@ -40,13 +43,13 @@ Run = Step | Iterable[Step] | HasSteps
 
 def entered(run: Run, state: str) -> bool:
     """Return whether the state was entered."""
-    _check(run, state=state)
+    _check(run, state)
     return any(step.entered(state) for step in _steps(run))
 
 
 def exited(run: Run, state: str) -> bool:
     """Return whether the state was exited."""
-    _check(run, state=state)
+    _check(run, state)
     return any(step.exited(state) for step in _steps(run))
 
 
@@ -72,8 +75,7 @@ def took(
         target: the state it leads to.
         rule: label of the contingency rule it comes from, e.g. `no_path: wait, retry`.
     """
-    for state in (source, target):
-        _check(run, state=state, trigger=trigger, rule=rule)
+    _check(run, source, target, trigger=trigger, rule=rule)
     return any(
         (source is None or _named(taken.source, source))
         and (trigger is None or taken.trigger == trigger)
@@ -129,7 +131,7 @@ def switched(run: Run, component: str, mode: str) -> bool:
 
 def chose(run: Run, state: str, plot: str | None) -> bool:
     """Return whether a dynamic state chose the plot; `None` means that no candidate fitted."""
-    _check(run, state=state)
+    _check(run, state)
     return any(
         _named(made.state, state) and made.decision.chosen == plot and not made.decision.satisfied
         for step in _steps(run)
@@ -147,13 +149,6 @@ def told(run: Run, what: str) -> bool:
     """
     wanted = tuple(_parts(parse_effect(what)))
     return any(all(_tells(step, part) for part in wanted) for step in _steps(run))
-
-
-def _check(run: Run, **names: str | None) -> None:
-    if isinstance(run, Step | Iterable):
-        return
-    bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)  # includes those of rules and planners
-    KnownNames([*run.library, *bound]).check(**names)
 
 
 def _steps(run: Run) -> Iterable[Step]:
@@ -209,3 +204,54 @@ def _fact(form: Atom | Call) -> Fact:
         if not isinstance(argument, Constant):
             raise InputError(f"'{argument}' has no value; a change contains only objects and numbers")
     return Fact(name, tuple(argument.value for argument in form.args if isinstance(argument, Constant)))
+
+
+def _check(
+    run: Run, *states: str | None, trigger: str | None = None, rule: str | None = None, skill: str | None = None
+) -> None:
+    """Raise `UnknownNameError` for a name that cannot occur in a run with plots; a state may be given by its path."""
+    if isinstance(run, Step | Iterable):
+        return
+    bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)  # includes those of rules and planners
+    known = _KnownNames([*run.library, *bound])
+    known.check("state", (name for state in states if state is not None for name in state.split("/")))
+    known.check("transition on", (trigger,))
+    known.check("rule", (rule,))
+    known.check("skill", (skill,))
+
+
+class _KnownNames:
+    """States, triggers, rules and skills (`component.skill`) of some plots.
+
+    With a plot that takes events by prefix (SCXML 3.12.1), any trigger is known.
+    """
+
+    def __init__(self, plots: Iterable[ActionPlot]) -> None:
+        self._by_prefix = False
+        self._names: dict[str, set[str | None]] = {
+            "state": {None}, "transition on": {None, AFTER, EVERY, "always"}, "rule": {None}, "skill": {None},
+        }  # fmt: skip
+        for plot in plots:
+            self._by_prefix |= plot.dialect == "scxml"
+            self._names["rule"].update(rule.label for rule in plot.rules)
+            self._names["rule"].update(handler.label for handler in plot.handlers)
+            for name, state, _ in plot.walk():
+                self._names["state"].add(name)
+                self._add(state)
+
+    def _add(self, state: AnyState) -> None:
+        if not isinstance(state, TransitionSource):
+            return
+        for trigger, transition in state.transitions():
+            self._names["transition on"].add(trigger)
+            self._names["rule"].add(transition.rule)
+        actions = flat((*state.entry, *state.exit, *state.on_break)) if isinstance(state, State) else ()
+        self._names["skill"].update(action.trigger for action in actions if isinstance(action, Trigger))
+
+    def check(self, kind: str, names: Iterable[str | None]) -> None:
+        """Raise `UnknownNameError` for an unknown name; `None` is always known."""
+        valid = self._names[kind]
+        for name in names:
+            if name not in valid and not (kind == "transition on" and self._by_prefix):
+                known = (one for one in valid if one is not None)
+                raise UnknownNameError(f"no plot of this run has a {kind} '{name}'", found=name, valid=known)

@@ -14,9 +14,8 @@ from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import RunEnd, Sequencer
-from dsc.testing.answers import Call, Replies
-from dsc.testing.scripted import ScriptedSkills
-from dsc.testing.worlds import change_of, world
+from dsc.testing.fixtures import change_of, world
+from dsc.testing.scripted import Call, Replies, ScriptedSkills
 from dsc.trace import Record, Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta

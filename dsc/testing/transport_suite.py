@@ -21,14 +21,13 @@ import pytest
 
 from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
+from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError, Transport
 from dsc.components.heartbeat import BEAT, SILENCE, Heartbeat
 from dsc.components.life_cycle import Life
 from dsc.components.ports import event, query, takes
 from dsc.components.publication import Publisher, Subscription
 from dsc.components.remote import Host, RemoteComponent
 from dsc.components.streams import Push, Stream, Wiring
-from dsc.components.transport import Transport
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from dsc.supervision.activation import ComponentActivation

@@ -10,15 +10,15 @@ from dsc_runs import ran
 
 from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
+from dsc.components.endpoint import LocalTransport
 from dsc.components.life_cycle import Life
 from dsc.components.remote import Host, RemoteComponent
-from dsc.components.transport import LocalTransport
 from dsc.dynamic.library import Library
 from dsc.engine.steps import SwitchMode
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
-from dsc.testing.lossy import LossyTransport
+from dsc.testing.faults import LossyTransport
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 

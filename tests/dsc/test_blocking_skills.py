@@ -16,7 +16,7 @@ from dsc_runs import Arm, Ran
 from dsc import blocking
 from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
-from dsc.components.factories import component_of
+from dsc.components.robot import component_of
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.skills import skill
 from knowledge_base.errors import InputError
@@ -298,7 +298,7 @@ def test_a_skill_that_swallows_its_deadline_is_timed_out_for_the_chart():
 def test_a_skill_that_swallows_its_cancellation_does_not_keep_the_process():
     program = """
 import asyncio
-from dsc.components.abandonment import give_up
+from dsc.components.hooks import give_up
 
 async def swallows():
     while True:

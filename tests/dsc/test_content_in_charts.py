@@ -4,7 +4,7 @@ import json
 
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.testing.worlds import world
+from dsc.testing.fixtures import world
 from knowledge_base.language.parser import parse_effect, parse_term
 
 ROOM = """(define (domain room) (:types thing)

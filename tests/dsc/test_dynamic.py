@@ -14,8 +14,7 @@ from dsc.dynamic.plot_outcomes import outcomes_of
 from dsc.engine.machine import Machine
 from dsc.engine.situation import Decision
 from dsc.events import Event
-from dsc.primitive import primitive_plot
-from dsc.skills import skill
+from dsc.skills import primitive_plot, skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.language.parser import parse_condition, parse_effect, parse_term

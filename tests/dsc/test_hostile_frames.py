@@ -12,15 +12,15 @@ from dsc_runs import SCHEMA, Ran
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dsc import calls
 from dsc.calls import Outcome, SkillCall
 from dsc.components import endpoint as endpoints
-from dsc.components import hosted, reports
+from dsc.components import hosted
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
+from dsc.components.endpoint import EVERYBODY, Endpoint, LocalTransport, NoAnswerError, RefusedError
 from dsc.components.publication import Subscription
 from dsc.components.remote import CONDITION, Host, RemoteComponent
 from dsc.components.streams import Push, Stream
-from dsc.components.transport import EVERYBODY, LocalTransport
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from knowledge_base.facts import Delta, fact
@@ -296,7 +296,7 @@ class Flooding(Component):
 
 @pytest.mark.parametrize("where", ["floods", "floods_from_thread"])
 def test_a_flood_of_reports_is_conflated_and_no_knowledge_is_lost(where, monkeypatch):
-    monkeypatch.setattr(reports, "MOST_WAITING", 50)
+    monkeypatch.setattr(calls, "MOST_WAITING", 50)
     most = []
 
     def watch(sequencer):
@@ -314,16 +314,16 @@ def test_a_flood_of_reports_is_conflated_and_no_knowledge_is_lost(where, monkeyp
 
 
 def test_reports_below_the_bound_all_arrive():
-    ran = Ran(FLOODED.replace("SKILL", "floods"), arm=Flooding(reports.MOST_WAITING // 10))
+    ran = Ran(FLOODED.replace("SKILL", "floods"), arm=Flooding(calls.MOST_WAITING // 10))
     (last,) = ran.end.emitted
-    assert last.attributes["heard"] == reports.MOST_WAITING // 10
+    assert last.attributes["heard"] == calls.MOST_WAITING // 10
     assert not any("conflated" in event for event in ran.of_type("event"))
 
 
 def test_conflated_observations_come_to_the_same_knowledge(monkeypatch):
-    monkeypatch.setattr(reports, "MOST_WAITING", 2)
+    monkeypatch.setattr(calls, "MOST_WAITING", 2)
     posted = []
-    aside = reports.Reports(lambda outcome, conflated: posted.append((outcome, conflated)))
+    aside = calls.Reports(lambda outcome, conflated: posted.append((outcome, conflated)))
     deltas = [
         Delta(added=(fact("p"),)),
         Delta(removed=(fact("p"),)),
@@ -343,7 +343,7 @@ def test_conflated_observations_come_to_the_same_knowledge(monkeypatch):
 
 
 def test_a_host_bounds_what_it_keeps_of_one_action(monkeypatch):
-    monkeypatch.setattr(reports, "MOST_WAITING", 50)
+    monkeypatch.setattr(calls, "MOST_WAITING", 50)
     monkeypatch.setattr(hosted, "MOST_KEPT", 100)
 
     async def main():

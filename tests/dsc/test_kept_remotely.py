@@ -11,9 +11,9 @@ from dsc_runs import SCHEMA
 
 from dsc.calls import Outcome
 from dsc.components.component import Component
+from dsc.components.endpoint import LocalTransport
 from dsc.components.ports import event
 from dsc.components.remote import Host, RemoteComponent
-from dsc.components.transport import LocalTransport
 from dsc.dynamic.library import Library
 from dsc.runs.archive import archive
 from dsc.runs.store import RunStore

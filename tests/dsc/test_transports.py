@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint
+from dsc.components.endpoint import Endpoint, LocalTransport
 from dsc.components.publication import Publisher
 from dsc.components.remote import Host
-from dsc.components.transport import LocalTransport
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
-from dsc.testing.lossy import LossyTransport
+from dsc.testing.faults import LossyTransport
 from dsc.testing.transport_suite import TransportSuite
 from knowledge_base.errors import InputError
 

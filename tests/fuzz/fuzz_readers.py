@@ -18,8 +18,8 @@ from fuzz_mutation import mutated, reset
 from domains.clean_up_table.deployment import deploy, domain, library
 from domains.clean_up_table.scenario import Scenario
 from dsc.components.component import Component
+from dsc.components.endpoint import LocalTransport
 from dsc.components.remote import Host
-from dsc.components.transport import LocalTransport
 from dsc.drawing import draw
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library

@@ -1,0 +1,146 @@
+"""Components of a robot: made of plain functions, found by `module:name`, and checked before a run."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+from dsc.components.component import ALWAYS, Component
+from dsc.components.hooks import contained
+from dsc.components.life_cycle import NEUTRAL
+from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
+from knowledge_base.language.inputs import require_several, shown
+
+
+def component_of(name: str, *functions: SkillBody) -> Component:
+    """A component whose skills are decorated functions: `async def greet(call, person)`.
+
+    Raises:
+        InputError: a function is not decorated with `skill`.
+    """
+    for function in functions:
+        if not hasattr(function, DECLARED):
+            what = f"'{function.__name__}'" if hasattr(function, "__name__") else shown(function)
+            raise InputError(f"{what} is no skill: decorate a function with `skill`", found=what)
+    return _OfFunctions(name, {function.__name__: function for function in functions})
+
+
+class _OfFunctions(Component):
+    """Has functions for skills."""
+
+    def __init__(self, name: str, functions: Mapping[str, SkillBody]) -> None:
+        super().__init__(name)
+        self._functions = functions
+        self._signatures = {skill: _signature(self.name, skill, function) for skill, function in functions.items()}
+
+    def skills(self) -> dict[str, SkillSignature]:
+        """The signatures of the functions."""
+        return dict(self._signatures)
+
+    def body(self, skill_name: str) -> SkillBody:
+        """The function."""
+        return self._functions[skill_name]
+
+
+def _signature(component: str, name: str, function: SkillBody) -> SkillSignature:
+    """As of a method, but for `self`, which a function has not."""
+    declared: Declared = getattr(function, DECLARED)
+    return signature_of(component, name, function, replace(declared, own=declared.own - 1))
+
+
+def robot_of(named: str) -> tuple[Component, ...]:
+    """The components that a function without arguments gives, or that a name stands for.
+
+    Args:
+        named: `module:name`; the module is found as `python -m` would, also in the present folder.
+
+    Raises:
+        InputError: there is no such module, nothing of that name in it, or it is no components. The module is run.
+    """
+    module_name, colon, name = named.partition(":")
+    if not (module_name and colon and name):
+        raise InputError(f"a robot is named as MODULE:NAME, not {shown(named)}", found=named)
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        with contained():
+            module = import_module(module_name)
+    except Exception as error:  # whatever somebody's module does wrong
+        raise InputError(f"the module '{module_name}' cannot be imported: {described(error)}") from error
+    if not hasattr(module, name):
+        valid = [one for one in vars(module) if not one.startswith("_")]
+        raise UnknownNameError(f"there is no '{name}' in the module '{module_name}'", found=name, valid=valid)
+    found = getattr(module, name)
+    try:
+        with contained():
+            made = found() if callable(found) else found
+    except Exception as error:
+        raise InputError(f"'{named}' gives no components: {described(error)}") from error
+    components = (made,) if isinstance(made, Component) or not isinstance(made, Iterable) else tuple(made)
+    return require_instances(components)
+
+
+def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
+    """Validate components: their instances, unique names and needs; return them.
+
+    Raises:
+        InputError: the argument is not a list, an item is not a component instance, or its needs are malformed.
+        SchemaError: two have one name.
+    """
+    require_several(components, "components")
+    components = tuple(components)
+    names = set()
+    for one in components:
+        if not isinstance(one, Component):
+            hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
+            raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
+        if one.name in names:
+            raise SchemaError(f"two components are named '{one.name}'", found=one.name)
+        _require_needs(one)
+        names.add(one.name)
+    return components
+
+
+def _require_needs(component: Component) -> None:
+    """Raise an error unless a component's `needs` are names, for modes that it has.
+
+    Raises:
+        InputError: the needs in a mode are not a tuple of names, e.g. one name without the comma.
+        UnknownNameError: the component says which modes it has, and one is none.
+    """
+    name, needs = component.name, component.needs
+    if not isinstance(needs, Mapping):
+        raise InputError(f"what component '{name}' needs is said for each mode, as in {_EXAMPLE}, not {shown(needs)}")
+    modes = (NEUTRAL, *component.modes)
+    for mode, needed in needs.items():
+        if not isinstance(needed, tuple) or not all(isinstance(one, str) for one in needed):
+            when = f"in its mode '{mode}'" if mode else "always"
+            raise InputError(f"what component '{name}' needs {when} is a tuple, as in {_EXAMPLE}, not {shown(needed)}")
+        if mode != ALWAYS and component.modes and mode not in modes:
+            message = f"component '{name}' needs something in its mode '{mode}', which it does not have"
+            raise UnknownNameError(message, found=mode, valid=modes)
+
+
+def require_deployed(components: Collection[Component], besides: Iterable[str] = ()) -> None:
+    """Raise `UnknownNameError` for a component that another needs, in any mode, and that is not deployed.
+
+    Args:
+        components: all components; those that reach others elsewhere are not validated.
+        besides: names of further components.
+    """
+    deployed = {*(component.name for component in components), *besides}
+    for component in components:
+        if type(component).reach is not Component.reach:  # it may find them elsewhere
+            continue
+        for needed in (*component.needed(), *(name for names in component.needs.values() for name in names)):
+            if needed not in deployed:
+                message = f"component '{component.name}' needs a component '{needed}', and there is none"
+                raise UnknownNameError(message, found=needed, valid=deployed - {component.name})
+
+
+_EXAMPLE = "needs = {'scanning': ('power',)}"
