@@ -35,7 +35,7 @@ from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from knowledge_base import Delta, KnowledgeBase, Schema
 from knowledge_base.facts import Fact, fact
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 from planning import Executive, PlanStep
 from planning.engines.planner import PlannerProcess
 from planning.plan import PlanningOutcome

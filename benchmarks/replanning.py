@@ -19,7 +19,7 @@ import set_table
 
 from dsc import ActionPlot, Component, Outcome, SkillCall, skill
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 from planning import Executive, PlanStep
 from planning.domain import PlanningAction
 from planning.engines import planner as asking

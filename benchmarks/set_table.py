@@ -6,7 +6,7 @@ from pathlib import Path
 
 from domains.clean_up_table import deployment
 from knowledge_base.facts import Delta, Fact, fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.plan import PlanStep

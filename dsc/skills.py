@@ -24,7 +24,7 @@ from dsc.calls import Outcome, SkillCall
 from dsc.events import EXECUTIVES
 from dsc.model.plot import ActionPlot
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.inputs import shown
+from knowledge_base.language.checking.inputs import shown
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
 """What may be done about an action of which nothing is known: do it again, since twice is as once; do it with the

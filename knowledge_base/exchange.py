@@ -17,8 +17,8 @@ from typing import Any
 
 from knowledge_base.errors import InputError, ParseError, Place, SchemaError
 from knowledge_base.facts import Content, Delta, Fact
-from knowledge_base.language.expression import TypedVariable
-from knowledge_base.language.vocabulary import Signature
+from knowledge_base.language.checking.vocabulary import Signature
+from knowledge_base.language.syntax.expression import TypedVariable
 from knowledge_base.pddl.files import read_text
 from knowledge_base.world.change_checks import check_delta
 from knowledge_base.world.schema import Schema

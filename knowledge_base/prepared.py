@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
-from knowledge_base.language.evaluator import asked, queried
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.inputs import require_params, shown
+from knowledge_base.language.checking.inputs import require_params, shown
+from knowledge_base.language.evaluation.evaluator import asked, queried
+from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.questions import Questions
 from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.state import WorldState

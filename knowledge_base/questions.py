@@ -7,13 +7,13 @@ from functools import lru_cache
 from typing import TypeVar
 
 from knowledge_base.facts import Value
-from knowledge_base.language.check import Free, check
-from knowledge_base.language.evaluator import Asked, Queried, asked, queried, rows
-from knowledge_base.language.expression import Expression, free_variables
-from knowledge_base.language.identity_cache import IdentityCache
-from knowledge_base.language.inputs import fitted_names, require_condition, require_params
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.world import World
+from knowledge_base.language.checking.check import Free, check
+from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params
+from knowledge_base.language.evaluation.evaluator import Asked, Queried, asked, queried, rows
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import Expression, free_variables
+from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.text import parse_condition
 
 _parsed = lru_cache(maxsize=1024)(parse_condition)
 

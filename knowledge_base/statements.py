@@ -10,15 +10,14 @@ from collections.abc import Iterable, Mapping
 
 from knowledge_base.errors import InputError, ParseError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.check import check, check_effect
-from knowledge_base.language.effect import Add, Effect, NumericEffect
-from knowledge_base.language.effect_application import apply_effect
-from knowledge_base.language.expression import Atom, Call, Comparison, Constant, Expression
-from knowledge_base.language.parser import parse_condition, parse_effect
-from knowledge_base.language.question_bounds import BoundedWorld, Bounds, Meter
-from knowledge_base.language.sexpr import Group, read
-from knowledge_base.language.vocabulary import ROOT_TYPE
-from knowledge_base.language.world import World
+from knowledge_base.language.checking.check import check, check_effect
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE
+from knowledge_base.language.evaluation.evaluator import apply_effect
+from knowledge_base.language.evaluation.world import BoundedWorld, Bounds, Meter, World
+from knowledge_base.language.syntax.effect import Add, Effect, NumericEffect
+from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Constant, Expression
+from knowledge_base.language.syntax.sexpr import Group, read
+from knowledge_base.language.syntax.text import parse_condition, parse_effect
 from knowledge_base.world.overlay import Overlay
 
 

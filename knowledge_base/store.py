@@ -26,8 +26,8 @@ from knowledge_base.journal.file import Durability, located
 from knowledge_base.journal.history import History, Version, Writer, gone
 from knowledge_base.journal.journal import Journal
 from knowledge_base.journal.memory_history import MemoryHistory
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.inputs import require_delta, require_text, require_time, require_version, shown
+from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, require_version, shown
+from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.sources import DataSource, Sources
 from knowledge_base.transaction import Transaction
 from knowledge_base.view import View

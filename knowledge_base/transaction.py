@@ -7,8 +7,8 @@ from typing import cast
 
 from knowledge_base.errors import ConflictError, InputError, UnknownNameError
 from knowledge_base.facts import Change, Content, Delta, Fact, Value
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.inputs import require_delta
+from knowledge_base.language.checking.inputs import require_delta
+from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.questions import Questions
 from knowledge_base.world.overlay import Overlay
 

@@ -8,11 +8,11 @@ from itertools import islice
 from knowledge_base.errors import ConflictError, InputError
 from knowledge_base.exchange import to_json
 from knowledge_base.facts import Content, Fact, Value
-from knowledge_base.language.evaluation import Explanation, explain
-from knowledge_base.language.expression import TRUE, Expression
-from knowledge_base.language.inputs import shown
-from knowledge_base.language.query_plan import QueryPlan, plan_query
-from knowledge_base.language.question_bounds import BoundedWorld, Bounds, Meter
+from knowledge_base.language.checking.inputs import shown
+from knowledge_base.language.evaluation.explanation import Explanation, explain
+from knowledge_base.language.evaluation.query_plan import QueryPlan, plan_query
+from knowledge_base.language.evaluation.world import BoundedWorld, Bounds, Meter
+from knowledge_base.language.syntax.expression import TRUE, Expression
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.problem_writer import problem_to_text
 from knowledge_base.prepared import Binding, Prepared

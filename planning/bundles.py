@@ -19,7 +19,7 @@ from dsc.model.plot import ActionPlot
 from dsc.text.plot_files import load_library
 from dsc.validation.deployment import addressed_by
 from knowledge_base.errors import InputError, Place, UnknownNameError, described
-from knowledge_base.language.inputs import shown
+from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.domain_text import DomainText
 from planning.domain import PlanningDomain
 from planning.fragments import shipped_by

@@ -7,10 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import InputError, Place, UnknownNameError
-from knowledge_base.language.durative import Duration
-from knowledge_base.language.effect import Effect, substitute_effect
-from knowledge_base.language.evaluation import Explanation, World, apply_effect, explain, holds
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.inputs import require
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Signature
+from knowledge_base.language.evaluation.evaluator import apply_effect, holds
+from knowledge_base.language.evaluation.explanation import Explanation, explain
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.durative import Duration
+from knowledge_base.language.syntax.effect import Effect, substitute_effect
+from knowledge_base.language.syntax.expression import (
     And,
     Atom,
     Comparison,
@@ -22,9 +26,7 @@ from knowledge_base.language.expression import (
     Variable,
     substitute,
 )
-from knowledge_base.language.inputs import require
-from knowledge_base.language.typed_list import TypedName
-from knowledge_base.language.vocabulary import ROOT_TYPE, Signature
+from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.pddl.action_text import ActionText
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.pddl.domain_writer import action_to_text, axiom_to_text, domain_to_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.inputs import require, shown
+from knowledge_base.language.checking.inputs import require, shown
 from knowledge_base.store import KnowledgeBase
 
 

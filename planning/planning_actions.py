@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.errors import Place, SchemaError
-from knowledge_base.language.check import check, check_arity, check_effect, check_parameters
-from knowledge_base.language.durative import Duration, DurativeParts
-from knowledge_base.language.effect import Add, Delete, Effect, effect_leaves
-from knowledge_base.language.expression import Atom, Comparison, Expression, TypedVariable, Variable
+from knowledge_base.language.checking.check import check, check_arity, check_effect, check_parameters
+from knowledge_base.language.syntax.durative import Duration, DurativeParts
+from knowledge_base.language.syntax.effect import Add, Delete, Effect, effect_leaves
+from knowledge_base.language.syntax.expression import Atom, Comparison, Expression, TypedVariable, Variable
 from knowledge_base.pddl.action_text import ActionText
 from knowledge_base.pddl.domain_text import AxiomText
 

@@ -19,7 +19,7 @@ from planning.problem.costs import TOTAL_COST
 
 if TYPE_CHECKING:
     from knowledge_base import View
-    from knowledge_base.language.expression import Expression
+    from knowledge_base.language.syntax.expression import Expression
 
 
 def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
-from knowledge_base.language.evaluation import World, apply_effect, evaluate_term, explain, holds
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.terms import as_number
+from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds
+from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.evaluation.terms import as_number
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.world.overlay import Overlay
 from planning.plan import Plan
 from planning.problem.derived import derivation
@@ -20,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from knowledge_base.facts import Value
-    from knowledge_base.language.effect import Effect
-    from knowledge_base.language.vocabulary import Vocabulary
+    from knowledge_base.language.checking.vocabulary import Vocabulary
+    from knowledge_base.language.syntax.effect import Effect
     from planning.domain import PlanningDomain
     from planning.plan import PlanStep, Timing
     from planning.problem.derived import Derivation

@@ -28,7 +28,7 @@ from dsc.components.hooks import contained
 from dsc.skills import AfterCrash, Declared, SkillBody, Skilled, require_names
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
-from knowledge_base.language.inputs import shown
+from knowledge_base.language.checking.inputs import shown
 
 PERIOD = 0.1
 """Seconds between two ticks."""

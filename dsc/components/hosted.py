@@ -17,7 +17,7 @@ from dsc.components.endpoint import Endpoint, encoded
 from dsc.components.hooks import contained
 from knowledge_base.errors import InputError, described
 from knowledge_base.exchange import delta_form, delta_of
-from knowledge_base.language.inputs import require_delta, require_time, shown
+from knowledge_base.language.checking.inputs import require_delta, require_time, shown
 
 MOST_ACTIONS = 1_000
 """Actions that are going on at a host, and as many that are over and were not forgotten; of those, the latest."""

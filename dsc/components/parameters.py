@@ -12,10 +12,9 @@ from typing import Literal, get_args
 from dsc.model.ranges import Range, Who, written
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.evaluator import evaluate_term
-from knowledge_base.language.expression import free_variables
-from knowledge_base.language.parser import parse_condition, parse_term
+from knowledge_base.language.evaluation.evaluator import evaluate_term, holds
+from knowledge_base.language.syntax.expression import free_variables
+from knowledge_base.language.syntax.text import parse_condition, parse_term
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState

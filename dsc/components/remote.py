@@ -26,7 +26,7 @@ from dsc.components.life_cycle import Life
 from dsc.components.publication import RENEWED, HostedStreams, Publisher, Subscription, ports_form, ports_of
 from dsc.skills import SkillSignature
 from knowledge_base.errors import InputError, described, text_of
-from knowledge_base.language.inputs import require_text
+from knowledge_base.language.checking.inputs import require_text
 
 WATCH = 1.0
 """Seconds after which a host is asked how an action goes."""

@@ -13,7 +13,7 @@ from dsc.components.hooks import contained
 from dsc.components.life_cycle import NEUTRAL
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
-from knowledge_base.language.inputs import require_several, shown
+from knowledge_base.language.checking.inputs import require_several, shown
 
 
 def component_of(name: str, *functions: SkillBody) -> Component:

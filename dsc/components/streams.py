@@ -12,7 +12,7 @@ from dsc.components.endpoint import NoAnswerError, encoded
 from dsc.components.life_cycle import Life, LifeCycle
 from dsc.model.ranges import Range
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.inputs import shown
+from knowledge_base.language.checking.inputs import shown
 
 Values = Mapping[str, str | None]
 """What is pushed, by name with types: `number`, `boolean`, a word of any other type, or `None`: any plain data."""

@@ -26,8 +26,8 @@ from dsc.model.actions import (
 from dsc.model.connectors import CHOICE, SelectState, case_value
 from dsc.model.states import State
 from dsc.model.transitions import TimedTransition, Transition, TransitionSource
-from knowledge_base.language.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.spelling import value_text
 
 WIDTH = 190.0

@@ -12,8 +12,8 @@ from dsc.dynamic.library import Library
 from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, FinalState, HistoryState, State, SubmachineState
-from knowledge_base.language.expression import Term
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.expression import Term
+from knowledge_base.language.syntax.text import to_text
 
 DETAIL_WIDTH = 260.0
 SIDE = 12.0

@@ -10,7 +10,7 @@ from dsc.drawing.layout import Box, BoxKind, Text, TextStyle
 from dsc.drawing.measure import LINE_HEIGHT, pack, shorten, text_width
 from dsc.model.plot import ActionPlot, PlotParameter, PlotVariable
 from dsc.model.rules import Handler, Rule
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 
 SIDE = 16.0
 LEAST_WIDTH = 340.0

@@ -29,7 +29,7 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 
 _SOFT, _RULE = "dim", "magenta"
 

@@ -10,9 +10,11 @@ from dsc.engine.situation import Decision, Verdict
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState
 from knowledge_base.facts import Content
-from knowledge_base.language.evaluation import World, evaluate_term, explain, holds
-from knowledge_base.language.expression import Constant, substitute
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.evaluation.evaluator import evaluate_term, holds
+from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import Constant, substitute
+from knowledge_base.language.syntax.text import to_text
 
 ACHIEVE = "achieve"
 """The library's plot for a goal without a fitting candidate: plan, execute, replan."""

@@ -23,7 +23,7 @@ from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.rules import Handler
 from dsc.model.states import AnyState, CompositeState, FinalState, OrthogonalState, Region, State, SubmachineState
 from dsc.model.transitions import Transition
-from knowledge_base.language.expression import Variable
+from knowledge_base.language.syntax.expression import Variable
 
 States = dict[str, AnyState]
 _EVENT = "event."

@@ -23,7 +23,7 @@ from dsc.model.rules import CONTINUE, ENTER, Rule
 from dsc.model.states import AnyState, DynamicState, SubmachineState
 from dsc.model.transitions import Transition
 from knowledge_base.errors import SchemaError
-from knowledge_base.language.expression import Term
+from knowledge_base.language.syntax.expression import Term
 
 
 class Insertions:

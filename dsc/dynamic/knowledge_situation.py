@@ -9,9 +9,9 @@ from dsc.dynamic.library import Library
 from dsc.engine.situation import Bindings, Decision
 from dsc.model.states import DynamicState
 from knowledge_base.facts import Delta
-from knowledge_base.language.effect import Effect
-from knowledge_base.language.evaluation import apply_effect, evaluate_term, holds
-from knowledge_base.language.expression import Expression, Term
+from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds
+from knowledge_base.language.syntax.effect import Effect
+from knowledge_base.language.syntax.expression import Expression, Term
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.overlay import Overlay
 

@@ -13,7 +13,7 @@ from dsc.engine.tables import CompiledPlot
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import Who
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.inputs import shown
+from knowledge_base.language.checking.inputs import shown
 
 MOST_BOUND = 64
 """Upper bound of compiled plots given as data: a retry binds the same plan again, and a long run has many plans."""

@@ -14,8 +14,8 @@ from dsc.model.rules import CONTINUE, ENTER, GIVE_UP, REPLAN, RETRY, Rule
 from dsc.model.states import AnyState, FinalState, State, SubmachineState
 from dsc.model.transitions import Transition
 from knowledge_base.errors import SchemaError
-from knowledge_base.language import expression as lang
-from knowledge_base.language.effect import substitute_effect
+from knowledge_base.language.syntax import expression as lang
+from knowledge_base.language.syntax.effect import substitute_effect
 
 DEFAULT_RETRIES = 3
 """Limit of `retry` and `replan` responses without a `limit`, so that no rule repeats without end."""

@@ -16,7 +16,7 @@ from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.rules import REPLAN, Rule
 from dsc.model.states import AnyState, CompositeState, DynamicState, OrthogonalState, SubmachineState
 from dsc.model.transitions import Transition
-from knowledge_base.language.expression import Arithmetic, Comparison, Constant, Variable
+from knowledge_base.language.syntax.expression import Arithmetic, Comparison, Constant, Variable
 
 
 def expand(plot: ActionPlot, plots: Plots) -> ActionPlot:

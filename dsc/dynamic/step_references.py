@@ -11,8 +11,8 @@ from dsc.model.plot import ActionPlot
 from dsc.model.rules import STEP, Command, Handler, Response, Rule
 from dsc.model.states import DynamicState, SubmachineState
 from knowledge_base.errors import SchemaError
-from knowledge_base.language.effect import mentioned, quantified_in, substitute_effect
-from knowledge_base.language.expression import Term, free_variables, quantified, substitute, substitute_term
+from knowledge_base.language.syntax.effect import mentioned, quantified_in, substitute_effect
+from knowledge_base.language.syntax.expression import Term, free_variables, quantified, substitute, substitute_term
 
 Step = SubmachineState | DynamicState
 """A state that holds another plot."""

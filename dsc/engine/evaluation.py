@@ -12,7 +12,7 @@ from dsc.engine.steps import Output, SendMessage, SetParameter, Start, SwitchMod
 from dsc.model.actions import Configure, ExternalAction, Send, Trigger
 from dsc.model.plot import ActionPlot
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.expression import Constant, Term, Variable
+from knowledge_base.language.syntax.expression import Constant, Term, Variable
 
 
 def evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> Any:

@@ -18,7 +18,7 @@ from dsc.errors import RunawayError
 from dsc.events import DONE, DONE_STATE, NO_CANDIDATE, Event
 from dsc.model.states import DynamicState, SubmachineState
 from knowledge_base.errors import InputError
-from knowledge_base.language.expression import Variable
+from knowledge_base.language.syntax.expression import Variable
 
 MAX_NESTING = 40
 """Upper bound of plots inside plots; a deeper chart nests a plot in itself without end."""

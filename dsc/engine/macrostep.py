@@ -19,7 +19,7 @@ from dsc.engine.transition_selection import Addressed, Enabled, Trigger, select
 from dsc.errors import RunawayError
 from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, Event, goes_outwards
 from knowledge_base.errors import InputError
-from knowledge_base.language.expression import Expression
+from knowledge_base.language.syntax.expression import Expression
 
 MAX_MICROSTEPS = 1000
 """Upper bound; a macrostep with more microsteps does not end."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     TRUE,
     And,
     Atom,

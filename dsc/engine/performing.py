@@ -16,7 +16,7 @@ from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, Event
 from dsc.model.actions import Assign, Block, Choose, Emit, ExternalAction, Internal, Log, Tell, Withdraw
 from dsc.model.language import TermField
 from knowledge_base.errors import InputError
-from knowledge_base.language.expression import Expression
+from knowledge_base.language.syntax.expression import Expression
 
 Action = ExternalAction | Internal
 _EXPONENT_FROM = 1e21

@@ -13,7 +13,7 @@ from dsc.engine.membership import FALSE, settle
 from dsc.engine.reaction import CompiledReaction
 from dsc.engine.tables import TransitionEdge
 from dsc.engine.transition_selection import Enabled, Trigger, edges_of, select
-from knowledge_base.language.expression import TRUE, Expression
+from knowledge_base.language.syntax.expression import TRUE, Expression
 
 MOST_QUESTIONS = 1024
 """Upper bound for one configuration: n independent guards have 2**n outcomes."""

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 
 from dsc.model.states import DynamicState
 from knowledge_base.facts import Delta
-from knowledge_base.language.effect import Effect
-from knowledge_base.language.expression import Expression, Term
+from knowledge_base.language.syntax.effect import Effect
+from knowledge_base.language.syntax.expression import Expression, Term
 
 Bindings = Mapping[str, Any]
 """Values of chart variables, parameters and `event.attribute`s by name."""

@@ -11,7 +11,7 @@ from dsc.model.actions import ExternalAction, Internal, Trigger
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot
 from dsc.model.states import AnyState, DynamicState, FinalState, OrthogonalState, State, SubmachineState
-from knowledge_base.language.expression import Expression
+from knowledge_base.language.syntax.expression import Expression
 
 
 @dataclass(slots=True, eq=False)  # never changed; a frozen one takes five times as long to create

@@ -13,7 +13,7 @@ from dsc.model.language import TermField
 from dsc.model.reading import LOCATED, FormPath
 from dsc.model.transitions import Transition, Transitions, TransitionSource, as_transition
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import And, Comparison, Constant
+from knowledge_base.language.syntax.expression import And, Comparison, Constant
 from knowledge_base.spelling import TRUTH_VALUES, is_number
 
 CHOICE = "choice"

@@ -17,12 +17,10 @@ from pydantic import ConfigDict, Discriminator, PlainSerializer, PlainValidator,
 from dsc.model.reading import UNKNOWN_FORM, Form
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
-from knowledge_base.language.depth import check_depth
-from knowledge_base.language.effect import AllOf, Effect
-from knowledge_base.language.expression import Constant, Expression, Term
-from knowledge_base.language.identity_cache import IdentityCache
-from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.effect import AllOf, Effect, check_depth
+from knowledge_base.language.syntax.expression import Constant, Expression, Term
+from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 
 _Parsed = TypeVar("_Parsed", Expression, Term, Effect)
 

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, field_validator
 from dsc.model.actions import Assign, Emit, Internal, InternalAction, Tell, flat
 from dsc.model.language import ConditionField, EffectField, Frozen, TermField
 from dsc.model.reading import FormPath
-from knowledge_base.language.expression import Constant, Term
+from knowledge_base.language.syntax.expression import Constant, Term
 
 
 def as_tuple(value: Any) -> Any:

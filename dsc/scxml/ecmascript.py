@@ -15,7 +15,7 @@ from dsc.errors import NotExpressibleError
 from dsc.scxml.tokens import Token, tokens
 from dsc.scxml.value_kinds import ANY, BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, WHOLE, Scope
 from knowledge_base.errors import Place, UnknownNameError
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     TRUE,
     And,
     Arithmetic,

@@ -13,7 +13,7 @@ from dsc.scxml.ecmascript import MAX_WHOLE, condition, joined, term
 from dsc.scxml.elements import STATES
 from dsc.scxml.value_kinds import NO_VALUE, WHOLE, Scope, Sent
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.expression import Constant, Term, Variable
+from knowledge_base.language.syntax.expression import Constant, Term, Variable
 from knowledge_base.spelling import is_plain_name
 
 Form = dict[str, Any]

@@ -29,7 +29,7 @@ from dsc.scxml.value_kinds import BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, Sc
 from dsc.text.form import read_model
 from dsc.text.yaml import Document
 from knowledge_base.errors import InputError, Place
-from knowledge_base.language.expression import Constant, Term, free_variables
+from knowledge_base.language.syntax.expression import Constant, Term, free_variables
 from knowledge_base.spelling import is_plain_name
 
 

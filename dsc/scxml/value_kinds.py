@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from dsc.engine.transition_selection import matches
 from dsc.errors import NotExpressibleError
 from knowledge_base.errors import Place
-from knowledge_base.language.expression import Arithmetic, Constant, Term, Variable
+from knowledge_base.language.syntax.expression import Arithmetic, Constant, Term, Variable
 
 NUMBER, TEXT, BOOLEAN = "number", "text", "boolean"
 UNDEFINED = "undefined"

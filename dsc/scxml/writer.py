@@ -26,7 +26,7 @@ from dsc.model.transitions import Transition
 from dsc.scxml.document import NAMESPACE
 from dsc.scxml.value_kinds import NO_VALUE
 from dsc.text.targets import require_targets
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     ARITHMETIC,
     And,
     Arithmetic,
@@ -41,7 +41,7 @@ from knowledge_base.language.expression import (
     Variable,
     free_variables,
 )
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 
 _SIGNS = {"=": "===", "!=": "!=="}
 

@@ -17,7 +17,7 @@ from dsc.sequencer.outcome_checks import encoded
 from dsc.trace import Trace
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
-from knowledge_base.language.inputs import require, require_delta, require_text, shown
+from knowledge_base.language.checking.inputs import require, require_delta, require_text, shown
 from knowledge_base.store import KnowledgeBase
 
 _NUMBER = int | float

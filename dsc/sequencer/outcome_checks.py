@@ -15,8 +15,8 @@ from dsc.messages import SkillMessage
 from dsc.skills import SkillSignature
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
 from knowledge_base.facts import Delta
-from knowledge_base.language.inputs import require_delta, shown
-from knowledge_base.language.world import World
+from knowledge_base.language.checking.inputs import require_delta, shown
+from knowledge_base.language.evaluation.world import World
 from knowledge_base.store import KnowledgeBase
 
 Declared = Mapping[str, str | None]

@@ -18,7 +18,7 @@ from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import AfterCrash, SkillSignature, check_arguments
 from knowledge_base.errors import UnknownNameError
-from knowledge_base.language.expression import Constant
+from knowledge_base.language.syntax.expression import Constant
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 

@@ -10,9 +10,9 @@ from dsc.events import DONE
 from dsc.model.plot import ActionPlot, PlotVariable
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
-from knowledge_base.language.effect_application import apply_effect
-from knowledge_base.language.parser import parse_effect
-from knowledge_base.language.terms import Bindings
+from knowledge_base.language.evaluation.evaluator import apply_effect
+from knowledge_base.language.evaluation.terms import Bindings
+from knowledge_base.language.syntax.text import parse_effect
 from knowledge_base.pddl.domain_text import read_domain
 from knowledge_base.pddl.problem_text import read_problem
 from knowledge_base.store import KnowledgeBase

@@ -18,9 +18,9 @@ from dsc.model.states import AnyState, State
 from dsc.model.transitions import TransitionSource
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Fact
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, NumericEffect
-from knowledge_base.language.expression import Atom, Call, Constant
-from knowledge_base.language.parser import parse_effect
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, NumericEffect
+from knowledge_base.language.syntax.expression import Atom, Call, Constant
+from knowledge_base.language.syntax.text import parse_effect
 
 
 class HasSteps(Protocol):

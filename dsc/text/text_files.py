@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from knowledge_base.errors import InputError, Place
-from knowledge_base.language.inputs import shown
+from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.files import read_text, require_size
 
 MAX_BYTES = 250_000

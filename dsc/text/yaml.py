@@ -34,7 +34,7 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 from dsc.model.reading import FormPath
 from dsc.text.text_files import check_size
 from knowledge_base.errors import ParseError, Place
-from knowledge_base.language.inputs import require_text
+from knowledge_base.language.checking.inputs import require_text
 
 MAX_DEPTH = 128
 MAX_PARTS = 18_000

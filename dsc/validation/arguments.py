@@ -18,7 +18,7 @@ from dsc.model.states import AnyState, FinalState, HistoryState, State, Submachi
 from dsc.model.transitions import Transition, TransitionSource
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.expression import Constant, Term
+from knowledge_base.language.syntax.expression import Constant, Term
 
 
 def check_parameters(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:

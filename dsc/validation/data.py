@@ -34,10 +34,10 @@ from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.nesting import Nesting
 from dsc.validation.rules import RuleScope, Skills, Types, attributes_of
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.binding import unbound_error
-from knowledge_base.language.check import check, check_effect, check_term
-from knowledge_base.language.effect import Effect, mentioned
-from knowledge_base.language.expression import Expression, Term, free_variables
+from knowledge_base.language.checking.binding import unbound_error
+from knowledge_base.language.checking.check import check, check_effect, check_term
+from knowledge_base.language.syntax.effect import Effect, mentioned
+from knowledge_base.language.syntax.expression import Expression, Term, free_variables
 from knowledge_base.world.schema import Schema
 
 FREE_TYPES = frozenset({"number", "text", "symbol", "boolean", "condition", "plot"})

@@ -11,7 +11,7 @@ from dsc.model.plot import ActionPlot, Path
 from dsc.model.ranges import Who, refuse_change
 from dsc.model.states import State
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.expression import Constant
+from knowledge_base.language.syntax.expression import Constant
 
 Components = Collection[str] | Mapping[str, Mapping[str, Parameter]]
 """The names of components, or their declared parameters as well; names alone allow any parameter."""

@@ -19,8 +19,8 @@ from dsc.model.transitions import TimedTransition, Transition
 from dsc.validation.nesting import Nesting
 from dsc.validation.rules import Attributes, RuleScope, Skills, attributes_of
 from knowledge_base.errors import SchemaError
-from knowledge_base.language.expression import Constant, Term, Variable
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.expression import Constant, Term, Variable
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.schema import Schema
 
 _VALUES = frozenset({"number", "boolean"})

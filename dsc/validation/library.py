@@ -17,7 +17,7 @@ from dsc.validation.kinds import check_kinds
 from dsc.validation.nesting import Nesting
 from dsc.validation.reach import check_reach
 from dsc.validation.shape import check_size, check_structure
-from knowledge_base.language.inputs import require, require_several
+from knowledge_base.language.checking.inputs import require, require_several
 from knowledge_base.world.schema import Schema
 
 MAX_FINDINGS = 50

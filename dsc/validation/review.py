@@ -16,8 +16,8 @@ from dsc.model.states import CompositeState, DynamicState, State
 from dsc.validation.library import MAX_FINDINGS
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError
-from knowledge_base.language.contradiction import contradictory, implied, subjects
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.contradiction import contradictory, implied, subjects
+from knowledge_base.language.syntax.expression import (
     TRUE,
     Call,
     Comparison,

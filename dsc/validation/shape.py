@@ -30,7 +30,7 @@ from dsc.validation.nesting import Nesting
 from dsc.validation.reach import check_connectors
 from dsc.validation.rules import check_rules, unknown_plot
 from knowledge_base.errors import SchemaError, UnknownNameError
-from knowledge_base.language.expression import Constant, Term
+from knowledge_base.language.syntax.expression import Constant, Term
 
 MAX_ANSWERS = 1_000
 """Upper bound of transitions from rules; ten times those of this project's largest plot, in a tenth of a second."""

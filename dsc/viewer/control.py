@@ -11,14 +11,14 @@ from dsc.events import Event
 from dsc.sequencer.clock import LoopClock
 from dsc.viewer.queries import require_short
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.check import check
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.question_bounds import Bounds
+from knowledge_base.language.checking.check import check
+from knowledge_base.language.evaluation.world import Bounds
+from knowledge_base.language.syntax.text import parse_condition
 
 if TYPE_CHECKING:
     from dsc.engine.steps import Step
     from dsc.sequencer.sequencer import Sequencer
-    from knowledge_base.language.expression import Expression
+    from knowledge_base.language.syntax.expression import Expression
 
 AUTHOR = "viewer"
 MOST_SECONDS = 10

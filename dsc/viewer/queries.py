@@ -14,11 +14,10 @@ from dsc.viewer.records import RecordLog
 from knowledge_base.errors import InputError, OutOfBoundsError, UnknownNameError
 from knowledge_base.exchange import delta_of, schema_of, world_of
 from knowledge_base.facts import Fact
-from knowledge_base.language.explanation import Explanation
-from knowledge_base.language.expression import Expression, variables_in_order
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.question_bounds import Bounds
+from knowledge_base.language.evaluation.explanation import Explanation
+from knowledge_base.language.evaluation.world import Bounds
+from knowledge_base.language.syntax.expression import Expression, variables_in_order
+from knowledge_base.language.syntax.text import parse_condition, to_text
 from knowledge_base.view import View
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState

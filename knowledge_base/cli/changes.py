@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from knowledge_base.facts import Delta
-    from knowledge_base.language.world import World
+    from knowledge_base.language.evaluation.world import World
 
 Facts = Annotated[
     list[str],

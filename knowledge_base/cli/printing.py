@@ -11,7 +11,7 @@ import typer
 
 if TYPE_CHECKING:
     from knowledge_base.facts import Change, Delta
-    from knowledge_base.language.evaluation import Explanation
+    from knowledge_base.language.evaluation.explanation import Explanation
 
 MOST_ROWS = 5000
 """Rows of one table. Columns are as wide as their widest cell, so that all rows must exist before the first is

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from knowledge_base.facts import Value
-    from knowledge_base.language.expression import Expression
+    from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.pddl import ProblemText
     from knowledge_base.view import View
 
@@ -66,7 +66,7 @@ def ask(
 ) -> None:
     """Answer whether EXPR is true. Exit status: 0 yes, 1 no."""
     from knowledge_base.cli.printing import explanation_lines
-    from knowledge_base.language.question_bounds import Bounds
+    from knowledge_base.language.evaluation.world import Bounds
 
     with opened(source, domain) as (kb, _):
         explanation = kb.explain(_parsed(expression), _params(param), bounds=Bounds(seconds=seconds))
@@ -124,8 +124,8 @@ def _answer(
     """Print the answers as they are found, without a list of all in memory."""
     from itertools import chain, islice
 
-    from knowledge_base.language.expression import variables_in_order
-    from knowledge_base.language.question_bounds import Bounds
+    from knowledge_base.language.evaluation.world import Bounds
+    from knowledge_base.language.syntax.expression import variables_in_order
 
     condition = _parsed(expression)
     answers = world.stream(condition, params, bounds=Bounds(seconds=seconds))
@@ -143,7 +143,7 @@ def _answer(
 
 def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_json: bool) -> None:
     from knowledge_base.errors import UnknownNameError
-    from knowledge_base.language.printer import to_text
+    from knowledge_base.language.syntax.text import to_text
     from knowledge_base.spelling import value_text
 
     things, facts, values = world.nodes(), world.facts(), world.values()
@@ -169,7 +169,7 @@ def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_jso
 
 
 def _parsed(expression: str) -> Expression:
-    from knowledge_base.language.parser import parse_condition
+    from knowledge_base.language.syntax.text import parse_condition
 
     return parse_condition(expression, source="EXPR")
 
@@ -177,8 +177,8 @@ def _parsed(expression: str) -> Expression:
 def _params(said: list[str] | None) -> dict[str, Value]:
     """Return the bindings of `x=VALUE` options; values are written as in the language."""
     from knowledge_base.errors import InputError
-    from knowledge_base.language.expression import Constant
-    from knowledge_base.language.parser import parse_term
+    from knowledge_base.language.syntax.expression import Constant
+    from knowledge_base.language.syntax.text import parse_term
 
     found: dict[str, Value] = {}
     for one in said or ():

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Comparison,

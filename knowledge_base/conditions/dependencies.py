@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,

@@ -18,9 +18,9 @@ from knowledge_base.conditions.join import ConditionIndex, ConditionRow, Join
 from knowledge_base.conditions.notification import Notifier
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact, Value
-from knowledge_base.language.expression import Expression, substitute
-from knowledge_base.language.inputs import shown
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.checking.inputs import shown
+from knowledge_base.language.syntax.expression import Expression, substitute
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState

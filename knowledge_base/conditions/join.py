@@ -11,11 +11,10 @@ from knowledge_base.conditions.dependencies import Occurrence, occurrences
 from knowledge_base.conditions.open_rows import ROWS, RowsWorld, schema_with_rows
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.compiler import compile_query, compile_test
-from knowledge_base.language.expression import And, Atom, Variable, free_variables
-from knowledge_base.language.joins import conjuncts
-from knowledge_base.language.lookups import Search
-from knowledge_base.language.terms import Bindings, Test
+from knowledge_base.language.evaluation.compiler import compile_query, compile_test
+from knowledge_base.language.evaluation.lookups import Search, conjuncts
+from knowledge_base.language.evaluation.terms import Bindings, Test
+from knowledge_base.language.syntax.expression import And, Atom, Variable, free_variables
 from knowledge_base.world.index import FactIndex
 from knowledge_base.world.state import WorldState
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import lru_cache
 
 from knowledge_base.facts import Content, Value
-from knowledge_base.language.expression import TypedVariable
-from knowledge_base.language.vocabulary import Signature
+from knowledge_base.language.checking.vocabulary import Signature
+from knowledge_base.language.syntax.expression import TypedVariable
 from knowledge_base.world.index import FactIndex
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState

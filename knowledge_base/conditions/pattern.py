@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Change, Delta, Value
-from knowledge_base.language.check import check_arity
-from knowledge_base.language.expression import Atom, Constant, Expression, Variable
+from knowledge_base.language.checking.check import check_arity
+from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Variable
 from knowledge_base.world.schema import Schema
 
 Touches = Callable[[Change], bool]

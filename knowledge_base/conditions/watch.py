@@ -14,9 +14,9 @@ from knowledge_base.conditions.pattern import Touches, touches
 from knowledge_base.conditions.waiters import Waiters
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Change, Value
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.inputs import fitted_names, require_condition, require_params, shown
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params, shown
+from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.schema import Schema
 
 

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from knowledge_base.errors import ParseError, Place, SchemaError
-from knowledge_base.language.durative import Duration, DurativeParts
-from knowledge_base.language.effect import NO_EFFECT, Effect
-from knowledge_base.language.expression import TRUE, Expression, TypedVariable
-from knowledge_base.language.parser import parse_condition, parse_effect, parse_variables
-from knowledge_base.language.printer import to_text, variables_text
-from knowledge_base.language.sexpr import Group, Node, Word
+from knowledge_base.language.syntax.durative import Duration, DurativeParts
+from knowledge_base.language.syntax.effect import NO_EFFECT, Effect
+from knowledge_base.language.syntax.expression import TRUE, Expression, TypedVariable
+from knowledge_base.language.syntax.sexpr import Group, Node, Word, parse_variables
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, to_text, variables_text
 from knowledge_base.pddl.beyond import ACTION_PARTS, refuse_forms, refused
 from knowledge_base.pddl.durative_text import read_duration, read_timed
 from knowledge_base.pddl.sections import word

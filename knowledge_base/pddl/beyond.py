@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from knowledge_base.errors import Place, UnsupportedConstructError
-from knowledge_base.language.sexpr import Group, Node, Word
+from knowledge_base.language.syntax.sexpr import Group, Node, Word
 
 _HYBRID = "hybrid planners (PDDL+), such as ENHSP or OPTIC"
 _TEMPORAL = "temporal planners, such as OPTIC or Tamer"

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from knowledge_base.content import UNSET
 from knowledge_base.errors import ParseError, Place, nearest
-from knowledge_base.language.expression import Expression, TypedVariable
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.sexpr import Group, Node, Word, read
-from knowledge_base.language.typed_list import TypedName, parse_names, typed_variables
+from knowledge_base.language.syntax.expression import Expression, TypedVariable
+from knowledge_base.language.syntax.sexpr import Group, Node, TypedName, Word, parse_names, read, typed_variables
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.pddl.action_text import ACTION, DURATIVE_ACTION, ActionText, read_actions
 from knowledge_base.pddl.beyond import OBJECT_FLUENTS, refuse_forms, refused
 from knowledge_base.pddl.files import text_and_source

@@ -8,12 +8,12 @@ from graphlib import TopologicalSorter
 from typing import TypeVar
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.durative import Duration, DurativeParts
-from knowledge_base.language.effect import NO_EFFECT, AllOf, Effect
-from knowledge_base.language.expression import TRUE, And, Constant, Expression, TypedVariable
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.typed_list import TypedName
-from knowledge_base.language.vocabulary import ROOT_TYPE
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE
+from knowledge_base.language.syntax.durative import Duration, DurativeParts
+from knowledge_base.language.syntax.effect import NO_EFFECT, AllOf, Effect
+from knowledge_base.language.syntax.expression import TRUE, And, Constant, Expression, TypedVariable
+from knowledge_base.language.syntax.sexpr import TypedName
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl.action_text import ACTION, DURATIVE_ACTION, ActionText
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText
 from knowledge_base.spelling import is_plain_name

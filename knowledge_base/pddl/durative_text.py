@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import TypeVar
 
 from knowledge_base.errors import ParseError
-from knowledge_base.language.durative import Duration, DurativeParts
-from knowledge_base.language.effect import AllOf, Effect, ForEach, NumericEffect, When
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.durative import Duration, DurativeParts
+from knowledge_base.language.syntax.effect import AllOf, Effect, ForEach, NumericEffect, When
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Constant,
@@ -20,8 +20,8 @@ from knowledge_base.language.expression import (
     Variable,
     free_variables,
 )
-from knowledge_base.language.parser import parse_condition, parse_effect, parse_term, parse_variables
-from knowledge_base.language.sexpr import Group, Node, Word
+from knowledge_base.language.syntax.sexpr import Group, Node, Word, parse_variables
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term
 from knowledge_base.pddl.beyond import ACROSS_TIMES, CHOSEN_DURATION, DURATION_AT_END, refused
 
 _DURATION = Variable("duration")

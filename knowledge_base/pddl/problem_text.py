@@ -10,8 +10,9 @@ from typing import Literal, Protocol
 from knowledge_base.content import GEOMETRY, require_content
 from knowledge_base.errors import ParseError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Content, Delta, Fact, Value
-from knowledge_base.language.check import check
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.check import check
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Signature, Vocabulary
+from knowledge_base.language.syntax.expression import (
     TRUE,
     Arithmetic,
     Atom,
@@ -22,10 +23,8 @@ from knowledge_base.language.expression import (
     Not,
     Term,
 )
-from knowledge_base.language.parser import parse_condition, parse_term
-from knowledge_base.language.sexpr import Group, Node, Word
-from knowledge_base.language.typed_list import TypedName, parse_names
-from knowledge_base.language.vocabulary import ROOT_TYPE, Signature, Vocabulary
+from knowledge_base.language.syntax.sexpr import Group, Node, TypedName, Word, parse_names
+from knowledge_base.language.syntax.text import parse_condition, parse_term
 from knowledge_base.pddl.beyond import TIMED_INITIAL, refuse_forms, refused
 from knowledge_base.pddl.files import text_and_source
 from knowledge_base.pddl.sections import Definition, read_definition, word

@@ -7,10 +7,9 @@ from typing import Protocol
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Content, Fact
-from knowledge_base.language.expression import KEYWORDS, TRUE, Expression
-from knowledge_base.language.parser import LONGEST_NUMBER
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.vocabulary import Signature, Vocabulary
+from knowledge_base.language.checking.vocabulary import Signature, Vocabulary
+from knowledge_base.language.syntax.expression import KEYWORDS, TRUE, Expression
+from knowledge_base.language.syntax.text import LONGEST_NUMBER, to_text
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.spelling import is_name, value_text
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from knowledge_base.errors import ParseError, Place, nearest, printable
-from knowledge_base.language.sexpr import Group, Node, Word, read
+from knowledge_base.language.syntax.sexpr import Group, Node, Word, read
 from knowledge_base.pddl.beyond import SECTIONS, refused
 
 REQUIREMENTS = frozenset(

@@ -8,10 +8,10 @@ from dataclasses import replace
 from knowledge_base.content import require_content, require_finite, require_writable
 from knowledge_base.errors import MAX_NAME, InputError, SchemaError, UnknownNameError, shortened
 from knowledge_base.facts import Delta, Fact, Value
-from knowledge_base.language.check import check_arity, value_fits
-from knowledge_base.language.expression import TypedVariable
-from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
-from knowledge_base.language.world import World
+from knowledge_base.language.checking.check import check_arity, value_fits
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import TypedVariable
 from knowledge_base.spelling import A_NAME_IS, is_name, nearest_name
 
 _Key = tuple[str, tuple[Value, ...]]

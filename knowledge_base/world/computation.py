@@ -13,10 +13,17 @@ from graphlib import CycleError, TopologicalSorter
 from typing import Any, Generic, ParamSpec
 
 from knowledge_base.errors import InputError, Place, SchemaError, described, text_of
-from knowledge_base.language.expression import Arithmetic, Atom, Call, Term, TypedVariable, Variable, free_variables
-from knowledge_base.language.parser import parse_term
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.vocabulary import Read
+from knowledge_base.language.checking.vocabulary import Read
+from knowledge_base.language.syntax.expression import (
+    Arithmetic,
+    Atom,
+    Call,
+    Term,
+    TypedVariable,
+    Variable,
+    free_variables,
+)
+from knowledge_base.language.syntax.text import parse_term, to_text
 from knowledge_base.pddl.domain_text import parse_declaration
 
 MOST_NESTED = 8

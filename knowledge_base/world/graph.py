@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 import networkx as nx
 
 from knowledge_base.facts import Content, Delta, Fact
-from knowledge_base.language.vocabulary import VALUE_TYPES, Signature
+from knowledge_base.language.checking.vocabulary import VALUE_TYPES, Signature
 from knowledge_base.world.state import WorldState
 
 Graph: TypeAlias = "nx.MultiDiGraph[Any]"

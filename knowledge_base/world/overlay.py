@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from knowledge_base.facts import Content, Delta, Fact, Value
-from knowledge_base.language.vocabulary import Vocabulary
-from knowledge_base.language.world import World
+from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.evaluation.world import World
 from knowledge_base.world.change_checks import check_delta, rivals
 from knowledge_base.world.index import FactIndex
 

@@ -10,10 +10,10 @@ from typing import Any
 from knowledge_base.content import GEOMETRY, UNSET
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Content
-from knowledge_base.language.check import check_reads
-from knowledge_base.language.expression import KEYWORDS
-from knowledge_base.language.typed_list import TypedName
-from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature
+from knowledge_base.language.checking.check import check_reads
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature
+from knowledge_base.language.syntax.expression import KEYWORDS
+from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.pddl.domain_text import DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.world.computation import Computed, in_reading_order
 

@@ -13,7 +13,7 @@ from planning.cli.plan_report import TIMED_OUT, answer_of, end, ordered, purpose
 from planning.cli.solving import read_files, solved, why_none
 
 if TYPE_CHECKING:
-    from knowledge_base.language.expression import Expression
+    from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from planning.bundles import Bundle
     from planning.domain import PlanningDomain

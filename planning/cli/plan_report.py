@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.effect import AllOf, Effect, NumericEffect, When, effect_conditions
-from knowledge_base.language.expression import Call, Constant, Expression, Term, parts_of
+from knowledge_base.language.syntax.effect import AllOf, Effect, NumericEffect, When, effect_conditions
+from knowledge_base.language.syntax.expression import Call, Constant, Expression, Term, parts_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -68,7 +68,7 @@ def ordered(order: PartialOrder) -> dict[str, Any]:
 
 def purposes(order: PartialOrder) -> dict[str, Any]:
     """Return the facts that each step establishes, each with its user; 0 is the goal."""
-    from knowledge_base.language.printer import to_text
+    from knowledge_base.language.syntax.text import to_text
 
     purposes: dict[int, list[dict[str, Any]]] = {number: [] for number in range(1, len(order.steps) + 1)}
     for link in order.links:

@@ -21,7 +21,7 @@ from itertools import chain
 from typing import Any
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.identity_cache import IdentityCache
+from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.plan import PlanStep
 from planning.quantities import Assignment, NumericBound, from_json, to_json
 from planning.strips import ActionSpan, GroundAction, Problem

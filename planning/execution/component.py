@@ -11,8 +11,9 @@ from dsc.components.component import Component
 from dsc.sequencer.reactor import CHART
 from dsc.skills import skill
 from knowledge_base.errors import InputError
-from knowledge_base.language.evaluation import explain, holds
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.syntax.text import parse_condition
 from planning.execution.escalation import Choices, Escalation
 from planning.execution.monitoring import Monitoring
 from planning.execution.plan_records import PlanRecords

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dsc.calls import Outcome
 from knowledge_base.errors import InputError
-from knowledge_base.language.evaluation import holds
+from knowledge_base.language.evaluation.evaluator import holds
 from planning.execution.plan_run import PlanRun, PlanState
 from planning.execution.progress import PlanProgress, shortest_end
 from planning.execution.repair import EscalationStep, Failure, situation
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from dsc.dynamic.library import Library
     from dsc.engine.steps import Step
-    from knowledge_base.language.expression import Expression
+    from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
     from planning.execution.plan_records import PlanRecords

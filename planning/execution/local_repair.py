@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from itertools import islice
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.evaluation import World, holds
-from knowledge_base.language.expression import And, Atom, Constant, Expression
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression
 from planning.cancellable_work import WorkLimit
 from planning.domain import PlanningDomain
 from planning.execution.progress import PlanProgress

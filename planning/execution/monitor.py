@@ -13,9 +13,10 @@ from typing import Any
 from knowledge_base.conditions.condition import Condition, Firing
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Change
-from knowledge_base.language.evaluation import World, holds
-from knowledge_base.language.expression import Atom, Expression
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import Atom, Expression
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.execution.progress import PlanProgress, shortest_end, thinned

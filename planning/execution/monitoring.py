@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from dsc.calls import Outcome
 from dsc.sequencer.resumed_skills import PastClock
 from knowledge_base.errors import described
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.execution.monitor import Broken, GoalReached, Monitor, News, Shorter
 from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, StepEnded, Successor

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.identity_cache import IdentityCache
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.text import to_text
 from planning.ordering.partial_order import PRESENT
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 from knowledge_base.errors import UnknownNameError
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning.execution.monitor import Broken, GoalReached, News, Shorter, news_form, news_from
 from planning.execution.progress import PlanProgress
 from planning.execution.repair import Attempt
@@ -21,7 +20,7 @@ from planning.plan import PlanStep
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from knowledge_base.language.expression import Expression
+    from knowledge_base.language.syntax.expression import Expression
     from planning.execution.planner_call import Improvements
     from planning.ordering.partial_order import PartialOrder
     from planning.plan import PlanFound

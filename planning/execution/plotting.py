@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from dsc.dynamic.library import Library
     from dsc.model.plot import ActionPlot
-    from knowledge_base.language.expression import Expression
+    from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from planning.execution.plan_run import PlanRun
     from planning.problem.derived import Derivation

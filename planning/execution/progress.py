@@ -9,8 +9,9 @@ from typing import Any
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
-from knowledge_base.language.evaluation import World, holds
-from knowledge_base.language.expression import Expression
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.execution.regression import CausalNeeds

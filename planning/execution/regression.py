@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
+from knowledge_base.language.syntax.expression import (
     TRUE,
     And,
     Arithmetic,
@@ -30,9 +30,11 @@ from knowledge_base.language.expression import (
     TypedVariable,
     Variable,
     free_variables,
+    fresh,
+    renamed,
+    renamed_term,
 )
-from knowledge_base.language.identity_cache import IdentityCache
-from knowledge_base.language.renaming import fresh, renamed, renamed_term
+from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.domain import GroundStep, PlanningDomain
 from planning.plan import PlanStep
 from planning.problem.relevance import changed, names_of

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from knowledge_base.language.effect import effect_conditions
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.identity_cache import IdentityCache
+from knowledge_base.language.syntax.effect import effect_conditions
+from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.view import View
 from planning.domain import PlanningDomain
 from planning.plan import PlanStep

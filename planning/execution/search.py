@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Collection, Iterable
 
     from dsc.sequencer.clock import LoopClock
-    from knowledge_base.language.evaluation import World
-    from knowledge_base.language.expression import Expression
+    from knowledge_base.language.evaluation.world import World
+    from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from knowledge_base.world.state import WorldState
     from planning.domain import PlanningDomain

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.effect import Add, AllOf, Effect, ForEach, When, effect_leaves
-from knowledge_base.language.evaluation import World, explain
-from knowledge_base.language.expression import And, Expression, TypedVariable, substitute
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.effect import Add, AllOf, Effect, ForEach, When, effect_leaves
+from knowledge_base.language.syntax.expression import And, Expression, TypedVariable, substitute
+from knowledge_base.language.syntax.text import to_text
 from planning.cancellable_work import WorkLimit
 from planning.explanation.mutexes import goal_mutexes
 from planning.plan import PlanStep

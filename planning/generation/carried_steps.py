@@ -16,8 +16,8 @@ from dsc.model.states import DynamicState, State, SubmachineState
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,
@@ -30,7 +30,7 @@ from knowledge_base.language.expression import (
     substitute,
     substitute_term,
 )
-from knowledge_base.language.identity_cache import IdentityCache
+from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import PlanStep
 from planning.problem.relevance import changed, names_of

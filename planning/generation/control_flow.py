@@ -20,9 +20,9 @@ from typing import Any
 from dsc.dynamic.responses import skipped
 from dsc.events import GAVE_UP
 from dsc.model.rules import REPLAN
-from knowledge_base.language.expression import And, Comparison, Constant, Expression, Not, Variable
-from knowledge_base.language.identity_cache import IdentityCache
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.expression import And, Comparison, Constant, Expression, Not, Variable
+from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.text import to_text
 from planning.generation.carried_steps import CarriedStep
 from planning.ordering.partial_order import PartialOrder
 

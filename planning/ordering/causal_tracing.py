@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, effect_parts, substitute_effect
-from knowledge_base.language.evaluation import World, apply_effect, holds
-from knowledge_base.language.expression import And, Atom, Constant, Expression, Not, Variable
-from knowledge_base.language.identity_cache import IdentityCache
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.vocabulary import Vocabulary
+from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.evaluation.evaluator import apply_effect, holds
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, effect_parts, substitute_effect
+from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression, Not, Variable
+from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import GroundStep, PlanningAction, PlanningDomain
 from planning.ordering.step_dependencies import Changes, Ground, Support, changes, conjuncts, favours, support

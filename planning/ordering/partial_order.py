@@ -21,9 +21,9 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from knowledge_base.language.evaluation import World
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.text import to_text
 from planning.domain import PlanningDomain
 from planning.ordering.causal_tracing import PRESENT, CausalTrace
 from planning.plan import Plan, PlanStep

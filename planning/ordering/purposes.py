@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from knowledge_base.language.evaluation import World
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.text import to_text
 from planning.domain import PlanningDomain
 from planning.ordering.partial_order import CausalLink, PartialOrder, deordered
 from planning.ordering.timed_links import linked

@@ -12,10 +12,19 @@ from itertools import chain
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When, substitute_effect
-from knowledge_base.language.effect_application import apply_effect, choices
-from knowledge_base.language.evaluation import World, evaluate_argument, holds
-from knowledge_base.language.expression import (
+from knowledge_base.language.evaluation.evaluator import apply_effect, choices, evaluate_argument, holds
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.effect import (
+    Add,
+    AllOf,
+    Delete,
+    Effect,
+    ForEach,
+    NumericEffect,
+    When,
+    substitute_effect,
+)
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field, replace
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
-from knowledge_base.language.effect import AllOf, Effect, substitute_effect
-from knowledge_base.language.evaluation import World, apply_effect, holds
-from knowledge_base.language.expression import And, Expression, substitute
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.evaluation.evaluator import apply_effect, holds
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.effect import AllOf, Effect, substitute_effect
+from knowledge_base.language.syntax.expression import And, Expression, substitute
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, scheduled

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from knowledge_base.facts import Fact
-    from knowledge_base.language.evaluation import World
+    from knowledge_base.language.evaluation.world import World
     from planning.problem.numbering import Numbering
     from planning.problem.operators import GroundOperator
     from planning.problem.reduction import Task

@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, effect_conditions, effect_leaves
-from knowledge_base.language.expression import Atom, Exists, Expression, Or, TypedVariable, Variable
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, effect_conditions, effect_leaves
+from knowledge_base.language.syntax.expression import Atom, Exists, Expression, Or, TypedVariable, Variable
 from planning.planning_actions import PlanningAction
 from planning.problem.construction import build_problem
 from planning.problem.derived import denied, derivation
@@ -26,7 +26,7 @@ from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from knowledge_base.language.evaluation import World
+    from knowledge_base.language.evaluation.world import World
     from knowledge_base.pddl.problem_text import Metric
     from planning.cancellable_work import WorkLimit
     from planning.domain import Axiom, PlanningDomain

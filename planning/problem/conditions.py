@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
-from knowledge_base.language.evaluation import World, evaluate_argument, evaluate_term, holds
-from knowledge_base.language.expression import (
+from knowledge_base.language.evaluation.evaluator import evaluate_argument, evaluate_term, holds
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,
@@ -33,7 +34,7 @@ from knowledge_base.language.expression import (
     Variable,
     parts_of,
 )
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 from planning.cancellable_work import WorkLimit
 from planning.quantities import OPPOSITE, Assignment, NumericBound, Quantity, combined
 from planning.unsupported import UnsupportedActionError

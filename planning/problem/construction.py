@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.check import check
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.expression import Expression, Term
-from knowledge_base.language.identity_cache import IdentityCache
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.checking.check import check
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.expression import Expression, Term
+from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.text import to_text
 from planning.cancellable_work import WorkLimit
 from planning.problem.assembly import Assembly
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, Some
@@ -42,7 +42,7 @@ from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from knowledge_base.language.evaluation import World
+    from knowledge_base.language.evaluation.world import World
     from knowledge_base.pddl.problem_text import Metric
     from planning.domain import PlanningDomain
     from planning.problem.numbering import Numbering

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from knowledge_base.language.effect import effect_conditions
-from knowledge_base.language.expression import Atom, Call, Comparison, Expression, Term, parts_of
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.effect import effect_conditions
+from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Expression, Term, parts_of
+from knowledge_base.language.syntax.text import to_text
 from planning.problem.derived import derivation
 from planning.problem.relevance import changed, names_of, relevant
 from planning.unsupported import UnsupportedActionError, UnsupportedGoalError

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from knowledge_base.language.expression import Arithmetic, Call, Term
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.expression import Arithmetic, Call, Term
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl.problem_text import TOTAL_TIME
 from planning.problem.relevance import names_of
 from planning.quantities import Assignment, linear
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from knowledge_base.facts import Fact
-    from knowledge_base.language.vocabulary import Vocabulary
+    from knowledge_base.language.checking.vocabulary import Vocabulary
     from knowledge_base.pddl.problem_text import Metric
     from planning.problem.conditions import Grounder
 

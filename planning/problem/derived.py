@@ -14,9 +14,9 @@ import networkx as nx
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.effect import effect_conditions
-from knowledge_base.language.evaluation import query
-from knowledge_base.language.expression import (
+from knowledge_base.language.evaluation.evaluator import query
+from knowledge_base.language.syntax.effect import effect_conditions
+from knowledge_base.language.syntax.expression import (
     And,
     Atom,
     Comparison,
@@ -31,7 +31,7 @@ from knowledge_base.language.expression import (
     Variable,
     parts_of,
 )
-from knowledge_base.language.identity_cache import IdentityCache
+from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.world.overlay import Overlay
 from planning.problem.relevance import changed, names_of
 from planning.problem.rewriting import instantiated, rewritten, type_test
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
     from knowledge_base.facts import Value
-    from knowledge_base.language.evaluation import World
+    from knowledge_base.language.evaluation.world import World
     from planning.domain import Axiom, PlanningAction, PlanningDomain
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.expression import And, Atom, Constant, Expression, Variable
+from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression, Variable
 from planning.plan import PlanStep
 from planning.problem.conditions import (
     Every,
@@ -26,7 +26,7 @@ from planning.unsupported import UnsupportedActionError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from knowledge_base.language.vocabulary import Vocabulary
+    from knowledge_base.language.checking.vocabulary import Vocabulary
     from planning.cancellable_work import WorkLimit
     from planning.domain import PlanningAction
 

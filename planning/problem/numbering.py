@@ -11,7 +11,7 @@ from planning.quantities import NumericBound, worth
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from knowledge_base.language.evaluation import World
+    from knowledge_base.language.evaluation.world import World
 
 
 NOT = "not "

@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from knowledge_base.facts import Content, Fact, Value
-from knowledge_base.language.effect import ForEach, effect_conditions, effect_parts
-from knowledge_base.language.expression import Exists, Expression, Forall, Term, Variable, parts_of
-from knowledge_base.language.vocabulary import ROOT_TYPE
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE
+from knowledge_base.language.syntax.effect import ForEach, effect_conditions, effect_parts
+from knowledge_base.language.syntax.expression import Exists, Expression, Forall, Term, Variable, parts_of
 from planning.cancellable_work import WorkLimit
 from planning.plan import PlanStep
 from planning.problem.conditions import Grounder
@@ -23,8 +23,8 @@ from planning.quantities import Assignment
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 
-    from knowledge_base.language.evaluation import World
-    from knowledge_base.language.vocabulary import Vocabulary
+    from knowledge_base.language.checking.vocabulary import Vocabulary
+    from knowledge_base.language.evaluation.world import World
     from planning.domain import PlanningAction
 
 

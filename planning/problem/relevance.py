@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from knowledge_base.language.effect import Add, Delete, Effect, NumericEffect, effect_conditions, effect_leaves
-from knowledge_base.language.expression import Atom, Call, Constant, Expression, Term, Variable, parts_of
+from knowledge_base.language.syntax.effect import Add, Delete, Effect, NumericEffect, effect_conditions, effect_leaves
+from knowledge_base.language.syntax.expression import Atom, Call, Constant, Expression, Term, Variable, parts_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator

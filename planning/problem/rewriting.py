@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from knowledge_base.language.effect import AllOf, Effect, ForEach, When
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES
+from knowledge_base.language.syntax.effect import AllOf, Effect, ForEach, When
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,
@@ -23,7 +24,6 @@ from knowledge_base.language.expression import (
     Variable,
     free_variables,
 )
-from knowledge_base.language.vocabulary import ROOT_TYPE, VALUE_TYPES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

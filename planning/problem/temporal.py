@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.effect import AllOf
-from knowledge_base.language.evaluation import evaluate_term
-from knowledge_base.language.expression import And, Expression
-from knowledge_base.language.terms import as_number
+from knowledge_base.language.evaluation.evaluator import evaluate_term
+from knowledge_base.language.evaluation.terms import as_number
+from knowledge_base.language.syntax.effect import AllOf
+from knowledge_base.language.syntax.expression import And, Expression
 from planning.plan import PlanStep
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, alternatives
 from planning.problem.grounding import Variant, variants
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from knowledge_base.facts import Value
-    from knowledge_base.language.evaluation import World
+    from knowledge_base.language.evaluation.world import World
     from planning.cancellable_work import WorkLimit
     from planning.domain import PlanningAction, PlanningDomain
     from planning.problem.relevance import Relevant

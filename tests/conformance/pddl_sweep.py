@@ -27,7 +27,7 @@ from unified_planning.plans import ActionInstance, SequentialPlan, TimeTriggered
 from unified_planning.test.examples import get_example_problems
 
 from knowledge_base.errors import InputError, UnsupportedConstructError
-from knowledge_base.language.evaluation import evaluate_term
+from knowledge_base.language.evaluation.evaluator import evaluate_term
 from knowledge_base.pddl import ProblemText, read_problem
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain

@@ -17,8 +17,8 @@ from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.table_world import TableWorld
 from dsc.calls import SkillCall
 from knowledge_base.facts import Fact, fact
-from knowledge_base.language.effect import Add, AllOf, Delete
-from knowledge_base.language.expression import And, Atom, Variable
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete
+from knowledge_base.language.syntax.expression import And, Atom, Variable
 from knowledge_base.pddl.action_text import ActionText
 from knowledge_base.pddl.domain_text import parse_domain
 

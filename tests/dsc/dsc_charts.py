@@ -16,8 +16,8 @@ from dsc.events import Event
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language import effect as eff
-from knowledge_base.language import expression as lang
+from knowledge_base.language.syntax import effect as eff
+from knowledge_base.language.syntax import expression as lang
 
 PROPERTY = settings(deadline=None, derandomize=True)
 """How properties are tested: the same examples on every machine, however slow it is."""

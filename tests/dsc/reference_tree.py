@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from dsc.model.connectors import ChoiceState, SelectState
 from dsc.model.plot import initial_of
 from dsc.model.states import CompositeState, FinalState, HistoryState, OrthogonalState, State
-from knowledge_base.language import effect as eff
-from knowledge_base.language import expression as lang
+from knowledge_base.language.syntax import effect as eff
+from knowledge_base.language.syntax import expression as lang
 
 COMPARE = {
     "=": operator.eq, "!=": operator.ne, "<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge,

@@ -5,7 +5,7 @@ import json
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.testing.fixtures import world
-from knowledge_base.language.parser import parse_effect, parse_term
+from knowledge_base.language.syntax.text import parse_effect, parse_term
 
 ROOM = """(define (domain room) (:types thing)
   (:functions (pose ?t ?frame - thing) - geometry (label ?t - thing) - text))"""

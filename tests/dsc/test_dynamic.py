@@ -17,7 +17,7 @@ from dsc.events import Event
 from dsc.skills import primitive_plot, skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, fact
-from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 

@@ -3,8 +3,8 @@
 import pytest
 
 from dsc.engine.membership import FALSE, asked_states, settle
-from knowledge_base.language.expression import TRUE
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.expression import TRUE
+from knowledge_base.language.syntax.text import parse_condition
 
 OPEN = parse_condition("(open door)")
 

@@ -26,8 +26,8 @@ from dsc.model.states import (
 from dsc.model.transitions import Transition
 from dsc.text.plot_files import parse_plot, plot_to_yaml
 from knowledge_base.errors import InputError
-from knowledge_base.language.effect import Add, When
-from knowledge_base.language.expression import TRUE, And, Arithmetic, Atom, Comparison, Constant, Not, Variable
+from knowledge_base.language.syntax.effect import Add, When
+from knowledge_base.language.syntax.expression import TRUE, And, Arithmetic, Atom, Comparison, Constant, Not, Variable
 
 EVERYTHING = plot("""
     plot: everything

@@ -15,7 +15,7 @@ from dsc.text.plot_files import parse_plot, plot_to_yaml
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Fact, fact
-from knowledge_base.language.expression import Constant
+from knowledge_base.language.syntax.expression import Constant
 from knowledge_base.world.schema import Schema
 
 STEP = """

@@ -12,7 +12,7 @@ from dsc.model.connectors import ChoiceState
 from dsc.text.plot_files import parse_plot, plot_to_yaml
 from knowledge_base.errors import InputError, SchemaError
 from knowledge_base.facts import Fact, fact
-from knowledge_base.language.expression import Constant
+from knowledge_base.language.syntax.expression import Constant
 
 LOOK = """
     plot: look

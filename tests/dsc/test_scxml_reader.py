@@ -19,7 +19,7 @@ from dsc.text.plot_files import parse_plot, plot_to_yaml
 from dsc.text.text_files import MAX_BYTES
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 
 
 def scxml(body, attributes=""):

@@ -14,7 +14,7 @@ from dsc.scxml.reader import parse_scxml
 from dsc.scxml.writer import to_scxml
 from dsc.text.text_diagrams import to_mermaid, to_plantuml
 from knowledge_base.errors import InputError
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 
 SHIPPED = sorted((Path(__file__).parents[2] / "domains" / "clean_up_table" / "plots").glob("*.yaml"))
 

@@ -11,7 +11,7 @@ from dsc.text.plot_files import load_library, load_plot, parse_plot, plot_to_yam
 from dsc.text.text_files import MAX_BYTES
 from dsc.text.yaml import load_document
 from knowledge_base.errors import InputError, ParseError, Place
-from knowledge_base.language.expression import Variable
+from knowledge_base.language.syntax.expression import Variable
 
 SHIPPED = sorted((Path(__file__).parents[2] / "domains").glob("*/plots/*.yaml"))
 

@@ -48,9 +48,8 @@ from dsc.viewer.record_sources import records_of
 from dsc.viewer.records import RecordLog, read_trace
 from dsc.viewer.server import Viewer
 from knowledge_base import InputError, KnowledgeBase, Schema
-from knowledge_base.language.check import check, check_effect
-from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.checking.check import check, check_effect
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 from knowledge_base.pddl import read_problem
 from knowledge_base.statements import retracted, told
 from planning.cancellable_work import WorkLimit, WorkLimitError

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from kb_strategies import brute
 
 from knowledge_base import Delta, Fact, Schema
-from knowledge_base.language import expression as ex
-from knowledge_base.language.binding import only_tested
+from knowledge_base.language.checking.binding import only_tested
+from knowledge_base.language.syntax import expression as ex
 
 THINGS, OBJECTS, NUMBER = ("a", "b", "c", "d"), ("x", "y", "z"), "n"
 NUMBERS = (0, 1, 2)

@@ -8,8 +8,8 @@ import operator
 from hypothesis import strategies as st
 
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language import effect as eff
-from knowledge_base.language import expression as ex
+from knowledge_base.language.syntax import effect as eff
+from knowledge_base.language.syntax import expression as ex
 from knowledge_base.world.schema import Schema
 
 SCHEMA = Schema.parse(

@@ -24,8 +24,8 @@ from knowledge_base import (
     computed,
     fact,
 )
-from knowledge_base.language.evaluation import apply_effect
-from knowledge_base.language.parser import parse_condition, parse_effect
+from knowledge_base.language.evaluation.evaluator import apply_effect
+from knowledge_base.language.syntax.text import parse_condition, parse_effect
 
 ROOM = Schema.parse(
     """(define (domain room)

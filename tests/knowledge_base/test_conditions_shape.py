@@ -7,7 +7,7 @@ from kb_strategies import SCHEMA
 
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.conditions.condition_shape import lifted
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 
 
 def shape(text: str):

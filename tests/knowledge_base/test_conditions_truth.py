@@ -11,7 +11,7 @@ from kb_strategies import brute
 
 from knowledge_base import Delta, KnowledgeBase
 from knowledge_base.errors import InputError
-from knowledge_base.language import expression as ex
+from knowledge_base.language.syntax import expression as ex
 
 PROPERTY = settings(deadline=None, derandomize=True, max_examples=100)
 

@@ -9,10 +9,10 @@ from kb_strategies import NAMES, SCHEMA, THINGS, deltas, expressions
 from kb_worlds import PROPERTY
 
 from knowledge_base.errors import InputError
-from knowledge_base.language import expression as ex
-from knowledge_base.language.contradiction import complete, contradictory, implied, subjects
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.parser import parse_condition as condition
+from knowledge_base.language.checking.contradiction import complete, contradictory, implied, subjects
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax import expression as ex
+from knowledge_base.language.syntax.text import parse_condition as condition
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.state import WorldState
 

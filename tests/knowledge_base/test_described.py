@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from knowledge_base.errors import MAX_MESSAGE, InputError, described
-from knowledge_base.language.inputs import shown
+from knowledge_base.language.checking.inputs import shown
 
 
 class FailsError(Exception):

@@ -9,9 +9,10 @@ from kb_strategies import NAMES, SCHEMA, THINGS, brute, deltas, expressions
 from kb_worlds import PROPERTY
 
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, UnknownNameError, fact
-from knowledge_base.language import expression as ex
-from knowledge_base.language.evaluation import Explanation, explain, holds
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.evaluation.explanation import Explanation, explain
+from knowledge_base.language.syntax import expression as ex
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.state import WorldState
 

@@ -17,7 +17,7 @@ from knowledge_base import (
     UnsupportedConstructError,
     fact,
 )
-from knowledge_base.language.parser import parse_condition, parse_effect
+from knowledge_base.language.syntax.text import parse_condition, parse_effect
 from knowledge_base.pddl import read_domain, read_problem
 
 QUESTIONS = [

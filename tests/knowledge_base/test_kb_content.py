@@ -19,9 +19,9 @@ from knowledge_base import (
     UnknownNameError,
     fact,
 )
-from knowledge_base.language.check import check_effect
-from knowledge_base.language.evaluation import apply_effect
-from knowledge_base.language.parser import parse_effect
+from knowledge_base.language.checking.check import check_effect
+from knowledge_base.language.evaluation.evaluator import apply_effect
+from knowledge_base.language.syntax.text import parse_effect
 from knowledge_base.pddl import read_problem
 
 KITCHEN = Schema.parse(

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from knowledge_base import Delta, KnowledgeBase, Schema, fact
 from knowledge_base.cli import app
 from knowledge_base.errors import InputError
-from knowledge_base.language.effect import EFFECT_KEYWORDS
-from knowledge_base.language.expression import COMPUTING, KEYWORDS
+from knowledge_base.language.syntax.effect import EFFECT_KEYWORDS
+from knowledge_base.language.syntax.expression import COMPUTING, KEYWORDS
 from knowledge_base.pddl import read_problem
 from knowledge_base.spelling import LONGEST_NAME, is_name, nearest_name
 

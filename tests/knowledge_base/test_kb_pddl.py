@@ -9,11 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_base import Fact, InputError, KnowledgeBase, Schema, SchemaError, fact
-from knowledge_base.language.check import check, check_effect, check_parameters
-from knowledge_base.language.effect import AllOf, ForEach, NumericEffect, When
-from knowledge_base.language.expression import And
-from knowledge_base.language.parser import parse_condition, parse_effect
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.checking.check import check, check_effect, check_parameters
+from knowledge_base.language.syntax.effect import AllOf, ForEach, NumericEffect, When
+from knowledge_base.language.syntax.expression import And
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, to_text
 from knowledge_base.pddl import read_domain, read_problem
 
 CLEAN_UP = Path(__file__).parents[2] / "domains" / "clean_up_table" / "domain.pddl"

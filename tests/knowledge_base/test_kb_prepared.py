@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from kb_strategies import SCHEMA, THINGS, brute, deltas
 
 from knowledge_base import Delta, InputError, KnowledgeBase, SchemaError, UnknownNameError, fact
-from knowledge_base.language import expression as ex
-from knowledge_base.language.evaluator import query
+from knowledge_base.language.evaluation.evaluator import query
+from knowledge_base.language.syntax import expression as ex
 
 ITEMS, PLACES = ("cup1", "cup2", "can1"), ("shelf", "home")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from knowledge_base import InputError, KnowledgeBase, Schema, fact
-from knowledge_base.language.expression import TRUE
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.expression import TRUE
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl import read_domain, read_problem
 
 SMALL = Schema.parse(

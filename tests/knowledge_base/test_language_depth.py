@@ -10,14 +10,14 @@ from kb_strategies import SCHEMA, THINGS
 
 from knowledge_base import Delta, InputError, KnowledgeBase, ParseError, fact
 from knowledge_base.conditions.damping import relaxed
-from knowledge_base.language import effect as eff
-from knowledge_base.language import expression as ex
-from knowledge_base.language.check import check, check_effect, check_term
-from knowledge_base.language.evaluation import apply_effect, evaluate_term, explain, holds, query
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.query_plan import plan_query
-from knowledge_base.language.sexpr import MAX_DEPTH
+from knowledge_base.language.checking.check import check, check_effect, check_term
+from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds, query
+from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.evaluation.query_plan import plan_query
+from knowledge_base.language.syntax import effect as eff
+from knowledge_base.language.syntax import expression as ex
+from knowledge_base.language.syntax.sexpr import MAX_DEPTH
+from knowledge_base.language.syntax.text import parse_condition, to_text
 
 CALLER = 150
 """Frames that a caller such as pytest, asyncio and an engine may have used."""

@@ -9,10 +9,11 @@ from kb_strategies import NAMES, SCHEMA, THINGS, brute, brute_choices, deltas, e
 
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, fact
-from knowledge_base.language.binding import only_tested
-from knowledge_base.language.evaluation import apply_effect, evaluate_term, explain, holds, query
-from knowledge_base.language.expression import TypedVariable, free_variables
-from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
+from knowledge_base.language.checking.binding import only_tested
+from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds, query
+from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.syntax.expression import TypedVariable, free_variables
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.state import WorldState
 

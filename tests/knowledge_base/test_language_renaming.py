@@ -2,10 +2,8 @@
 
 import pytest
 
-from knowledge_base.language.expression import free_variables
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.renaming import fresh, renamed
+from knowledge_base.language.syntax.expression import free_variables, fresh, renamed
+from knowledge_base.language.syntax.text import parse_condition, to_text
 
 
 @pytest.mark.parametrize(

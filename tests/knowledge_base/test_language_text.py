@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from kb_strategies import any_effects, any_expressions, any_terms
 
 from knowledge_base.errors import InputError, ParseError, Place
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     And,
     Atom,
     Comparison,
@@ -19,9 +19,8 @@ from knowledge_base.language.expression import (
     free_variables,
     substitute,
 )
-from knowledge_base.language.parser import parse_condition, parse_effect, parse_term
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.sexpr import MAX_DEPTH, Group, Word, read
+from knowledge_base.language.syntax.sexpr import MAX_DEPTH, Group, Word, read
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 
 
 @given(any_expressions())

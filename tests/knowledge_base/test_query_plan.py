@@ -11,10 +11,10 @@ from kb_strategies import SCHEMA, THINGS, deltas
 from kb_worlds import PROPERTY
 
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, computed
-from knowledge_base.language import expression as ex
-from knowledge_base.language.binding import only_tested
-from knowledge_base.language.evaluation import query
-from knowledge_base.language.query_plan import plan_query
+from knowledge_base.language.checking.binding import only_tested
+from knowledge_base.language.evaluation.evaluator import query
+from knowledge_base.language.evaluation.query_plan import plan_query
+from knowledge_base.language.syntax import expression as ex
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.state import WorldState
 

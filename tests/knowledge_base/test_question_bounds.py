@@ -7,7 +7,7 @@ from itertools import count, islice, pairwise
 import pytest
 
 from knowledge_base import Bounds, ConflictError, Delta, Fact, InputError, KnowledgeBase, OutOfBoundsError, Schema
-from knowledge_base.language.question_bounds import LOOK_EVERY
+from knowledge_base.language.evaluation.world import LOOK_EVERY
 from knowledge_base.statements import told
 
 ITEMS = 100

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from hypothesis import strategies as st
 
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.expression import Expression
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from obedient_robot import ObedientRobot, plots
 
 from knowledge_base import Delta, KnowledgeBase, fact
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.text import parse_condition
 from planning import Executive, PlanningDomain, PlanStep
 from planning.plan import PlanFound
 from planning.problem.construction import build_problem

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning import Executive, PlanningDomain
 from planning.engines import planner as planner_module

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from knowledge_base.facts import fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning import Executive
 from planning.domain import PlanningDomain
 from planning.plan import NobodyCan

@@ -9,8 +9,8 @@ from searching import solution
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.explanation.unsolvability import why_unsolvable

@@ -4,7 +4,7 @@ import pytest
 
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import fact
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 from planning.domain import PlanningDomain
 from planning.plan import PlanStep
 

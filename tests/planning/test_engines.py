@@ -16,7 +16,7 @@ import pytest
 from fake_engines import HANGING, PROBLEM, READY, answering, descendants, gone, lights_out
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import DISTRIBUTION, ENGINES
 from planning.engines.request import written

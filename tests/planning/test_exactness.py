@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from random_domains import ACTIONS, GOAL, START, THINGS, domain_of, state_of, world_of
 from searching import cheapest, solution
 
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
 from planning.plan import PlanStep
 from planning.problem.construction import ProblemBuilder, build_problem

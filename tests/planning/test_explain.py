@@ -4,7 +4,7 @@ import pytest
 
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning.domain import PlanningDomain
 from planning.explanation.unsolvability import why_unsolvable
 from planning.problem.construction import build_problem

@@ -3,7 +3,7 @@
 import pytest
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning.ordering.purposes import purposes
 from planning.plan import Plan, PlanStep
 

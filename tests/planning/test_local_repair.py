@@ -4,7 +4,7 @@ import pytest
 from breadth_first import BreadthFirst
 
 from knowledge_base import Delta, KnowledgeBase, fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning import Plan, PlanningDomain, PlanStep, validate
 from planning.execution.local_repair import local_repair
 from planning.execution.progress import PlanProgress

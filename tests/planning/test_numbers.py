@@ -9,7 +9,7 @@ import pytest
 from searching import breadth_first, cheapest, solution
 
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.parser import parse_condition, parse_term
+from knowledge_base.language.syntax.text import parse_condition, parse_term
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain

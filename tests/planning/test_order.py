@@ -9,8 +9,8 @@ from order_strategies import Planned, planned
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import fact
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.ordering.partial_order import PartialOrder, causal_links, deordered, reduced, standing

@@ -8,8 +8,7 @@ from dsc.skills import signatures
 from dsc.text.plot_files import plot_to_yaml
 from knowledge_base import Delta, fact
 from knowledge_base.errors import InputError
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning import Executive, Plan, PlanningDomain, PlanStep, plot_from_plan
 from planning.generation.carried_steps import fitting, usage
 from planning.ordering.partial_order import PartialOrder, deordered

@@ -8,7 +8,7 @@ from trace_replay import Replay
 from dsc import ActionPlot, Component, Outcome, skill
 from dsc.chance import uniform
 from dsc.trace import Record
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning import Executive, PlanStep, plot_from_plan
 from planning.ordering.partial_order import deordered

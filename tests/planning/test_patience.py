@@ -7,7 +7,7 @@ import pytest
 
 from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
 from knowledge_base import Delta, fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning import Executive, PlanningDomain
 from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.problem.construction import build_problem

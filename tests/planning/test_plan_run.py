@@ -7,7 +7,7 @@ from errands import DOMAIN
 from test_carrying_out import Run
 
 from knowledge_base import Delta, KnowledgeBase, UnknownNameError, fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanStep
 from planning.execution.monitor import Broken, GoalReached, Shorter
 from planning.execution.plan_run import PlanRun, PlanRuns, PlanState, StepEnded, Successor

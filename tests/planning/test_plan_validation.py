@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from random_domains import ACTIONS, FLUENTS, GOAL, START, THINGS, domain_of, domain_text, world_of
 from searching import solution
 
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning.plan import Plan, PlanStep
 from planning.problem.construction import build_problem
 from planning.validation import validate

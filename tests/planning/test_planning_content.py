@@ -3,7 +3,7 @@
 import pytest
 
 from knowledge_base import fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning.domain import PlanningDomain
 from planning.problem.construction import build_problem
 from planning.unsupported import UnsupportedActionError, UnsupportedGoalError

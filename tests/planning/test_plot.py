@@ -5,7 +5,7 @@ import pytest
 from dsc import ActionPlot, Library, parse_plot, validate_plot
 from dsc.text.plot_files import plot_to_yaml
 from knowledge_base import UnknownNameError
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 from planning import Plan, PlanningDomain, PlanStep, plot_from_plan
 
 DOMAIN = PlanningDomain.parse("""

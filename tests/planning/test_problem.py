@@ -11,8 +11,8 @@ from searching import breadth_first, solution
 
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.computation import computed
 from knowledge_base.world.overlay import Overlay

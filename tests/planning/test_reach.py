@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.problem.construction import ProblemBuilder

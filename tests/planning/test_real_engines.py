@@ -8,7 +8,7 @@ import pytest
 from fake_engines import PROBLEM, descendants, gone, lights_out, session
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning.domain import PlanningDomain
 from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, worker
 from planning.engines.registry import ENGINES

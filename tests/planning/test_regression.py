@@ -5,9 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_base import Delta, KnowledgeBase, fact
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.parser import parse_condition
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning import Plan, PlanningDomain, PlanStep, validate
 from planning.execution.regression import CausalNeeds
 

@@ -3,7 +3,7 @@
 import pytest
 
 from knowledge_base import Delta, KnowledgeBase, fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanningDomain, PlanStep
 from planning.execution.repair import MOST_RESUMED, Attempt, EscalationStep, Failure, situation
 from planning.execution.search import without

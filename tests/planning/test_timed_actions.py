@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from knowledge_base.errors import InputError, UnsupportedConstructError
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.evaluation import apply_effect, holds
-from knowledge_base.language.expression import Constant
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.evaluation.evaluator import apply_effect, holds
+from knowledge_base.language.syntax.expression import Constant
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl import read_problem
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain

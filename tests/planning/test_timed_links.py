@@ -4,7 +4,7 @@ import pytest
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import fact
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.syntax.text import parse_condition
 from planning.domain import PlanningDomain
 from planning.ordering.purposes import purposes
 from planning.ordering.timed_links import linked

@@ -13,9 +13,9 @@ from itertools import combinations
 
 from knowledge_base.exchange import delta_of
 from knowledge_base.facts import Fact
-from knowledge_base.language.evaluation import holds
-from knowledge_base.language.expression import And, Not, substitute
-from knowledge_base.language.parser import parse_condition
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.expression import And, Not, substitute
+from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
 from planning.ordering.partial_order import causal_links, standing
 from planning.plan import Plan, PlanStep

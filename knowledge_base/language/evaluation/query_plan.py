@@ -7,11 +7,22 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from knowledge_base.facts import Value
-from knowledge_base.language.binding import check_answers
-from knowledge_base.language.compiler import SearchPlan, Stage
-from knowledge_base.language.depth import check_depth
-from knowledge_base.language.evaluator import NO_BINDINGS
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.binding import check_answers
+from knowledge_base.language.evaluation.compiler import SearchPlan, Stage
+from knowledge_base.language.evaluation.evaluator import NO_BINDINGS
+from knowledge_base.language.evaluation.lookups import (
+    Conjunct,
+    JoinStep,
+    Lookup,
+    Search,
+    TypeRange,
+    conjuncts,
+    smallest,
+)
+from knowledge_base.language.evaluation.terms import Bindings
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.effect import check_depth
+from knowledge_base.language.syntax.expression import (
     Atom,
     Exists,
     Expression,
@@ -23,11 +34,7 @@ from knowledge_base.language.expression import (
     substitute_term,
     variables_in_order,
 )
-from knowledge_base.language.joins import Conjunct, JoinStep, TypeRange, conjuncts
-from knowledge_base.language.lookups import Lookup, Search, smallest
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.terms import Bindings
-from knowledge_base.language.world import World
+from knowledge_base.language.syntax.text import to_text
 
 Kind = Literal["test", "computed", "look up", "scan", "things", "alternatives", "witnesses"]
 """`test`: a condition whose variables all have values, `computed`: one that Python judges; `look up`: facts with

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     And,
     Comparison,
     Constant,
@@ -25,7 +25,7 @@ from knowledge_base.language.expression import (
     Or,
     Term,
 )
-from knowledge_base.language.printer import to_text
+from knowledge_base.language.syntax.text import to_text
 
 MOST_CASES = 512
 """Ways in which a part of a condition can hold that are looked at; with more, the answer is "perhaps"."""

@@ -5,20 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     Atom,
     Call,
+    Constant,
     Expression,
     Located,
     Term,
     TypedVariable,
+    Variable,
     free_variables,
+    parts_of,
     quantified,
     substitute,
     substitute_term,
     unshadowed,
 )
+from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.sexpr import MAX_DEPTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,3 +143,39 @@ def effect_leaves(effect: Effect) -> Iterator[Add | Delete | NumericEffect]:
 def effect_conditions(effect: Effect) -> Iterator[Expression]:
     """The conditions of all conditional effects."""
     return (part.condition for part in effect_parts(effect) if isinstance(part, When))
+
+
+_Node = Expression | Term | Effect
+
+_judged: IdentityCache[_Node, bool] = IdentityCache()
+
+
+def check_depth(node: _Node) -> None:
+    """Raise `InputError` if `node` is nested deeper than a text may be, `MAX_DEPTH`; remembered by identity."""
+    if _judged.find(node, None) is None:
+        _judged.keep(node, None, _check(node))
+
+
+def _check(node: _Node) -> bool:
+    level = [node]
+    for _ in range(MAX_DEPTH):
+        level = [part for one in level for part in _parts(one) if not isinstance(part, Variable | Constant)]
+        if not level:
+            return True
+    raise InputError(f"this is nested more than {MAX_DEPTH} deep", place=level[0].place or node.place)
+
+
+def _parts(node: _Node) -> tuple[_Node, ...]:
+    match node:
+        case Add(atom) | Delete(atom):
+            return (atom,)
+        case AllOf(parts):
+            return parts
+        case ForEach(_, effect):
+            return (effect,)
+        case When(condition, effect):
+            return (condition, effect)
+        case NumericEffect(_, call, value):
+            return (call, value)
+        case _:
+            return parts_of(node)

@@ -1,4 +1,6 @@
-"""Text or read groups to conditions, effects and terms.
+"""Text or read groups to conditions, effects and terms, and these back to text.
+
+Reading the text of a value gives an equal value again.
 
 Names are folded to lower case, as PDDL compares them; quoted text stays as it is. What is checked here is
 form only; whether names are declared is checked against a schema (`check`).
@@ -11,7 +13,7 @@ from collections.abc import Iterable, Sequence
 
 from knowledge_base.content import GEOMETRY, MOST_NUMBERS
 from knowledge_base.errors import ParseError, Place, nearest
-from knowledge_base.language.effect import (
+from knowledge_base.language.syntax.effect import (
     ASSIGNMENTS,
     EFFECT_KEYWORDS,
     Add,
@@ -22,7 +24,7 @@ from knowledge_base.language.effect import (
     NumericEffect,
     When,
 )
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.expression import (
     COMPARISONS,
     COMPUTING,
     KEYWORDS,
@@ -39,11 +41,11 @@ from knowledge_base.language.expression import (
     Not,
     Or,
     Term,
+    TypedVariable,
     Variable,
 )
-from knowledge_base.language.sexpr import Group, Node, Word, read
-from knowledge_base.language.typed_list import parse_typed_list, parse_variables
-from knowledge_base.spelling import TRUTH_VALUES, is_number
+from knowledge_base.language.syntax.sexpr import Group, Node, Word, parse_typed_list, parse_variables, read
+from knowledge_base.spelling import TRUTH_VALUES, is_number, value_text
 
 __all__ = ["parse_condition", "parse_effect", "parse_term", "parse_typed_list", "parse_variables"]
 
@@ -240,3 +242,58 @@ def _call(group: Group) -> Call:
     if head in (*KEYWORDS, *COMPUTING):
         raise ParseError(f"'{head}' is not a function; a name, number or function is expected", place=group.place)
     return Call(head, tuple(parse_term(a) for a in group.items[1:]), place=group.place)
+
+
+_Form = Call | Arithmetic | Atom | And | Or | Not | Imply | Comparison | AllOf | Delete | When | NumericEffect
+
+
+def to_text(node: Expression | Term | Effect) -> str:
+    """`node` on one line of PDDL, losslessly: `parse(to_text(x)) == x`."""
+    match node:
+        case Variable(name):
+            return f"?{name}"
+        case Constant(value, quoted):
+            return value_text(value, quoted=quoted)
+        case Add(atom):
+            return to_text(atom)
+        case Exists(variables, body) | Forall(variables, body) | ForEach(variables, body):
+            head = "exists" if isinstance(node, Exists) else "forall"
+            return f"({head} {variables_text(variables)} {to_text(body)})"
+        case _:
+            head, parts = _form(node)
+            return "(" + " ".join([head, *map(to_text, parts)]) + ")"
+
+
+def variables_text(variables: Iterable[TypedVariable]) -> str:
+    """A typed list in parentheses: `(?a - cup ?b - object)`, each variable with a type of its own."""
+    listed = tuple(variables)
+    if not any(v.types for v in listed):
+        return "(" + " ".join(f"?{v.name}" for v in listed) + ")"
+    return "(" + " ".join(_typed(v) for v in listed) + ")"
+
+
+def _typed(variable: TypedVariable) -> str:
+    types = variable.types or ("object",)  # left out, it would take the type of the next one
+    return f"?{variable.name} - " + (types[0] if len(types) == 1 else f"(either {' '.join(types)})")
+
+
+def _form(node: _Form) -> tuple[str, Sequence[Expression | Term | Effect]]:
+    form: tuple[str, Sequence[Expression | Term | Effect]]
+    match node:
+        case Call(head, args) | Arithmetic(head, args) | Atom(head, args):
+            form = head, args
+        case And(parts):
+            form = "and", parts
+        case AllOf(effects):
+            form = "and", effects
+        case Or(parts):
+            form = "or", parts
+        case Not(body) | Delete(body):
+            form = "not", (body,)
+        case Imply(premise, conclusion):
+            form = "imply", (premise, conclusion)
+        case When(condition, effect):
+            form = "when", (condition, effect)
+        case Comparison(operator, left, right) | NumericEffect(operator, left, right):
+            form = operator, (left, right)
+    return form

@@ -9,10 +9,10 @@ from typing import Literal
 from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.language.binding import check_answers, unbound_error
-from knowledge_base.language.depth import check_depth
-from knowledge_base.language.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.binding import check_answers, unbound_error
+from knowledge_base.language.checking.vocabulary import Computing, Signature, Vocabulary
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When, check_depth
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,
@@ -29,7 +29,6 @@ from knowledge_base.language.expression import (
     TypedVariable,
     Variable,
 )
-from knowledge_base.language.vocabulary import Computing, Signature, Vocabulary
 
 Free = Literal["error", "answers"]
 

@@ -1,4 +1,4 @@
-"""Is it true, who makes it true, what is it worth: conditions and terms on a world.
+"""Conditions, terms and effects on a world: truth, answers, values and changes.
 
 Conditions are compiled when they are first used and remembered by identity, so that asking the same
 expression again costs no more than the look-ups it needs. Nothing is ever executed as text.
@@ -6,27 +6,34 @@ expression again costs no more than the look-ups it needs. Nothing is ever execu
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from knowledge_base.content import require_content
 from knowledge_base.errors import SchemaError
-from knowledge_base.facts import VALUE_TYPES, Content, Value
-from knowledge_base.language.binding import check_answers, check_bound
-from knowledge_base.language.compiler import Answers, compile_answers, compile_query, compile_test
-from knowledge_base.language.depth import check_depth
-from knowledge_base.language.expression import (
+from knowledge_base.facts import VALUE_TYPES, Content, Delta, Fact, Value
+from knowledge_base.language.checking.binding import check_answers, check_bound
+from knowledge_base.language.checking.check import check_arity
+from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.evaluation.compiler import Answers, compile_answers, compile_query, compile_test
+from knowledge_base.language.evaluation.terms import Bindings, Getter, Test, as_number, compile_term
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When, check_depth
+from knowledge_base.language.syntax.expression import (
+    Arithmetic,
+    Atom,
+    Call,
     Constant,
     Expression,
     Term,
+    TypedVariable,
     Variable,
     free_variables,
     variables_in_order,
 )
-from knowledge_base.language.identity_cache import IdentityCache
-from knowledge_base.language.terms import Bindings, Getter, Test, compile_term
-from knowledge_base.language.vocabulary import Vocabulary
-from knowledge_base.language.world import World
+from knowledge_base.language.syntax.identity_cache import IdentityCache
 
 NO_BINDINGS: Bindings = MappingProxyType({})
 
@@ -187,3 +194,94 @@ def _compiled_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) ->
 
 def _asked_for(e: Expression, bound: frozenset[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
+
+
+_ARITHMETIC = {"increase": "+", "decrease": "-", "scale-up": "*", "scale-down": "/"}
+
+
+def apply_effect(effect: Effect, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Delta:
+    """What `effect` changes on `world`, which itself is left alone.
+
+    All conditions and values are those of the world before (PDDL 2.1). A fact both deleted and added is
+    added. Several changes of one number in an effect add up; two different assignments contradict.
+
+    Raises:
+        UnknownNameError: a variable is not bound, or a name is not declared.
+        SchemaError: contradicting assignments, a wrong number of arguments, arithmetic on no number.
+        InputError: it is nested too deeply.
+    """
+    check_depth(effect)
+    application = _Application(world)
+    application.apply(effect, bindings)
+    added = tuple(application.added)
+    removed = tuple(f for f in application.removed if f not in application.added)
+    return Delta(removed=removed, added=added, values=application.values)
+
+
+def choices(variables: tuple[TypedVariable, ...], world: World) -> Iterator[dict[str, Value]]:
+    """Every choice of things for `variables`, in order of insertion."""
+    things = [
+        tuple(dict.fromkeys(thing for t in v.types or ("object",) for thing in world.objects(t))) for v in variables
+    ]
+    for chosen in itertools.product(*things):
+        yield {v.name: thing for v, thing in zip(variables, chosen, strict=True)}
+
+
+class _Application:
+    """Collects changes; dicts stand for ordered sets."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.added: dict[Fact, None] = {}
+        self.removed: dict[Fact, None] = {}
+        self.values: dict[Fact, Content] = {}
+        self.computed: set[Fact] = set()
+        self.spend: Callable[[], None] | None = getattr(world, "spend", None)
+
+    def apply(self, effect: Effect, bindings: Bindings) -> None:
+        if self.spend is not None:
+            self.spend()
+        match effect:
+            case Add(atom):
+                self.added[self.fact(atom, bindings)] = None
+            case Delete(atom):
+                self.removed[self.fact(atom, bindings)] = None
+            case AllOf(parts):
+                for part in parts:
+                    self.apply(part, bindings)
+            case ForEach(variables, inner):
+                for choice in choices(variables, self.world):
+                    self.apply(inner, {**bindings, **choice})
+            case When(condition, inner):
+                if holds(condition, self.world, bindings):
+                    self.apply(inner, bindings)
+            case NumericEffect():
+                self.assign(effect, bindings)
+
+    def fact(self, atom: Atom, bindings: Bindings) -> Fact:
+        signature = self.world.schema.told(atom.predicate, atom.place)
+        check_arity(signature, len(atom.args), atom.place)
+        return self.instance(atom.predicate, atom, bindings)
+
+    def instance(self, name: str, form: Atom | Call, bindings: Bindings) -> Fact:
+        return Fact(name, tuple(evaluate_argument(a, self.world, bindings) for a in form.args))
+
+    def assign(self, effect: NumericEffect, bindings: Bindings) -> None:
+        call, operator = effect.call, effect.operator
+        fluent = self.instance(call.function, call, bindings)
+        old = self.values.get(fluent, evaluate_term(call, self.world, bindings))
+        change = evaluate_term(effect.value, self.world, bindings)
+        again = fluent in self.values
+        if operator == "assign":
+            require_content(change, self.world.schema.result(call.function), fluent, effect.place)
+            self.refuse(again and (fluent in self.computed or old != change), fluent, effect)
+            self.values[fluent] = change
+            return
+        self.refuse(again and fluent not in self.computed, fluent, effect)
+        self.computed.add(fluent)
+        sides = tuple(Constant(as_number(side, operator, effect.place)) for side in (old, change))
+        self.values[fluent] = evaluate_term(Arithmetic(_ARITHMETIC[operator], sides, place=effect.place), self.world)
+
+    def refuse(self, contradicts: bool, fluent: Fact, effect: NumericEffect) -> None:  # noqa: FBT001
+        if contradicts:
+            raise SchemaError(f"the effect changes {fluent} in two ways that contradict", place=effect.place)

@@ -11,10 +11,10 @@ from typing import cast
 from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import InputError, Place, SchemaError
 from knowledge_base.facts import Content, Value
-from knowledge_base.language.check import check_arity
-from knowledge_base.language.expression import Arithmetic, Call, Comparison, Constant, Term, Variable
-from knowledge_base.language.vocabulary import Vocabulary
-from knowledge_base.language.world import World
+from knowledge_base.language.checking.check import check_arity
+from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import Arithmetic, Call, Comparison, Constant, Term, Variable
 
 Bindings = Mapping[str, Value]
 Getter = Callable[[World, Bindings], Content]

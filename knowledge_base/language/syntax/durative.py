@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from knowledge_base.language.effect import NO_EFFECT, Add, AllOf, Delete, Effect, NumericEffect, When
-from knowledge_base.language.expression import (
+from knowledge_base.language.syntax.effect import NO_EFFECT, Add, AllOf, Delete, Effect, NumericEffect, When
+from knowledge_base.language.syntax.expression import (
     TRUE,
     And,
     Atom,

@@ -10,7 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.syntax.expression import (
     And,
     Atom,
     Call,
@@ -23,7 +24,6 @@ from knowledge_base.language.expression import (
     parts_of,
     variable_place,
 )
-from knowledge_base.language.vocabulary import Vocabulary
 
 _NONE: frozenset[str] = frozenset()
 

@@ -18,8 +18,36 @@ from itertools import chain
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
-from knowledge_base.language.check import check_arity
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.check import check_arity
+from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.evaluation.lookups import (
+    Answer,
+    Answering,
+    Conjunct,
+    JoinStep,
+    Lookup,
+    Search,
+    TypeRange,
+    alternatives,
+    as_range,
+    candidates,
+    conjuncts,
+    distinct,
+    opposite,
+    order,
+    smallest,
+    things,
+)
+from knowledge_base.language.evaluation.terms import (
+    Bindings,
+    Getter,
+    Test,
+    compile_arguments,
+    compile_comparison,
+    compile_term,
+)
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.expression import (
     And,
     Atom,
     Comparison,
@@ -33,27 +61,6 @@ from knowledge_base.language.expression import (
     Variable,
     free_variables,
 )
-from knowledge_base.language.joins import (
-    Conjunct,
-    JoinStep,
-    TypeRange,
-    as_range,
-    candidates,
-    conjuncts,
-    opposite,
-    order,
-)
-from knowledge_base.language.lookups import Answer, Answering, Lookup, Search, alternatives, distinct, smallest, things
-from knowledge_base.language.terms import (
-    Bindings,
-    Getter,
-    Test,
-    compile_arguments,
-    compile_comparison,
-    compile_term,
-)
-from knowledge_base.language.vocabulary import Vocabulary
-from knowledge_base.language.world import World
 
 _MOST_STAGES = 1000
 Answers = Callable[[World, Bindings], list[Answer]]

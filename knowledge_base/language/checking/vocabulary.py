@@ -8,7 +8,7 @@ from typing import Protocol
 
 from knowledge_base.errors import Place, SchemaError
 from knowledge_base.facts import Content
-from knowledge_base.language.expression import Atom, Term, TypedVariable
+from knowledge_base.language.syntax.expression import Atom, Term, TypedVariable
 
 ROOT_TYPE = "object"
 VALUE_TYPES = ("number", "text", "boolean")

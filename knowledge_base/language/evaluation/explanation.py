@@ -10,12 +10,14 @@ from typing import Any
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
-from knowledge_base.language.binding import check_bound
-from knowledge_base.language.compiler import counterexamples, witnesses
-from knowledge_base.language.depth import check_depth
-from knowledge_base.language.effect_application import choices
-from knowledge_base.language.evaluator import NO_BINDINGS, evaluate_term, holds, prepare
-from knowledge_base.language.expression import (
+from knowledge_base.language.checking.binding import check_bound
+from knowledge_base.language.checking.vocabulary import Read
+from knowledge_base.language.evaluation.compiler import counterexamples, witnesses
+from knowledge_base.language.evaluation.evaluator import NO_BINDINGS, choices, evaluate_term, holds, prepare
+from knowledge_base.language.evaluation.terms import Bindings
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax.effect import check_depth
+from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,
@@ -30,10 +32,7 @@ from knowledge_base.language.expression import (
     substitute,
     substitute_term,
 )
-from knowledge_base.language.printer import to_text
-from knowledge_base.language.terms import Bindings
-from knowledge_base.language.vocabulary import Read
-from knowledge_base.language.world import World
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.spelling import value_text
 
 _Judged = tuple["Explanation", InputError | None]

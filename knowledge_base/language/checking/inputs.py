@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, type_name
 from knowledge_base.facts import VALUE_TYPES, Delta, Fact, Value
-from knowledge_base.language.expression import Expression, free_variables
+from knowledge_base.language.syntax.expression import Expression, free_variables
 
 _NO_CHANGE = Delta()
 

@@ -1,0 +1,1 @@
+"""Conditions, terms and effects on a world: truth, answers, values, changes, explanations."""

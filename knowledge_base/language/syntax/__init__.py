@@ -1,0 +1,1 @@
+"""Conditions, terms and effects as frozen values, and their text."""
