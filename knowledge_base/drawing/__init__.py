@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from knowledge_base.drawing.picture import picture_of
-from knowledge_base.drawing.placement import arranged
-from knowledge_base.drawing.rendering import to_svg
+from knowledge_base.drawing.rendering import arranged, to_svg
 from knowledge_base.view import View
 
 MOST_DRAWN = 150

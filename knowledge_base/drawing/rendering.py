@@ -1,30 +1,153 @@
-"""Rendering of an arranged picture as SVG, with colours for colour-blind readers (Okabe and Ito 2008)."""
+"""Positions of a picture's cards, and the picture as SVG.
+
+networkx places the cards by distance in the graph, then overlaps are removed.
+"""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from html import escape
-from math import hypot
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import dist, hypot
 
-from knowledge_base.drawing.picture import Arrow
-from knowledge_base.drawing.placement import LINE, PADDING, Arranged, Placed
+import networkx as nx
+
+from knowledge_base import svg
+from knowledge_base.drawing.picture import Arrow, Card, Picture
+
+LINE = 16.0
+"""Pixels between two lines of text; other lengths are in pixels too."""
+CHARACTER = 7.0
+PADDING = 10.0
+GAP = 46.0
+"""Space between two cards, for arrows and their labels."""
+HOP = 170.0
+"""Average distance of neighbours' centres, before cards are pushed apart."""
+ROW = 1400.0
+"""Width of a picture after which further connected parts go into another row."""
+FINE = 60
+"""Maximum number of cards for the layout by Kamada and Kawai (1989), which is finer and slower than springs."""
+
+
+@dataclass(slots=True)
+class Placed:
+    """A card with its centre and its size."""
+
+    card: Card
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class Arranged:
+    """A picture with positions between (0, 0) and (width, height)."""
+
+    cards: Mapping[str, Placed]
+    links: tuple[Arrow, ...]
+    width: float
+    height: float
+    left_out: int
+
+
+def arranged(scene: Picture) -> Arranged:
+    """Return positions for all cards; the same picture always gets the same ones."""
+    graph: nx.Graph[str] = nx.Graph()
+    graph.add_nodes_from(card.key for card in scene.cards)
+    graph.add_edges_from((link.source, link.target) for link in scene.links)
+    cards = {card.key: card for card in scene.cards}
+    order = {key: index for index, key in enumerate(cards)}
+    parts = [sorted(part, key=order.__getitem__) for part in nx.connected_components(graph)]
+    parts.sort(key=lambda part: (-len(part), order[part[0]]))
+    placed = [_part(graph, [cards[key] for key in part]) for part in parts]
+    width, height = _in_rows(placed)
+    found = {one.card.key: one for part in placed for one in part}
+    return Arranged({key: found[key] for key in cards}, scene.links, width, height, scene.left_out)
+
+
+def _part(graph: nx.Graph[str], cards: list[Card]) -> list[Placed]:
+    """Return the cards of one connected part, its upper left corner at (0, 0)."""
+    own: nx.Graph[str] = nx.Graph()  # positions depend on the order of the cards
+    own.add_nodes_from(card.key for card in cards)
+    own.add_edges_from(sorted(graph.subgraph([card.key for card in cards]).edges))
+    positions = _positions(own)
+    lengths = [dist(positions[one], positions[other]) for one, other in own.edges if one != other]
+    scale = HOP * len(lengths) / sum(lengths) if lengths else 1.0
+    placed = [_placed(card, positions[card.key], scale) for card in cards]
+    _push_apart(placed)
+    left = min(one.x - one.width / 2 for one in placed)
+    top = min(one.y - one.height / 2 for one in placed)
+    for one in placed:
+        one.x, one.y = round(one.x - left, 1), round(one.y - top, 1)
+    return placed
+
+
+def _positions(graph: nx.Graph[str]) -> Mapping[str, Sequence[float]]:
+    if len(graph) == 1:
+        return dict.fromkeys(graph, (0.0, 0.0))
+    found = nx.kamada_kawai_layout(graph) if len(graph) <= FINE else nx.spring_layout(graph, seed=1, iterations=100)
+    return {key: (float(x), float(y)) for key, (x, y) in found.items()}
+
+
+def _placed(card: Card, at: Sequence[float], scale: float) -> Placed:
+    texts = (card.title, card.kind, *card.lines)
+    width = max(map(len, texts)) * CHARACTER + 2 * PADDING
+    lines = 1 + bool(card.kind) + len(card.lines)
+    return Placed(card, at[0] * scale, at[1] * scale, width, lines * LINE + 2 * PADDING - 4)
+
+
+def _push_apart(placed: list[Placed], rounds: int = 300) -> None:
+    """Move cards that are too close along the axis with the smaller overlap, until none are."""
+    for _ in range(rounds):
+        moved = False
+        for i, one in enumerate(placed):
+            for other in placed[i + 1 :]:
+                moved = _part_two(one, other) or moved
+        if not moved:
+            return
+
+
+def _part_two(one: Placed, other: Placed) -> bool:
+    dx, dy = other.x - one.x, other.y - one.y
+    across = (one.width + other.width) / 2 + GAP - abs(dx)
+    down = (one.height + other.height) / 2 + GAP * 0.7 - abs(dy)
+    if across <= 0.01 or down <= 0.01:
+        return False
+    if across < down:
+        step = across / 2 if dx >= 0 else -across / 2
+        one.x, other.x = one.x - step, other.x + step
+    else:
+        step = down / 2 if dy >= 0 else -down / 2
+        one.y, other.y = one.y - step, other.y + step
+    return True
+
+
+def _in_rows(parts: Iterable[list[Placed]]) -> svg.Point:
+    """Place the parts in rows; return the size of the whole."""
+    x = y = row_height = width = 0.0
+    for part in parts:
+        own_width = max(one.x + one.width / 2 for one in part)
+        own_height = max(one.y + one.height / 2 for one in part)
+        if x and x + own_width > ROW:
+            x, y, row_height = 0.0, y + row_height + GAP, 0.0
+        for one in part:
+            one.x, one.y = one.x + x, one.y + y
+        x, row_height = x + own_width + GAP, max(row_height, own_height)
+        width = max(width, x - GAP)
+    return width, y + row_height
+
 
 MARGIN = 16.0
-ARROW = (9.0, 3.6)
-"""Length and half width of an arrowhead."""
-_INK, _SOFT = "#1f2937", "#64748b"
-_COLOURS = (
-    ("#e3f0fb", "#0064a8"),
-    ("#fff3d6", "#b35c00"),
-    ("#effaf6", "#00795a"),
-    ("#fbe8f1", "#a3195b"),
-    ("#f3effc", "#5b3fa0"),
-    ("#f6f8fb", "#475569"),
+_COLOURS = (svg.BLUE, svg.ORANGE, svg.GREEN, svg.PINK, svg.VIOLET, svg.GREY)
+"""A pair for each type; further types share the last one."""
+_RELATION = ("#ffffff", svg.SOFT)
+_STYLE = (
+    f"text{{{svg.FONTS};font-size:12px}}"
+    f".name{{font-weight:bold;fill:{svg.INK}}}.kind{{fill:{svg.SOFT};font-style:italic}}.line{{fill:{svg.DETAIL}}}"
+    f"{svg.EDGES}.head{{fill:{svg.SOFT}}}"
+    f".label{{fill:{svg.DETAIL};text-anchor:middle;paint-order:stroke;stroke:#ffffff;stroke-width:4px;font-size:11px}}"
+    ".mid{text-anchor:middle}"
 )
-"""Fill and border, a pair for each type; further types share the last one."""
-_RELATION = ("#ffffff", "#64748b")
-_FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 def to_svg(picture: Arranged) -> str:
@@ -39,27 +162,13 @@ def to_svg(picture: Arranged) -> str:
         *(line for link in picture.links for line in _label(link, picture)),
     ]
     if note:
-        body.append(f'<text class="kind" x="{_n(MARGIN)}" y="{_n(height - MARGIN / 2)}">{note}</text>')
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}" '
-        f'viewBox="0 0 {_n(width)} {_n(height)}" role="img">\n<title>world graph</title>\n<style>{_css()}</style>\n'
-        f'<rect width="{_n(width)}" height="{_n(height)}" rx="10" fill="#ffffff"/>\n' + "\n".join(body) + "\n</svg>\n"
-    )
-
-
-def _css() -> str:
-    return (
-        "text{font-family:Inter,'Segoe UI','Helvetica Neue',Arial,'DejaVu Sans',sans-serif;font-size:12px}"
-        f".name{{font-weight:bold;fill:{_INK}}}.kind{{fill:{_SOFT};font-style:italic}}.line{{fill:#334155}}"
-        f".edge{{fill:none;stroke:{_SOFT};stroke-width:1.4}}.head{{fill:{_SOFT}}}"
-        ".label{fill:#334155;text-anchor:middle;paint-order:stroke;stroke:#ffffff;stroke-width:4px;font-size:11px}"
-        ".mid{text-anchor:middle}"
-    )
+        body.append(f'<text class="kind" x="{svg.number(MARGIN)}" y="{svg.number(height - MARGIN / 2)}">{note}</text>')
+    return svg.document("world graph", width, height, _STYLE, body)
 
 
 def _colours(picture: Arranged) -> dict[str, tuple[str, str]]:
     kinds = dict.fromkeys(one.card.kind for one in picture.cards.values() if one.card.kind)
-    return {kind: _COLOURS[min(number, len(_COLOURS) - 1)] for number, kind in enumerate(kinds)}
+    return {kind: _COLOURS[min(index, len(_COLOURS) - 1)] for index, kind in enumerate(kinds)}
 
 
 def _card(one: Placed, colours: dict[str, tuple[str, str]]) -> Iterator[str]:
@@ -67,37 +176,31 @@ def _card(one: Placed, colours: dict[str, tuple[str, str]]) -> Iterator[str]:
     x, y = one.x - one.width / 2 + MARGIN, one.y - one.height / 2 + MARGIN
     thick = 3 if one.card.middle else 1.4
     dashes = "" if one.card.kind else ' stroke-dasharray="4 3"'
-    yield (
-        f'<rect x="{_n(x)}" y="{_n(y)}" width="{_n(one.width)}" height="{_n(one.height)}" rx="7" fill="{fill}" '
-        f'stroke="{stroke}" stroke-width="{thick}"{dashes}/>'
-    )
+    area = svg.area(x, y, one.width, one.height)
+    yield f'<rect {area} rx="7" fill="{fill}" stroke="{stroke}" stroke-width="{thick}"{dashes}/>'
     texts = [("name", one.card.title), ("kind", one.card.kind), *(("line", line) for line in one.card.lines)]
-    for number, (style, text) in enumerate(t for t in texts if t[1]):
-        middle = _n(one.x + MARGIN)
-        yield f'<text class="{style} mid" x="{middle}" y="{_n(y + PADDING + 8 + number * LINE)}">{_x(text)}</text>'
+    middle = svg.number(one.x + MARGIN)
+    for line, (style, text) in enumerate(t for t in texts if t[1]):
+        height = svg.number(y + PADDING + 8 + line * LINE)
+        yield f'<text class="{style} mid" x="{middle}" y="{height}">{svg.escaped(text)}</text>'
 
 
 def _arrow(link: Arrow, picture: Arranged) -> Iterator[str]:
-    (x1, y1), (x2, y2) = _ends(link, picture)
-    length = hypot(x2 - x1, y2 - y1)
-    if length < 1:
-        return
-    ux, uy = (x2 - x1) / length, (y2 - y1) / length
-    long, half = ARROW
-    bx, by = x2 - ux * long, y2 - uy * long
-    yield f'<path class="edge" d="M{_n(x1)} {_n(y1)}L{_n(bx)} {_n(by)}"/>'
-    corners = f"{_n(x2)},{_n(y2)} {_n(bx - uy * half)},{_n(by + ux * half)} {_n(bx + uy * half)},{_n(by - ux * half)}"
-    yield f'<polygon class="head" points="{corners}"/>'
+    start, end = _ends(link, picture)
+    if dist(start, end) >= 1:
+        base, head = svg.arrowhead(start, end)
+        yield f'<path class="edge" d="M{svg.point(start)}L{svg.point(base)}"/>'
+        yield f'<path class="head" d="{head}"/>'
 
 
 def _label(link: Arrow, picture: Arranged) -> Iterator[str]:
     (x1, y1), (x2, y2) = _ends(link, picture)
     along = 0.3 if _is_both_ways(link, picture) else 0.5  # the labels of an opposite pair must not meet
     x, y = x1 + (x2 - x1) * along, y1 + (y2 - y1) * along
-    yield f'<text class="label" x="{_n(x)}" y="{_n(y + 4)}">{_x(link.label)}</text>'
+    yield f'<text class="label" x="{svg.number(x)}" y="{svg.number(y + 4)}">{svg.escaped(link.label)}</text>'
 
 
-def _ends(link: Arrow, picture: Arranged) -> tuple[tuple[float, float], tuple[float, float]]:
+def _ends(link: Arrow, picture: Arranged) -> tuple[svg.Point, svg.Point]:
     """Return both ends of an arrow at the cards' borders; opposite arrows are shifted apart."""
     source, target = picture.cards[link.source], picture.cards[link.target]
     dx, dy = target.x - source.x, target.y - source.y
@@ -112,7 +215,7 @@ def _is_both_ways(link: Arrow, picture: Arranged) -> bool:
     return any(other.source == link.target and other.target == link.source for other in picture.links)
 
 
-def _border(one: Placed, dx: float, dy: float) -> tuple[float, float]:
+def _border(one: Placed, dx: float, dy: float) -> svg.Point:
     """Return the point where a line from the card's centre in that direction crosses its border."""
     share = min(
         one.width / 2 / abs(dx) if dx else float("inf"),
@@ -120,11 +223,3 @@ def _border(one: Placed, dx: float, dy: float) -> tuple[float, float]:
         1.0,
     )
     return one.x + dx * share, one.y + dy * share
-
-
-def _n(number: float) -> str:
-    return f"{number:.1f}".removesuffix(".0")
-
-
-def _x(text: str) -> str:
-    return escape(_FORBIDDEN.sub("\N{REPLACEMENT CHARACTER}", text))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from knowledge_base import Delta, KnowledgeBase, Schema, UnknownNameError, fact
 from knowledge_base.drawing import MOST_DRAWN, draw
 from knowledge_base.drawing.picture import picture_of
-from knowledge_base.drawing.placement import arranged
+from knowledge_base.drawing.rendering import arranged
 
 SCHEMA = Schema.parse(
     """(define (domain d) (:types cup place - object)
