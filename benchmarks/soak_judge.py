@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from soak_told import Told
 
-from domains.clean_up_table.items import Item
-from domains.clean_up_table.places import SURFACES
+from domains.clean_up_table.items import SURFACES, Item
 from domains.clean_up_table.report import Report
 from domains.clean_up_table.table_world import TableWorld
 from domains.clean_up_table.world_faults import ITEM_MOVED

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from domains.clean_up_table.items import DESTINATION_OF, HAND
-from domains.clean_up_table.places import DESTINATIONS, SURFACES
-from domains.clean_up_table.results import Result
+from domains.clean_up_table.items import DESTINATION_OF, DESTINATIONS, HAND, SURFACES
+from domains.clean_up_table.observations import Result
 from domains.clean_up_table.table_world import TableWorld
 from domains.clean_up_table.world_faults import ITEM_MOVED
 from dsc.sequencer.reactor import CHART

@@ -1,8 +1,9 @@
-"""Progress of a run for people: lines of text anywhere, and a status line on a terminal."""
+"""Progress of a run from its records: counts, lines of text anywhere, and a status line on a terminal."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, Self
 
@@ -10,7 +11,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from domains.tally import Tally
+from dsc.dynamic.candidate_selection import ACHIEVE
 from dsc.trace import Record
 
 _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
@@ -26,6 +27,44 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "rule": lambda data: f"rule  {data['rule']}",
 }
 _STEP = re.compile(r"step_\d+")
+
+
+class Tally:
+    """A trace listener that counts.
+
+    Attributes:
+        outcomes: events that skills ended with.
+        recoveries: rules that answered, by their label.
+        candidates: plots that dynamic states chose, without planning.
+        plans: plans that were found; `replans`: plans that replaced a running one.
+        excluded: steps that plans avoided for a while after a failure.
+        seconds: run time of the last record.
+    """
+
+    def __init__(self) -> None:
+        self.outcomes: Counter[str] = Counter()
+        self.recoveries: Counter[str] = Counter()
+        self.candidates: Counter[str] = Counter()
+        self.excluded: Counter[str] = Counter()
+        self.plans = 0
+        self.replans = 0
+        self.seconds = 0.0
+
+    def __call__(self, record: Record) -> None:
+        """Count one record."""
+        self.seconds = record.t
+        if record.type == "event" and "." in record.data["source"]:
+            self.outcomes[record.data["name"]] += 1
+        elif record.type == "decision" and record.data["chosen"] not in (None, ACHIEVE):
+            self.candidates[record.data["chosen"]] += 1
+        elif record.type == "rule":
+            self.recoveries[record.data["rule"]] += 1
+        elif record.type == "plan.found":
+            self.plans += 1
+        elif record.type == "plan.replaced":
+            self.replans += 1
+        elif record.type == "plan.excluded":
+            self.excluded[record.data["step"]] += 1
 
 
 def _working(scope: dict[str, Any]) -> dict[str, dict[str, Any]]:

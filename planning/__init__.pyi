@@ -20,9 +20,9 @@ from planning.plan import ProvenUnsolvable as ProvenUnsolvable
 from planning.plan import TimedOut as TimedOut
 from planning.plan import Timing as Timing
 from planning.problem.construction import build_problem as build_problem
+from planning.strips import UnsupportedActionError as UnsupportedActionError
+from planning.strips import UnsupportedGoalError as UnsupportedGoalError
 from planning.unified import from_unified as from_unified
 from planning.unified import to_unified as to_unified
-from planning.unsupported import UnsupportedActionError as UnsupportedActionError
-from planning.unsupported import UnsupportedGoalError as UnsupportedGoalError
 from planning.validation import Validation as Validation
 from planning.validation import validate as validate

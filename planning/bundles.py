@@ -20,9 +20,8 @@ from dsc.text.plot_files import load_library
 from dsc.validation.deployment import addressed_by
 from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.language.checking.inputs import shown
-from knowledge_base.pddl.domain_text import DomainText
+from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
 from planning.domain import PlanningDomain
-from planning.fragments import shipped_by
 
 GROUP = "dsc.bundles"
 """The entry point group; each entry point names a `Bundle`, or a function that makes one."""
@@ -211,6 +210,16 @@ def domain_of(bundles: Collection[Bundle]) -> PlanningDomain:
     return PlanningDomain.from_fragments(parts or ["(define (domain bundles))"])
 
 
+def shipped_by(components: Iterable[Component]) -> list[DomainText]:
+    """Return the fragments that components ship, once for each class.
+
+    Raises:
+        InputError: a file cannot be read, or does not contain a domain.
+    """
+    kinds = dict.fromkeys(type(component) for component in components)
+    return [_read(kind.domain, kind.__name__) for kind in kinds if kind.domain is not None]
+
+
 def _loaded(point: EntryPoint) -> Bundle:
     try:
         with contained():
@@ -225,3 +234,7 @@ def _loaded(point: EntryPoint) -> Bundle:
 
 def _of(point: EntryPoint) -> str:
     return f"package '{point.dist.name}'" if point.dist is not None else f"'{point.value}'"
+
+
+def _read(shipped: Path | str, owner: str) -> DomainText:
+    return read_domain(shipped) if isinstance(shipped, Path) else parse_domain(shipped, f"{owner}.domain")

@@ -1,7 +1,12 @@
-"""A planning domain: the schema and the planning actions of a PDDL file, checked against each other."""
+"""A planning domain: schema and planning actions of PDDL files, checked against each other (S4.6).
+
+Fragments are merged as text forms, before name resolution: one may use names that another declares, in any order. Equal
+declarations are merged; contradictory ones raise an error with both places.
+"""
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,15 +32,14 @@ from knowledge_base.language.syntax.expression import (
     substitute,
 )
 from knowledge_base.language.syntax.sexpr import TypedName
-from knowledge_base.pddl.action_text import ActionText
+from knowledge_base.pddl.action_text import ActionText, united
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.pddl.domain_writer import action_to_text, axiom_to_text, domain_to_text
-from knowledge_base.world.schema import Schema
-from planning.fragments import merged_text, searched
+from knowledge_base.world.schema import Schema, agreed_names
 from planning.planning_actions import Axiom, PlanningAction, checked, checked_axiom, refuse_changed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from knowledge_base.facts import Delta
     from knowledge_base.world.computation import Computed
@@ -113,8 +117,8 @@ class PlanningDomain:
         if len(pieces) == 1 and isinstance(pieces[0], PlanningDomain):
             return pieces[0]
         texts = [_text(piece) for piece in pieces]
-        with searched(texts):
-            return cls.from_text(merged_text(texts), (*_computed(pieces), *computed))
+        with _searched(texts):
+            return cls.from_text(_merged(texts), (*_computed(pieces), *computed))
 
     @classmethod
     def parse(cls, text: str, source: str | None = None, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
@@ -230,6 +234,39 @@ class PlanningDomain:
         if len(parameters) != len(step.args):
             raise InputError(f"'{step.action}' takes {len(parameters)} arguments, {step} has {len(step.args)}")
         return {p.name: arg for p, arg in zip(parameters, step.args, strict=True)}
+
+
+def _merged(texts: Sequence[DomainText]) -> DomainText:
+    """Return the union of the fragments, under the name of the first.
+
+    Raises:
+        SchemaError: two types, constants or actions of one name differ. (The schema made from the result detects
+            this for other declarations.)
+    """
+    first = texts[0]
+    return DomainText(
+        name=first.name,
+        requirements=tuple(dict.fromkeys(r for text in texts for r in text.requirements)),
+        types=agreed_names((text.types for text in texts), "type"),
+        constants=agreed_names((text.constants for text in texts), "constant"),
+        predicates=tuple(declared for text in texts for declared in text.predicates),
+        functions=tuple(declared for text in texts for declared in text.functions),
+        actions=united(action for text in texts for action in text.actions),
+        axioms=tuple(dict.fromkeys(axiom for text in texts for axiom in text.axioms)),
+        notes=tuple(note for text in texts for note in text.notes),
+    )
+
+
+@contextmanager
+def _searched(texts: Sequence[DomainText]) -> Iterator[None]:
+    """Add the names of the fragments to an error about a name that none of them declares."""
+    sources = dict.fromkeys(text.source or text.name for text in texts)
+    try:
+        yield
+    except InputError as error:
+        if error.found is not None and len(sources) > 1:
+            error.message += f" in {', '.join(sources)}"
+        raise
 
 
 def _computed(pieces: Iterable[object]) -> Iterator[Computed[Any]]:

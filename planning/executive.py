@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Iterable, Mapping
-from contextlib import nullcontext
+import gc
+import threading
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -31,18 +33,15 @@ from knowledge_base.journal.file import Durability, located
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema_compatibility import require_extension
-from planning import entrance
-from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of
+from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
 from planning.domain import PlanningDomain
 from planning.engines.cache import CachingPlanner
 from planning.engines.planner import Planner, PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.execution.component import PlanningComponent
 from planning.execution.search import Foresight
-from planning.fragments import shipped_by
-from planning.garbage_collection import settled
 from planning.problem.construction import check_goal
-from planning.soundness import require_sound
+from planning.soundness import require_parts, require_sound
 
 Prepare = Callable[[Sequencer], None]
 """A callback before a run starts, e.g. to post events or to keep a reference to the sequencer."""
@@ -89,7 +88,7 @@ class Executive:
         store: Path | str | None = None,
         durability: Durability = "process",
     ) -> None:
-        entrance.require_parts(knowledge, planner, foresight, store)
+        require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
         configure(self.components)
         require_deployed(self.components, [PlanningComponent.name])
@@ -343,3 +342,39 @@ def _budget(seconds: float, replans: int) -> Budget:
         first = error.errors()[0]
         wrong = f"'{first['loc'][0]}' is {first['input']!r}: {first['msg']}"
         raise InputError(wrong, found=str(first["input"])) from None
+
+
+_YOUNG = 10_000
+"""Allocations between collections of the youngest generation, as a minimum.
+
+The interpreter's default of 700 suits programs with few allocations. One new plan makes twice this number of objects,
+most of them short-lived.
+"""
+
+_lock = threading.Lock()
+_running = 0
+_before = gc.get_threshold()
+
+
+@contextmanager
+def settled() -> Iterator[None]:
+    """Freeze the existing objects until the end of this run, and of others at the same time.
+
+    A collection of all objects takes a tenth of a second. New objects are collected less often too.
+    """
+    global _running, _before  # noqa: PLW0603  there is one collector in a process
+    with _lock:
+        gc.freeze()
+        if not _running:
+            _before = gc.get_threshold()
+            if _before[0]:  # else it is switched off
+                gc.set_threshold(max(_before[0], _YOUNG), *_before[1:])
+        _running += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _running -= 1
+            if not _running:
+                gc.set_threshold(*_before)
+                gc.unfreeze()

@@ -1,16 +1,19 @@
-"""Soundness of a robot program: plots, skills and planning domain match, checked before a run."""
+"""Soundness of a robot program, checked before a run: its parts have their types; plots, skills and domain match."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from itertools import pairwise
+from pathlib import Path
 
 from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import Finding
 from dsc.skills import SkillSignature
 from dsc.validation import raise_findings, validate_library
-from knowledge_base.errors import SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.checking.inputs import require, shown
+from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.domain import PlanningDomain
 
@@ -84,3 +87,22 @@ def require_sound(
     if len(_sound) >= _MOST_SOUND:
         _sound.clear()
     _sound[key] = parts
+
+
+def require_parts(knowledge: object, planner: object, foresight: object, store: object) -> None:
+    """Raise `InputError` unless each part has its declared type, or is `None`."""
+    if knowledge is not None:
+        require(knowledge, KnowledgeBase, "the knowledge is a KnowledgeBase")
+    if store is not None:
+        require(store, (str, Path), "a store is named by a text or a Path")
+    _require_able(planner, "solve", "a planner")
+    _require_able(foresight, "foresee", "a foresight")
+
+
+def _require_able(part: object, method: str, what: str) -> None:
+    if part is None:
+        return
+    if isinstance(part, type):
+        raise InputError(f"{what} is an object, not a class; an instance is made by {part.__name__}()")
+    if not callable(getattr(part, method, None)):
+        raise InputError(f"{what} has a method '{method}', which {shown(part)[:60]} has not")

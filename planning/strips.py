@@ -12,6 +12,7 @@ from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
 from planning.plan import Plan, PlanStep, Timing
 from planning.quantities import Assignment, Numbers, NumericBound
@@ -25,6 +26,14 @@ FEATURES = ("numeric", "costs", "durations", "derived")
 """Features beyond STRIPS that a problem may need; problem construction compiles all others away."""
 
 _NONE: Numbers = MappingProxyType({})
+
+
+class UnsupportedGoalError(InputError):
+    """The goal has a construct without support by any engine; the message names it."""
+
+
+class UnsupportedActionError(InputError):
+    """A relevant planning action has a construct without support by any engine."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,14 +11,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Self
 
-from domains.clean_up_table.components import Arm, Base, Camera, Voice, initial_knowledge
+from domains.clean_up_table.components import Arm, Base, Camera, PatientCamera, SuctionArm, Tracks, Voice
 from domains.clean_up_table.durable_world import DurableWorld, beside, require_free
+from domains.clean_up_table.observations import initial_knowledge
 from domains.clean_up_table.physics import Physics
 from domains.clean_up_table.report import Report, summarise
 from domains.clean_up_table.scenario import Scenario
-from domains.clean_up_table.second_robot import PatientCamera, SuctionArm, Tracks
 from domains.clean_up_table.table_world import TableWorld
-from domains.tally import Tally
+from domains.progress import Tally
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
@@ -199,7 +199,7 @@ def _wired(
         domain(), library() if profile is None else adapted(plots(), profile), components, None, planner,
         foresight=Physics(), store=store, durability=durability,
     )  # fmt: skip
-    executive.knowledge.apply(initial_knowledge(world), "deployment", key="deployment")
+    executive.knowledge.apply(initial_knowledge(world.robot_at), "deployment", key="deployment")
     deployed = CleanUpTable(world, executive, profile=profile)
     executive.listen(deployed.tally)
     if listener is not None:
@@ -213,7 +213,7 @@ def on_wheels(world: TableWorld) -> list[Component]:
 
 
 def on_tracks(world: TableWorld) -> list[Component]:
-    """Return the components with a base on tracks and a suction arm; see `second_robot`."""
+    """Return the components with a base on tracks and a suction arm."""
     return [Tracks(world), SuctionArm(world), PatientCamera(world), Voice(world)]
 
 

@@ -10,6 +10,7 @@ import sqlite3
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
+from domains.clean_up_table.observations import RESULT
 from domains.clean_up_table.table_world import TableWorld
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.atomic_files import new_database
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from domains.clean_up_table.results import Result
+    from domains.clean_up_table.observations import Result
 
 KIND = Kind("simulated world", 0x64736377, 2)
 """Format 1 had no number and no application id."""
@@ -108,7 +109,7 @@ class DurableWorld(TableWorld):
         super().executed(action_id, result)
         assert self._file is not None  # noqa: S101  it was created or opened
         self._file.execute("BEGIN")
-        self._file.execute("INSERT INTO done VALUES (?, ?)", (action_id, json.dumps(result.to_json())))
+        self._file.execute("INSERT INTO done VALUES (?, ?)", (action_id, RESULT.dump_json(result).decode()))
         self._file.execute("UPDATE world SET state = ?", (self._present(),))
         self._file.execute("COMMIT")
 

@@ -1,16 +1,48 @@
-"""The items: cups, cans and crisp cans, with their places, carriers and destinations."""
+"""The places, and the items: cups, cans and crisp cans, with their carriers and destinations."""
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from domains.clean_up_table.places import PLACES, SURFACES
 from knowledge_base.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
+
+SURFACES = ("table", "shelf", "floor")
+DESTINATIONS = ("sink", "bin")
+OPERATOR = "operator"
+PLACES = (*SURFACES, *DESTINATIONS, OPERATOR)
+
+TYPES = {
+    **dict.fromkeys(SURFACES, "surface"),
+    **dict.fromkeys(DESTINATIONS, "destination"),
+    OPERATOR: "place",
+}
+"""A place's type in the planning domain."""
+
+POSITIONS = {
+    "table": (0.0, 0.0),
+    "shelf": (-3.0, 0.0),
+    "floor": (0.0, -2.0),
+    "sink": (3.0, 1.0),
+    "bin": (3.0, -2.0),
+    OPERATOR: (-3.0, -3.0),
+}
+"""A place's centre, seen from above: x to the right, y away from the viewer, in metres."""
+
+EXTENTS = {
+    "table": (2.0, 1.0),
+    "shelf": (2.0, 0.6),
+    "floor": (2.0, 1.0),
+    "sink": (0.8, 0.6),
+    "bin": (0.6, 0.6),
+    OPERATOR: (0.6, 0.6),
+}
+"""A place's width and depth in metres."""
 
 CUP, CAN, CRISP_CAN = "cup", "can", "crisp-can"
 KINDS = (CUP, CAN, CRISP_CAN)
@@ -26,6 +58,11 @@ ROOMS = ("none", "one", "two")
 HAND = "hand"
 RESERVED = frozenset({*PLACES, *ROOMS, HAND})
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,59}")
+
+
+def distance(start: str, end: str) -> float:
+    """Return the distance between two places in metres, in a straight line."""
+    return math.dist(POSITIONS[start], POSITIONS[end])
 
 
 def check_name(name: str) -> None:

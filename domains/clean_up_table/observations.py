@@ -1,4 +1,4 @@
-"""Observations of the robot: the change of its knowledge by a verb's result.
+"""Results of the world's verbs, and the change of the robot's knowledge by them.
 
 A success reports the effect of the planning action of the same name, in the domain's predicates. A failure reports the
 robot's observations of it. Facts are retracted whether they were known or not.
@@ -7,17 +7,69 @@ robot's observations of it. Facts are retracted whether they were known or not.
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
-from domains.clean_up_table.items import DESTINATION_OF, ROOMS
-from domains.clean_up_table.places import PLACES, SURFACES, TYPES
+from pydantic import TypeAdapter
+
+from domains.clean_up_table.items import DESTINATION_OF, PLACES, ROOMS, SURFACES, TYPES
 from knowledge_base.facts import Delta, Fact, fact
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+Attribute = str | int | tuple[str, ...]
 
-    from domains.clean_up_table.results import Result, Sighting
-    from domains.clean_up_table.table_world import TableWorld
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """An item in the robot's view.
+
+    Attributes:
+        item: its name.
+        kind: its kind.
+        where: the surface it lies on or the carrier it is directly in.
+        room: its free room in the planning domain's terms (`none`, `one`, `two`).
+        new: whether it was never seen before.
+    """
+
+    item: str
+    kind: str
+    where: str
+    room: str
+    new: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """The result of one verb.
+
+    Attributes:
+        outcome: the outcome event's name.
+        attributes: the event's attributes.
+        sightings: items with an observed place or room.
+        apart: (item, carrier) pairs that no longer hold.
+        fits: (item, carrier) pairs that were recognised as fitting for the first time.
+        failures: number of consecutive failures, this one included.
+    """
+
+    outcome: str
+    attributes: Mapping[str, Attribute]
+    sightings: tuple[Sighting, ...] = ()
+    apart: tuple[tuple[str, str], ...] = ()
+    fits: tuple[tuple[str, str], ...] = ()
+    failures: int = 0
+
+
+RESULT = TypeAdapter(Result)
+"""Results as JSON data."""
+
+
+def not_possible(reason: str) -> Result:
+    """Return the result of a verb that could not be tried; the world is unchanged."""
+    return Result("not_possible", {"reason": reason})
+
+
+def gone(item: str, surface: str) -> Result:
+    """Return the result of a verb whose item is not at the expected place."""
+    return Result("gone", {"item": item, "surface": surface})
 
 
 class _Notes:
@@ -53,11 +105,11 @@ class _Notes:
         return Delta(self.nodes, tuple(self.removed), tuple(self.added), self.values)
 
 
-def initial_knowledge(world: TableWorld) -> Delta:
-    """Return the robot's knowledge before the first look: places, its own position, and the order of rooms."""
+def initial_knowledge(robot_at: str) -> Delta:
+    """Return the robot's knowledge before its first look: places, its own place, and the order of rooms."""
     notes = _Notes()
     notes.nodes.update(TYPES)
-    notes.holds("robot-at", world.robot_at)
+    notes.holds("robot-at", robot_at)
     notes.holds("hand-free")
     for place in PLACES:
         notes.holds("passable", place)

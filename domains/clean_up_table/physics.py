@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from domains.clean_up_table.items import CRISP_CAN, HAND, KINDS, ROOMS, Item, new_item
-from domains.clean_up_table.places import OPERATOR, SURFACES
+from domains.clean_up_table.items import CRISP_CAN, HAND, KINDS, OPERATOR, ROOMS, SURFACES, Item, new_item
 from domains.clean_up_table.table_world import TableWorld
 from planning.validation import Validation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from domains.clean_up_table.results import Result
+    from domains.clean_up_table.observations import Result
     from knowledge_base.language.evaluation.world import World as Belief
     from planning.plan import Plan, PlanStep
 

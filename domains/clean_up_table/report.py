@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from domains.clean_up_table.table_world import TableWorld
-from domains.tally import Tally
+from domains.progress import Tally
 from dsc.sequencer.sequencer import RunEnd
 from knowledge_base.store import KnowledgeBase
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from domains.clean_up_table.items import HAND, Item
-from domains.clean_up_table.places import DESTINATIONS
-from domains.clean_up_table.results import Attribute, Result, Sighting, gone, not_possible
+from domains.clean_up_table.items import DESTINATIONS, HAND, Item
+from domains.clean_up_table.observations import Attribute, Result, Sighting, gone, not_possible
 from domains.clean_up_table.room import Room
 from domains.clean_up_table.world_faults import (
     GRASP_FAILED,

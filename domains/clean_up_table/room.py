@@ -1,4 +1,4 @@
-"""The simulated room: its state, interference by other people, and the truth about it.
+"""The simulated room: its state, interference by other people, the truth about it, and its drawing.
 
 It is pure data and rules, without clock or asyncio. The robot's verbs are in `table_world`.
 """
@@ -6,21 +6,34 @@ It is pure data and rules, without clock or asyncio. The robot's verbs are in `t
 from __future__ import annotations
 
 import copy
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Self
 
-from domains.clean_up_table import truth
-from domains.clean_up_table.items import CAN, CUP, Inventory, Item, new_item
-from domains.clean_up_table.places import OPERATOR, PLACES, SURFACES
-from domains.clean_up_table.results import Result
-from domains.clean_up_table.scene import scene
-from domains.clean_up_table.world_faults import ITEM_ADDED, ITEM_MOVED, Draw, FiredFault, WorldFaults
+from pydantic import TypeAdapter
+
+from domains.clean_up_table.items import (
+    CAN,
+    CUP,
+    EXTENTS,
+    HAND,
+    OPERATOR,
+    PLACES,
+    POSITIONS,
+    SURFACES,
+    Inventory,
+    Item,
+    new_item,
+)
+from domains.clean_up_table.observations import Result
+from domains.clean_up_table.world_faults import ITEM_ADDED, ITEM_MOVED, Draw, FiredFault, Left, WorldFaults, blame
 from dsc.chance import choose
 from knowledge_base.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+_COLUMNS = 10
+_LOWER_EDGE = 0.45  # metres from a place's centre to the robot in front of it
+_ITEMS, _FAULTS, _DONE = TypeAdapter(list[Item]), TypeAdapter(WorldFaults), TypeAdapter(dict[str, Result])
 _MOVES = {"table": "shelf", "shelf": "table"}
 
 
@@ -142,11 +155,18 @@ class Room:
         hidden behind one of these count too, and items in a carrier that is stuck in another one. Items that were
         thrown away, e.g. inside their carrier, do not count.
         """
-        return {item.name for item in self.items if truth.blame(item, self.items, self.faults)}
+        return {item.name for item in self.items if blame(item, self.items, self.faults)}
 
-    def left(self) -> list[truth.Left]:
+    def left(self) -> list[Left]:
         """Return the items that were ever on the table and are not in their destination, in order of addition."""
-        return truth.left(self.items, self.faults)
+        return [
+            Left(item.name, self._whereabouts(item), blame(item, self.items, self.faults))
+            for item in self.items
+            if item.on_table and not item.disposed
+        ]
+
+    def _whereabouts(self, item: Item) -> str:
+        return f"in {item.where}" if self.items.get(item.where) else item.where
 
     @property
     def goal_reached(self) -> bool:
@@ -154,7 +174,7 @@ class Room:
         return not self.left()
 
     def scene(self) -> list[dict[str, Any]]:
-        """Return the world drawn from above, see `scene.scene`."""
+        """Return the world drawn from above; see `scene`."""
         return scene(self.items, self.robot_at)
 
     # As data
@@ -163,12 +183,12 @@ class Room:
         """Return the whole state as JSON data; `from_state` restores it."""
         return {
             "robot_at": self.robot_at,
-            "items": [asdict(item) for item in self.items],
+            "items": _ITEMS.dump_python(list(self.items), mode="json"),
             "trips": self.trips,
             "said": list(self.said),
-            "faults": self.faults.to_json(),
+            "faults": _FAULTS.dump_python(self.faults, mode="json"),
             "departure": list(self.departure),
-            "done": {action_id: result.to_json() for action_id, result in self.done.items()},
+            "done": _DONE.dump_python(self.done, mode="json"),
         }
 
     @classmethod
@@ -189,12 +209,52 @@ class Room:
             InputError: this is not the state of a world.
         """
         try:
-            Room.__init__(self, (Item(**item) for item in state["items"]), robot_at=state["robot_at"])
+            Room.__init__(self, _ITEMS.validate_python(state["items"]), robot_at=state["robot_at"])
             self.trips = state["trips"]
             self.said = list(state["said"])
-            self.faults = WorldFaults.from_json(state["faults"])
+            self.faults = _FAULTS.validate_python(state["faults"])
             drive, place = state["departure"]
             self.departure = drive, place
-            self.done = {name: Result.from_json(data) for name, data in state["done"].items()}
+            self.done = _DONE.validate_python(state["done"])
         except (AttributeError, KeyError, TypeError, ValueError) as wrong:
             raise InputError(f"this is not the state of a clean-up-table world: {wrong!r}") from wrong
+
+
+def scene(items: Inventory, robot_at: str) -> list[dict[str, Any]]:
+    """Return every place, the robot and every item: `id, shape, x, y, label` in metres.
+
+    Places also have `width` and `depth`. An item inside another or in the hand has `in`, the id of its holder. An item
+    keeps its spot on a surface while others come and go.
+    """
+    places = [_place(name) for name in PLACES]
+    x, y = POSITIONS[robot_at]
+    robot = {"id": "robot", "shape": "robot", "x": x, "y": y - _LOWER_EDGE, "label": "robot"}
+    return [*places, robot, *(_item(item, slot, items, robot_at) for slot, item in enumerate(items))]
+
+
+def _place(name: str) -> dict[str, Any]:
+    (x, y), (width, depth) = POSITIONS[name], EXTENTS[name]
+    return {"id": name, "shape": name, "x": x, "y": y, "label": name, "width": width, "depth": depth}
+
+
+def _item(item: Item, slot: int, items: Inventory, robot_at: str) -> dict[str, Any]:
+    top = items.outermost(item)
+    top_slot = slot if top is item else list(items).index(top)
+    x, y = _spot(top.where, top_slot, len(items), robot_at)
+    drawn = {"id": item.name, "shape": item.kind, "x": x, "y": y, "label": item.name}
+    if item.where not in PLACES:
+        drawn["in"] = "robot" if item.where == HAND else item.where
+    return drawn
+
+
+def _spot(where: str, slot: int, count: int, robot_at: str) -> tuple[float, float]:
+    """Return the position of the item with that number, on a grid for all items."""
+    if where == HAND:
+        x, y = POSITIONS[robot_at]
+        return x, y - _LOWER_EDGE
+    (x, y), (width, depth) = POSITIONS[where], EXTENTS[where]
+    rows = -(-count // _COLUMNS)
+    column, row = slot % _COLUMNS, slot // _COLUMNS
+    across = (column + 0.5) / _COLUMNS - 0.5
+    along = (row + 0.5) / rows - 0.5
+    return round(x + across * width, 3), round(y + along * depth, 3)

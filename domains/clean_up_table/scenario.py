@@ -30,6 +30,8 @@ from domains.clean_up_table.items import (
     CAN,
     CRISP_CAN,
     CUP,
+    OPERATOR,
+    PLACES,
     SIZES,
     Inventory,
     Item,
@@ -37,7 +39,6 @@ from domains.clean_up_table.items import (
     check_name,
     new_item,
 )
-from domains.clean_up_table.places import OPERATOR, PLACES
 from domains.clean_up_table.table_world import TableWorld
 from dsc.model.reading import Form
 from dsc.text.form import read_model

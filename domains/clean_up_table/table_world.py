@@ -10,8 +10,8 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
 
-from domains.clean_up_table.places import DESTINATIONS, PLACES, SURFACES
-from domains.clean_up_table.results import Result, not_possible
+from domains.clean_up_table.items import DESTINATIONS, PLACES, SURFACES
+from domains.clean_up_table.observations import Result, not_possible
 from domains.clean_up_table.robot import RobotBody
 from domains.clean_up_table.world_faults import ITEM_SLIPPED, NOTHING_FOUND
 

@@ -7,14 +7,16 @@ fault.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dsc.chance import choose, uniform
 from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from domains.clean_up_table.items import Inventory, Item
 
 NOTHING_FOUND = "nothing_found"
 GRASP_FAILED = "grasp_failed"
@@ -68,26 +70,31 @@ class Draw:
     permanent: bool
 
 
+@dataclass
 class WorldFaults:
     """Draws faults and records them.
 
     Attributes:
+        seed: decides, with the action id, each draw.
+        chance: of a fault in a call.
         fired: every fault that happened, in order.
         ungraspable: items that can never be grasped, with the kind of fault.
         unrecognisable: items that the camera no longer finds.
         unreachable: destinations without a path from now on.
+        in_a_row: number of consecutive failures of each effort.
     """
 
-    def __init__(self, seed: int = 0, chance: float = 0.0) -> None:
-        if not 0.0 <= chance <= 1.0:
-            raise InputError(f"the chance of a fault is between 0 and 1, not {chance}", found=str(chance))
-        self.seed = seed
-        self.chance = chance
-        self.fired: list[FiredFault] = []
-        self.ungraspable: dict[str, str] = {}
-        self.unrecognisable: list[str] = []
-        self.unreachable: list[str] = []
-        self._in_a_row: dict[str, int] = {}
+    seed: int = 0
+    chance: float = 0.0
+    fired: list[FiredFault] = field(default_factory=list)
+    ungraspable: dict[str, str] = field(default_factory=dict)
+    unrecognisable: list[str] = field(default_factory=list)
+    unreachable: list[str] = field(default_factory=list)
+    in_a_row: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.chance <= 1.0:
+            raise InputError(f"the chance of a fault is between 0 and 1, not {self.chance}", found=str(self.chance))
 
     def draw(self, action_id: str, possible: Mapping[str, bool]) -> Draw | None:
         """Return the fault of this call, or `None`.
@@ -112,37 +119,56 @@ class WorldFaults:
 
     def may_fail(self, effort: str, subject: str) -> bool:
         """Return whether another transient fault may hit this effort (e.g. `grasp` of `cup1`)."""
-        return self._in_a_row.get(f"{effort} {subject}", 0) < IN_A_ROW
+        return self.in_a_row.get(f"{effort} {subject}", 0) < IN_A_ROW
 
     def failed(self, effort: str, subject: str) -> int:
         """Count a failure; return the number of consecutive failures."""
         key = f"{effort} {subject}"
-        self._in_a_row[key] = self._in_a_row.get(key, 0) + 1
-        return self._in_a_row[key]
+        self.in_a_row[key] = self.in_a_row.get(key, 0) + 1
+        return self.in_a_row[key]
 
     def passed(self, effort: str, subject: str) -> None:
         """Count a success, which ends a sequence of failures."""
-        self._in_a_row.pop(f"{effort} {subject}", None)
+        self.in_a_row.pop(f"{effort} {subject}", None)
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain JSON data."""
-        return {
-            "seed": self.seed,
-            "chance": self.chance,
-            "fired": [{**asdict(fault), "items": list(fault.items)} for fault in self.fired],
-            "ungraspable": dict(self.ungraspable),
-            "unrecognisable": list(self.unrecognisable),
-            "unreachable": list(self.unreachable),
-            "in_a_row": dict(self._in_a_row),
-        }
 
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> WorldFaults:
-        """Return the faults of a form; the inverse of `to_json`."""
-        faults = cls(data["seed"], data["chance"])
-        faults.fired = [FiredFault(**{**fault, "items": tuple(fault["items"])}) for fault in data["fired"]]
-        faults.ungraspable = dict(data["ungraspable"])
-        faults.unrecognisable = list(data["unrecognisable"])
-        faults.unreachable = list(data["unreachable"])
-        faults._in_a_row = dict(data["in_a_row"])
-        return faults
+_REASONS = {GRASP_FAILED: "every grasp of it fails", NO_INVERSE_KINEMATICS: "the arm cannot reach it"}
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """An item that was on the table and is not in its destination.
+
+    Attributes:
+        item: its name.
+        where: the surface it lies on, `hand`, or `in CARRIER`.
+        reason: the permanent fault that keeps it from its destination; `None` without one.
+    """
+
+    item: str
+    where: str
+    reason: str | None
+
+
+def blame(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
+    """Return the permanent fault that keeps an item from its destination, in words, or `None`."""
+    if item.disposed:
+        return None
+    if item.name in faults.ungraspable:
+        return _REASONS[faults.ungraspable[item.name]]
+    if item.name in faults.unrecognisable:
+        return "it cannot be recognised"
+    if item.destination in faults.unreachable:
+        return f"no path leads to the {item.destination}"
+    if items.hidden(item) and item.behind and blame(items[item.behind], items, faults):
+        return f"it is hidden behind {item.behind}"
+    return _stuck(item, items, faults)
+
+
+def _stuck(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
+    """Return why a carrier cannot release an item: the arm unloads carriers on a surface only."""
+    carrier = items.get(item.where)
+    outer = items.get(carrier.where) if carrier else None
+    if carrier and outer and blame(carrier, items, faults) and blame(outer, items, faults):
+        return f"it is in {carrier.name}, which is stuck in {outer.name}"
+    return None

@@ -5,6 +5,101 @@ The commands import their modules inside the function, so that `dsc --help` stay
 
 from __future__ import annotations
 
-from planning.cli.commands import bundles_command as bundles_command
-from planning.cli.commands import doctor_command as doctor_command
-from planning.cli.commands import plan_command as plan_command
+import json
+import sys
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from planning.cli.solving import plan_command as plan_command
+
+if TYPE_CHECKING:
+    from planning.bundles import Bundle
+
+
+def bundles_command(
+    name: Annotated[str | None, typer.Argument(help="Only this bundle, with its content.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Show the bundles of the installed packages: components, plots and planning actions to build a robot of."""
+    from knowledge_base.errors import UnknownNameError
+    from planning.bundles import GROUP, installed
+
+    found = installed()
+    if name is not None and name not in found:
+        raise UnknownNameError(f"there is no bundle '{name}'", found=name, valid=found)
+    shown = list(found.values()) if name is None else [found[name]]
+    if as_json:
+        said = [bundle.to_json() for bundle in shown]
+        typer.echo(json.dumps(said if name is None else said[0]))
+    elif not shown:
+        typer.echo(f"no installed package has bundles (entry points '{GROUP}')")
+    elif name is None:
+        width = max(map(len, found))
+        for bundle in shown:
+            typer.echo(f"{bundle.name:<{width}}  {bundle.about or _counted(bundle)}")
+    else:
+        typer.echo("\n".join(_lines(shown[0].to_json())))
+
+
+def _counted(bundle: Bundle) -> str:
+    return f"plots: {len(bundle.primitive)} primitive, {len(bundle.abstract)} abstract"
+
+
+def _lines(said: dict[str, Any]) -> list[str]:
+    about = f": {said['about']}" if said["about"] else ""
+    lines = [f"{said['name']}{about}"]
+    lines += [f"component {name}: {', '.join(skills) or 'no skills'}" for name, skills in said["components"].items()]
+    for what, title in (
+        ("primitive", "primitive plots"), ("abstract", "abstract plots"), ("actions", "planning actions"),
+        ("needs", "needs"),
+    ):  # fmt: skip
+        if said[what]:
+            lines.append(f"{title}: {', '.join(said[what])}")
+    return lines
+
+
+PIPE_WIDTH = 120
+"""Columns of a table that is not printed on a terminal."""
+
+EVERY_ENGINE = (
+    "Negative conditions, disjunctions, quantifiers, conditional effects and derived predicates are compiled away,"
+    " so that every engine can do them."
+)
+
+
+def doctor_command(
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Show which planning engines there are, what each can do, and how to install what is missing."""
+    from planning.engines.installed import findings
+
+    found = findings()
+    if as_json:
+        typer.echo(json.dumps(found))
+        return
+    from rich.console import Console
+
+    console = Console(width=None if sys.stdout.isatty() else PIPE_WIDTH)
+    console.print(_engine_table(found["engines"]))
+    for one in found["engines"]:
+        if not one["ready"]:
+            console.print(f"  {one['name']}: {one['to_do']}", markup=False, highlight=False)
+    console.print(EVERY_ENGINE, highlight=False)
+    versions = {"Python": found["python"], "Java": found["java"], **found["packages"]}
+    said = ", ".join(f"{name} {version or '(none)'}" for name, version in versions.items())
+    console.print(f"\n{said}; {found['system']}", markup=False, highlight=False)
+
+
+def _engine_table(engines: list[dict[str, Any]]) -> Any:
+    from rich.table import Table
+
+    table = Table(title="planning engines", title_justify="left")
+    for head in ("engine", "version", "can do", "plans", "by itself", "licence"):
+        table.add_column(head, overflow="fold")
+    for one in engines:
+        plans = "the cheapest" if one["optimal"] else "better and better" if one["anytime"] else "one"
+        version = one["version"] or "missing" if one["ready"] else "[yellow]missing[/]"
+        races = "races" if one["races"] else "by name only"
+        table.add_row(one["name"], version, ", ".join(one["can_do"]), plans, races, one["licence"])
+    return table

@@ -1,4 +1,4 @@
-"""The work of `dsc plan`: read files, plan, wait for a cheaper plan, explain why there is none."""
+"""Command `dsc plan`: read files, plan, wait for a cheaper plan, explain why there is none."""
 
 from __future__ import annotations
 
@@ -6,19 +6,109 @@ import sys
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from planning.cli.plan_report import TIMED_OUT, answer_of, end, ordered, purposes, valueless, without_derived
 
 if TYPE_CHECKING:
+    from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.pddl import ProblemText
     from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
     from planning.engines.planner import PlannerProcess
     from planning.engines.race import PlannerRace
-    from planning.plan import PlanningOutcome
+    from planning.ordering.partial_order import PartialOrder
+    from planning.plan import Plan, PlanningOutcome
     from planning.strips import Problem
 
+PLOT_NAME = "plan"
 PATIENCE, PATIENT_SECONDS = 3.0, 2.0
 """The wait for a cheaper plan: a factor on the time of the first one, and the minimum in seconds."""
+
+
+def plan_command(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DOMAIN... PROBLEM", help="PDDL: the domain, in one file or several, and the problem.",
+            show_default=False,
+        ),
+    ],
+    engine: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The engine.  [default: a race of those that suit the problem]")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Stop after this number of seconds.")] = 10.0,
+    parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can run concurrently.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete; - is standard output.")
+    ] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Explain each step's purpose, or why there is no plan.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:  # fmt: skip
+    """Find a plan and print its steps.
+
+    Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
+    """
+    from knowledge_base.output_files import Output
+    from planning.cancellable_work import WorkLimitError
+    from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
+    from planning.problem.constructs import why_no_engine
+
+    output = None if plot is None else Output(plot, "--plot", *files)
+    domain, read, world = read_files(files)
+    notes = [*domain.notes, *read.notes]
+    try:
+        problem, outcome = solved(domain, read, world, seconds, engine)
+    except WorkLimitError as error:
+        late: dict[str, Any] = {"outcome": "timed_out", "steps": [], "engine": None, "seconds": seconds}
+        end(TIMED_OUT, late | {"while": error.doing}, notes, as_json=as_json)
+    notes += problem.notes
+    status, answer = answer_of(outcome)
+    if isinstance(outcome, NobodyCan):
+        answer["reason"] = why_no_engine(domain, read.goal, outcome)
+    if isinstance(outcome, ProvenUnsolvable) and explain:
+        answer["why"] = why_none(domain, read, world, seconds)
+    if isinstance(outcome, PlanFound):
+        plan = outcome.plan
+        notes += valueless(plan, domain, read)
+        order = _order(plan, domain, world, read.goal)
+        notes += _untraced(domain) if parallel or explain or plot else []
+        answer |= ordered(order) if parallel else {}
+        answer |= purposes(order) if explain else {}
+        if output is not None:
+            output.write(_plot_text(outcome.plan, domain, order if parallel else None))
+    end(status, answer, notes, as_json=as_json)
+
+
+def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expression) -> PartialOrder:
+    from planning.ordering.partial_order import deordered, in_sequence
+    from planning.ordering.timed_links import linked
+    from planning.problem.axioms import Derivable
+
+    if Derivable.of(domain) is not None:
+        return in_sequence(plan)
+    return (linked if plan.schedule else deordered)(plan, domain, world, goal)
+
+
+def _untraced(domain: PlanningDomain) -> list[str]:
+    """Return a note if plans are only for display."""
+    from planning.problem.axioms import Derivable
+
+    form = Derivable.of(domain)
+    names = ", ".join(f"'{one}'" for one in sorted(form.predicates)) if form else ""
+    why = "planning actions change what it follows from, itself included"
+    return [f"{names}: {why}, so causal links are not traced, and no robot can execute the plan"] if form else []
+
+
+def _plot_text(plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> str:
+    from dsc.text.plot_files import plot_to_yaml
+    from planning.generation.plan_to_plot import plot_from_plan
+
+    return plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))
 
 
 def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, KnowledgeBase]:
@@ -30,7 +120,6 @@ def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, Knowledg
     from knowledge_base.errors import InputError, Place
     from knowledge_base.pddl import read_problem
     from knowledge_base.store import KnowledgeBase
-    from planning.cli.plan_report import without_derived
     from planning.domain import PlanningDomain
 
     if len(files) < 2:

@@ -21,7 +21,7 @@ from planning.planning_actions import PlanningAction
 from planning.problem.construction import build_problem
 from planning.problem.derived import denied, derivation
 from planning.problem.relevance import name_of, names_of, relevant
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator

@@ -37,7 +37,7 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.text import to_text
 from planning.cancellable_work import WorkLimit
 from planning.quantities import OPPOSITE, Assignment, NumericBound, Quantity, combined
-from planning.unsupported import UnsupportedActionError
+from planning.strips import UnsupportedActionError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

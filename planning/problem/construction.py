@@ -36,8 +36,7 @@ from planning.problem.relevance import Relevant, names_of, relevant
 from planning.problem.symmetry import spared
 from planning.problem.temporal import build_temporal_problem, durative
 from planning.quantities import NumericBound
-from planning.strips import Problem
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import Problem, UnsupportedActionError, UnsupportedGoalError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -10,7 +10,7 @@ from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Ex
 from knowledge_base.language.syntax.text import to_text
 from planning.problem.derived import derivation
 from planning.problem.relevance import changed, names_of, relevant
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator

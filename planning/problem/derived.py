@@ -35,7 +35,7 @@ from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.world.overlay import Overlay
 from planning.problem.relevance import changed, names_of
 from planning.problem.rewriting import instantiated, rewritten, type_test
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator

@@ -21,7 +21,7 @@ from planning.problem.conditions import (
     negation,
 )
 from planning.quantities import Assignment, combined, fluents
-from planning.unsupported import UnsupportedActionError
+from planning.strips import UnsupportedActionError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -24,8 +24,7 @@ from planning.problem.operators import GroundOperator, OperatorCache, OperatorIn
 from planning.problem.reduction import Task
 from planning.problem.relaxed_reachability import reachable
 from planning.problem.relevance import changed, relevant
-from planning.strips import ActionSpan, GroundAction, Problem
-from planning.unsupported import UnsupportedActionError
+from planning.strips import ActionSpan, GroundAction, Problem, UnsupportedActionError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

@@ -45,7 +45,7 @@ from planning.plan import (
 )
 from planning.problem.construction import build_problem
 from planning.problem.constructs import why_no_engine
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 PAGE = Path(__file__).parents[2] / "docs" / "pddl.md"
 TEST_FOLDER = Path(unified_planning.test.__path__[0])

@@ -6,7 +6,8 @@ import asyncio
 import json
 from typing import TYPE_CHECKING
 
-from domains.clean_up_table.components import Arm, Base, Camera, Voice, initial_knowledge
+from domains.clean_up_table.components import Arm, Base, Camera, Voice
+from domains.clean_up_table.observations import initial_knowledge
 from dsc.calls import Outcome, SkillCall
 from knowledge_base.facts import Delta, Fact, fact
 
@@ -40,7 +41,7 @@ class Robot:
         self.types: dict[str, str] = dict.fromkeys(("none", "one", "two"), "room")
         self.components = [Base(world), Arm(world), Camera(world), Voice(world)]
         self.calls = 0
-        self.learn(initial_knowledge(world))
+        self.learn(initial_knowledge(world.robot_at))
 
     def learn(self, delta: Delta) -> None:
         self.types |= delta.nodes

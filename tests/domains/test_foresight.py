@@ -21,7 +21,7 @@ def step(text):
 def seen(world):
     """The world, driven to its table, and what the robot believes after a look at it."""
     kb = KnowledgeBase(DOMAIN.schema)
-    kb.apply(initial_knowledge(world), "test")
+    kb.apply(initial_knowledge(world.robot_at), "test")
     for result in (world.drive("a", "table"), world.recognise("b", "table")):
         kb.apply(learned(result), "test")
     return kb

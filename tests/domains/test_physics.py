@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_table import NAMES, make_world
 
-from domains.clean_up_table.items import HAND
-from domains.clean_up_table.places import DESTINATIONS, PLACES, SURFACES
+from domains.clean_up_table.items import DESTINATIONS, HAND, PLACES, SURFACES
 from domains.clean_up_table.table_world import TableWorld
 
 items = st.sampled_from([*NAMES, "cup4", "can3", "ghost"])

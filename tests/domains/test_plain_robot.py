@@ -11,8 +11,7 @@ import pytest
 from reporting_robot import Robot, believes_the_truth
 
 import domains.clean_up_table
-from domains.clean_up_table.items import DESTINATION_OF
-from domains.clean_up_table.places import SURFACES
+from domains.clean_up_table.items import DESTINATION_OF, SURFACES
 from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.world_faults import KINDS, NO_PATH, NOTHING_FOUND
 from knowledge_base.facts import fact

@@ -5,8 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from domains.progress import LiveProgress, PlainProgress
-from domains.tally import Tally
+from domains.progress import LiveProgress, PlainProgress, Tally
 from dsc.trace import Record
 
 

@@ -7,8 +7,7 @@ import json
 import pytest
 from small_table import NAMES, make_world
 
-from domains.clean_up_table.items import HAND, new_item
-from domains.clean_up_table.places import OPERATOR, PLACES
+from domains.clean_up_table.items import HAND, OPERATOR, PLACES, new_item
 from domains.clean_up_table.table_world import TableWorld
 from knowledge_base.errors import InputError
 

@@ -19,7 +19,7 @@ from planning.explanation.unsolvability import why_unsolvable
 from planning.plan import PlanStep
 from planning.problem.axioms import Derivable
 from planning.problem.derived import derivation
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 
 ROOMS, DOORS = "abc", (("a", "b"), ("b", "c"))

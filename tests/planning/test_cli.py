@@ -174,7 +174,7 @@ def test_the_doctor_lists_every_engine_with_what_it_can_do_and_what_it_lacks(mon
 
 
 def test_the_doctor_fits_a_terminal_of_100_columns(monkeypatch):
-    monkeypatch.setattr("planning.cli.commands.PIPE_WIDTH", 100)
+    monkeypatch.setattr("planning.cli.PIPE_WIDTH", 100)
     app = typer.Typer()
     app.command()(doctor_command)
     lines = CliRunner().invoke(app, [], catch_exceptions=False).stdout.splitlines()

@@ -17,7 +17,7 @@ from planning.explanation.unsolvability import why_unsolvable
 from planning.plan import Plan, PlanStep
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 
 ROOMS = """(define (domain rooms) (:types room robot thing)

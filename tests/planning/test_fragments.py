@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, SchemaError, SchemaMismatchError, fact
 from planning import Executive, PlanningDomain
-from planning.fragments import shipped_by
+from planning.bundles import shipped_by
 
 WORLD = """(define (domain kitchen) (:types item place)
   (:predicates (at ?i - item ?p - place)) (:constants home - place))"""

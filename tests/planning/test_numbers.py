@@ -18,7 +18,7 @@ from planning.explanation.unsolvability import why_unsolvable
 from planning.plan import PlanStep
 from planning.problem.construction import build_problem
 from planning.quantities import Assignment, NumericBound, Operation, linear, text
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 
 JARS = """(define (domain jars)

@@ -6,7 +6,7 @@ from knowledge_base import fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning.domain import PlanningDomain
 from planning.problem.construction import build_problem
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 PAINTING = """(define (domain painting) (:types thing place)
   (:predicates (at ?p - place) (touched ?t - thing) (known ?l - text) (seen ?t - thing))

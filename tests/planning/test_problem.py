@@ -23,7 +23,7 @@ from planning.plan import PlanStep
 from planning.problem.conditions import Grounder
 from planning.problem.construction import ProblemBuilder, build_problem
 from planning.problem.grounding import variants
-from planning.unsupported import UnsupportedActionError, UnsupportedGoalError
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 from planning.validation import validate
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
