@@ -133,7 +133,7 @@ def run(
     """Run a ready world. Exit status: 0 goal reached, 1 something is left (the report says what and why)."""
     from domains.clean_up_table.deployment import PROFILES, deploy, resumed
     from domains.clean_up_table.scenario import Scenario
-    from dsc.text.profile_files import find_profile
+    from dsc.text.profiles import find_profile
     from dsc.trace import BEGINS
     from knowledge_base.errors import InputError, UnknownNameError
     from knowledge_base.output_files import Output

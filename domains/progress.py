@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from dsc.dynamic.candidate_selection import ACHIEVE
+from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.trace import Record
 
 _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {

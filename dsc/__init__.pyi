@@ -27,7 +27,6 @@ from dsc.errors import RunawayError as RunawayError
 from dsc.errors import UncertainActionError as UncertainActionError
 from dsc.events import Event as Event
 from dsc.model.plot import ActionPlot as ActionPlot
-from dsc.model.profile import Profile as Profile
 from dsc.profiles import configure as configure
 from dsc.reflection import MODELS as MODELS
 from dsc.reflection import design_facts as design_facts
@@ -47,9 +46,10 @@ from dsc.text.cloning import cloned_profile as cloned_profile
 from dsc.text.plot_files import load_library as load_library
 from dsc.text.plot_files import load_plot as load_plot
 from dsc.text.plot_files import parse_plot as parse_plot
-from dsc.text.profile_files import find_profile as find_profile
-from dsc.text.profile_files import load_profile as load_profile
-from dsc.text.profile_files import parse_profile as parse_profile
+from dsc.text.profiles import Profile as Profile
+from dsc.text.profiles import find_profile as find_profile
+from dsc.text.profiles import load_profile as load_profile
+from dsc.text.profiles import parse_profile as parse_profile
 from dsc.trace import Record as Record
 from dsc.trace import Trace as Trace
 from dsc.validation import validate_library as validate_library

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dsc.components.component import Component
 from dsc.components.parameters import changed, check_relations, known, require_bound
 from dsc.model.plot import ActionPlot
-from dsc.model.profile import Profile
 from dsc.model.ranges import refuse_change
+from dsc.text.profiles import Profile
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Value
 
@@ -61,14 +61,14 @@ def _configured(component: Component, profile: Profile | None) -> dict[str, Valu
             declared.check(f"{component.name}.{parameter}", value)
             refuse_change(f"{component.name}.{parameter}", "profile", declared.changed_by)
         except InputError as error:
-            error.place = None if profile is None else profile.place("components", component.name, parameter)
+            error.place = None if profile is None else profile.place(("components", component.name, parameter))
             raise
     try:
         values = changed(component.name, component.declares, component.parameters, settings)
         require_bound(component.name, component.declares, values)
         check_relations(component.name, component.relations, values)
     except InputError as error:
-        error.place = None if profile is None else profile.place("components", component.name)
+        error.place = None if profile is None else profile.place(("components", component.name))
         raise
     return values
 
@@ -78,12 +78,12 @@ def _adapted(plot: ActionPlot, profile: Profile) -> ActionPlot:
         try:
             plot = plot.with_default(name, value, "profile")
         except InputError as error:
-            error.place = profile.place("plots", plot.name, name)
+            error.place = profile.place(("plots", plot.name, name))
             raise
     return plot
 
 
 def _unknown(profile: Profile | None, group: str, kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:
     error = UnknownNameError(f"there is no {kind} '{name}'", found=name, valid=valid)
-    error.place = None if profile is None else profile.place(group, name)
+    error.place = None if profile is None else profile.place((group, name))
     return error

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from dsc.components.component import Component
 from dsc.components.robot import require_deployed, require_instances
 from dsc.components.streams import require_wired
-from dsc.dynamic.candidate_selection import ACHIEVE
+from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget

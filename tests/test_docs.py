@@ -15,7 +15,7 @@ import pytest
 from domains.clean_up_table import Scenario
 from dsc import load_library, load_plot, parse_plot
 from dsc.drawing import draw
-from dsc.text.profile_files import parse_profile
+from dsc.text.profiles import parse_profile
 
 ROOT = Path(__file__).parent.parent
 GUIDE = ROOT / "CONTRIBUTING.md"

@@ -22,11 +22,11 @@ from domains.progress import Tally
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
-from dsc.model.profile import Profile
 from dsc.profiles import adapted, configure
 from dsc.runs.archive import archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.text.plot_files import load_library
+from dsc.text.profiles import Profile
 from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError, Place, StoreError, UnknownNameError
 from knowledge_base.journal.file import Durability
@@ -230,7 +230,7 @@ def robot(profile: Profile | None) -> Callable[[TableWorld], list[Component]]:
     """
     name = "on_wheels" if profile is None or profile.robot is None else profile.robot
     if name not in ROBOTS:
-        place = None if profile is None else profile.place("robot")
+        place = None if profile is None else profile.place(("robot",))
         raise UnknownNameError(f"there is no robot '{name}'", place=place, found=name, valid=ROBOTS)
     return ROBOTS[name]
 

@@ -41,9 +41,7 @@ from domains.clean_up_table.items import (
 )
 from domains.clean_up_table.table_world import TableWorld
 from dsc.model.reading import Form
-from dsc.text.form import read_model
-from dsc.text.text_files import read_file
-from dsc.text.yaml import load_document
+from dsc.text.yaml import load_document, read_file, read_model
 from knowledge_base.errors import InputError, Place, UnknownNameError
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dsc.dynamic.library import Library
     from dsc.errors import Finding
     from dsc.model.plot import ActionPlot
-    from dsc.text.plot_folder import Neighbours
+    from dsc.text.plot_files import Neighbours
     from knowledge_base.errors import InputError
     from knowledge_base.world.schema import Schema
 
@@ -63,7 +63,7 @@ def check(
     A plot may use the other plots in its folder. Exit status: 0 nothing found, or warnings alone, 2 findings.
     """
     from dsc.components.robot import robot_of
-    from dsc.text.plot_folder import Neighbours
+    from dsc.text.plot_files import Neighbours
 
     neighbours = Neighbours()
     components = None if robot is None else robot_of(robot)
@@ -126,7 +126,7 @@ def import_(
     from dsc.dynamic.library import Library
     from dsc.scxml.reader import parse_scxml
     from dsc.text.plot_files import plot_to_yaml
-    from dsc.text.text_files import read_file
+    from dsc.text.yaml import read_file
     from dsc.validation import raise_findings, validate_plot
     from knowledge_base.output_files import Output
 
@@ -223,8 +223,8 @@ def schema(
     profile: Annotated[bool, typer.Option("--profile", help="That of profiles instead.")] = False,
 ) -> None:
     """Print the JSON Schema of plot files, for editors."""
-    from dsc.text.json_schema import json_schema
-    from dsc.text.profile_files import profile_schema
+    from dsc.text.plot_files import json_schema
+    from dsc.text.profiles import profile_schema
 
     _print_json(profile_schema() if profile else json_schema())
 
@@ -255,13 +255,13 @@ def _load(file: Path) -> ActionPlot:
     """A plot, whose file says by its name if it is a chart in SCXML."""
     from dsc.scxml.reader import parse_scxml
     from dsc.text.plot_files import load_plot
-    from dsc.text.text_files import read_file
+    from dsc.text.yaml import read_file
 
     return parse_scxml(read_file(file), str(file)) if file.suffix == ".scxml" else load_plot(file)
 
 
 def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
-    from dsc.text.plot_folder import Neighbours
+    from dsc.text.plot_files import Neighbours
 
     return Neighbours().of(file, plot)
 

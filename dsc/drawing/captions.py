@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from dsc.drawing.layout import TextStyle
-from dsc.drawing.measure import pack
+from dsc.drawing.layout import TextStyle, pack
 from dsc.events import TIMERS
 from dsc.model.actions import (
     Assign,
@@ -23,9 +22,8 @@ from dsc.model.actions import (
     Trigger,
     Withdraw,
 )
-from dsc.model.connectors import CHOICE, SelectState, case_value
 from dsc.model.states import State
-from dsc.model.transitions import TimedTransition, Transition, TransitionSource
+from dsc.model.transitions import CHOICE, SelectState, TimedTransition, Transition, TransitionSource, case_value
 from knowledge_base.language.syntax.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.spelling import value_text

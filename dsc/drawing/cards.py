@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dsc.drawing.captions import action_text, block_texts, captions, content_text, labelled, seconds_text
-from dsc.drawing.layout import Box, BoxKind, Text, TextStyle
-from dsc.drawing.measure import LINE_HEIGHT, shorten, text_width
+from dsc.drawing.layout import LINE_HEIGHT, Box, BoxKind, Text, TextStyle, shorten, text_width
 from dsc.dynamic.library import Library
-from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, FinalState, HistoryState, State, SubmachineState
+from dsc.model.transitions import Connector, SelectState
 from knowledge_base.language.syntax.expression import Term
 from knowledge_base.language.syntax.text import to_text
 

@@ -8,9 +8,8 @@ from itertools import pairwise
 from math import inf
 
 from dsc.drawing.layered.arrange import without_detours
-from dsc.drawing.layout import Area, Box, BoxKind, DrawnEdge, Point, Text
+from dsc.drawing.layout import Area, Box, BoxKind, DrawnEdge, Point, Text, text_width
 from dsc.drawing.maze import Maze
-from dsc.drawing.measure import text_width
 
 ROUND = frozenset({BoxKind.FINAL, BoxKind.HISTORY})
 """Cards with a circle inside; edges end at the circle."""

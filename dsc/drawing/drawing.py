@@ -8,13 +8,11 @@ from typing import Literal
 
 from dsc.drawing.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card
 from dsc.drawing.crossing import join, way_to
-from dsc.drawing.edges import EdgeBundle, bundles, initial_bundle
 from dsc.drawing.header import handler_text, header, rule_text, rules_note
 from dsc.drawing.layout import Box, BoxKind, Text, TextStyle
-from dsc.drawing.scopes import Inside, ScopeNesting, ScopeSpan, arranged, widened
+from dsc.drawing.scopes import EdgeBundle, Inside, ScopeNesting, ScopeSpan, arranged, bundles, initial_bundle, widened
 from dsc.drawing.svg import NO_MARKS, to_svg
 from dsc.dynamic.library import Library
-from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path, Scope, initial_of
 from dsc.model.states import (
     AnyState,
@@ -26,6 +24,7 @@ from dsc.model.states import (
     Region,
     State,
 )
+from dsc.model.transitions import Connector
 from knowledge_base.errors import UnknownNameError
 
 PAD = 16.0

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from dsc.drawing.captions import action_text, content_text
-from dsc.drawing.layout import Box, BoxKind, Text, TextStyle
-from dsc.drawing.measure import LINE_HEIGHT, pack, shorten, text_width
+from dsc.drawing.layout import LINE_HEIGHT, Box, BoxKind, Text, TextStyle, pack, shorten, text_width
 from dsc.model.plot import ActionPlot, PlotParameter, PlotVariable
 from dsc.model.rules import Handler, Rule
 from knowledge_base.language.syntax.text import to_text

@@ -8,8 +8,7 @@ from itertools import pairwise
 from math import hypot
 from types import MappingProxyType
 
-from dsc.drawing.layout import Box, BoxKind, DrawnEdge, Text
-from dsc.drawing.measure import BOLD, FONT_SIZES
+from dsc.drawing.layout import BOLD, FONT_SIZES, Box, BoxKind, DrawnEdge, Text
 from knowledge_base import svg
 
 MARGIN = 12.0

@@ -17,7 +17,6 @@ from dsc.drawing.captions import (
     seconds_text,
 )
 from dsc.drawing.header import facts, handler_text, rule_text, signature
-from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import (
     AnyState,
@@ -29,6 +28,7 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
+from dsc.model.transitions import Connector, SelectState
 from knowledge_base.language.syntax.text import to_text
 
 _SOFT, _RULE = "dim", "magenta"

@@ -13,16 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from dsc.dynamic.fresh_names import FreshNames
-from dsc.dynamic.plot_outcomes import Plots
-from dsc.dynamic.redirection import Way, redirected
-from dsc.dynamic.step_references import mentioned_in
+from dsc.dynamic.responses import FreshNames
+from dsc.dynamic.steps import Plots, mentioned_in
 from dsc.events import DONE, FAILURES
 from dsc.model.actions import Emit, Internal, Tell
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.rules import Handler
 from dsc.model.states import AnyState, CompositeState, FinalState, OrthogonalState, Region, State, SubmachineState
-from dsc.model.transitions import Transition
+from dsc.model.transitions import Transition, TransitionSource
 from knowledge_base.language.syntax.expression import Variable
 
 States = dict[str, AnyState]
@@ -135,16 +133,14 @@ def _ends(plot: ActionPlot) -> dict[str, FinalState]:
 
 def _inside(plot: ActionPlot, reached: Mapping[str, str]) -> States:
     """Return the plot's states as those of a region: its ends become final states of the region, with an event each."""
-
-    def to_region(way: Way) -> Way:
-        return way.model_copy(update={"target": reached.get(way.target or "", way.target)})
-
     inside: States = {}
     for name, state in plot.states.items():
         if isinstance(state, FinalState):
             inside[reached[name]] = FinalState(final=True, emit=reached[name], arguments=state.arguments)
+        elif isinstance(state, TransitionSource):
+            inside[name] = state.redirected(lambda way: {"target": reached.get(way.target or "", way.target)})
         else:
-            inside[name] = redirected(state, to_region)
+            inside[name] = state
     return inside
 
 

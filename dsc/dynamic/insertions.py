@@ -10,18 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from dsc.dynamic.fresh_names import FreshNames
-from dsc.dynamic.plot_outcomes import Plots
-from dsc.dynamic.redirection import Redirect, Way, redirected
-from dsc.dynamic.responses import Responses, States
-from dsc.dynamic.step_references import Step, about_step, concerns
+from dsc.dynamic.responses import FreshNames, Responses, States
+from dsc.dynamic.steps import Plots, Step, about_step, concerns
 from dsc.events import DONE
 from dsc.model.actions import Assign
-from dsc.model.connectors import ChoiceState
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, ENTER, Rule
 from dsc.model.states import AnyState, DynamicState, SubmachineState
-from dsc.model.transitions import Transition
+from dsc.model.transitions import ChoiceState, Redirect, Transition, TransitionSource
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.syntax.expression import Term
 
@@ -64,7 +60,9 @@ class Insertions:
         while waiting:
             name = waiting.pop()
             more: States = {}
-            result[name] = redirected(result[name], self._redirection(name, more))
+            state = result[name]
+            if isinstance(state, TransitionSource):
+                result[name] = state.redirected(self._redirection(name, more))
             result.update(more)
             waiting += more
         return _in_order(result, states)
@@ -96,12 +94,12 @@ class Insertions:
         return str(first.target)
 
     def _redirection(self, source: str, more: States) -> Redirect:
-        def redirect(way: Way) -> Way:
+        def redirect(way: Transition) -> Mapping[str, object]:
             target = way.target
             if target not in self.entrances or self._leading.get(source) == target:
-                return way
+                return {}
             if not way.passed:
-                return way.model_copy(update={"target": self.entrances[target]})
+                return {"target": self.entrances[target]}
             kept: dict[str, Term] = {}
             passed = self._responses.remembered(way.passed, target, kept)
             return _handing_over(way, self._in_front_of(target, passed, more), kept)
@@ -116,7 +114,7 @@ class Insertions:
         kept: dict[str, Term] = {}
         last = Transition(target=way.target, passed=self._responses.remembered(way.passed, mark, kept))
         first = self._chain(mark, name, state, rules, by_default, last, states)
-        return _handing_over(way, str(first.target), kept)
+        return way.model_copy(update=_handing_over(way, str(first.target), kept))
 
     def _chain(
         self, mark: str, name: str, state: Step, rules: list[tuple[int, Rule]], by_default: str, last: Transition,
@@ -151,13 +149,13 @@ class Insertions:
             )
 
 
-def _handing_over(way: Way, target: str, kept: Mapping[str, Term]) -> Way:
-    """Return the transition to another target, with its passed arguments kept in variables."""
+def _handing_over(way: Transition, target: str, kept: Mapping[str, Term]) -> dict[str, object]:
+    """Return the new fields of a transition to another target, with its passed arguments kept in variables."""
     if not kept:
-        return way.model_copy(update={"target": target})
+        return {"target": target}
     own = (Assign(assign=way.assign),) if way.assign else ()
     do = (*way.do, *own, Assign(assign=dict(kept)))
-    return way.model_copy(update={"target": target, "passed": {}, "assign": {}, "do": do})
+    return {"target": target, "passed": {}, "assign": {}, "do": do}
 
 
 def _in_order(result: States, states: Mapping[str, AnyState]) -> States:

@@ -1,17 +1,25 @@
-"""Situation of the engine on a knowledge base: one version plus the changes of the macrostep."""
+"""Situation of the engine on a knowledge base, and its choice of a dynamic state's content.
+
+The choice is made top-down among the candidates, and bottom-up by their conditions (S0.4).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-from dsc.dynamic.candidate_selection import choose, plain, scalars
 from dsc.dynamic.library import Library
-from dsc.engine.situation import Bindings, Decision
+from dsc.dynamic.steps import Plots
+from dsc.engine.situation import Bindings, Decision, Verdict
+from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState
-from knowledge_base.facts import Delta
+from knowledge_base.facts import Content, Delta
 from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds
+from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import Effect
-from knowledge_base.language.syntax.expression import Expression, Term
+from knowledge_base.language.syntax.expression import Constant, Expression, Term, substitute
+from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.overlay import Overlay
 
@@ -49,3 +57,68 @@ class KnowledgeSituation:
     def choose(self, state: DynamicState, holder: str, bindings: Bindings) -> Decision:
         """See `Situation`."""
         return choose(state, holder, bindings, self._world, self._library, self._version)
+
+
+ACHIEVE = "achieve"
+"""The library's plot for a goal without a fitting candidate: plan, execute, replan."""
+
+
+def choose(
+    state: DynamicState, holder: str, bindings: Mapping[str, Any], world: World, plots: Plots, version: int
+) -> Decision:
+    """Return the decision record for entering `state` in the plot named `holder`.
+
+    A goal that holds already needs no content. Otherwise the first candidate whose condition holds is chosen; with a
+    goal and no such candidate, `achieve`.
+
+    Raises:
+        UnknownNameError: a candidate is not in the library, or a variable has no value.
+    """
+    goal = None if state.goal is None else substitute(state.goal, scalars(bindings))
+    if goal is not None and holds(goal, world, {}):
+        return Decision(None, satisfied=True, version=version)
+    arguments = {name: plain(evaluate_term(term, world, bindings)) for name, term in state.arguments.items()}
+    chosen: str | None = None
+    chosen_arguments: dict[str, Any] = {}
+    verdicts = []
+    for name in state.dynamic:
+        plot = plots.plot(name)
+        own = {key: value for key, value in arguments.items() if key in plot.parameters}
+        verdict = judge(plot, own, world)
+        verdicts.append(verdict)
+        if verdict.fits and chosen is None:
+            chosen, chosen_arguments = name, own
+    if chosen is None and goal is not None:
+        chosen = ACHIEVE
+        budget = state.budget
+        chosen_arguments = {
+            "goal": to_text(goal), "holder": holder, "replans": budget.replans, "seconds": budget.seconds,
+        }  # fmt: skip
+    return Decision(chosen, chosen_arguments, verdicts=tuple(verdicts), version=version)
+
+
+def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdict:
+    """Return whether a candidate's condition holds for these arguments, with the leaf that decides."""
+    if plot.when is None:
+        return Verdict(plot.name, fits=True, reason="no condition")
+    bindings = {**_defaults(plot), **arguments}
+    why = explain(plot.when, world, scalars(bindings))
+    return Verdict(plot.name, fits=why.truth, reason=str(why.deciding), explanation=why.to_json())
+
+
+def _defaults(plot: ActionPlot) -> dict[str, Any]:
+    return {
+        name: parameter.default.value
+        for name, parameter in plot.parameters.items()
+        if isinstance(parameter.default, Constant)
+    }
+
+
+def plain(content: Content) -> Any:
+    """Return the content as a value for a chart's variable: plain JSON, with a geometry as a list of numbers."""
+    return list(content) if isinstance(content, tuple) else content
+
+
+def scalars(bindings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the bindings that a condition can use; drop plots and other structures held in variables."""
+    return {name: value for name, value in bindings.items() if isinstance(value, str | int | float | bool)}

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, MutableMapping, Sequence
 
 from dsc.dynamic.event_handlers import with_handlers
-from dsc.dynamic.fresh_names import FreshNames
 from dsc.dynamic.insertions import Insertions
-from dsc.dynamic.plot_outcomes import Plots, answerable
-from dsc.dynamic.responses import Responses, States, because, reason_of
-from dsc.dynamic.step_references import Step, about_step, answers_in_plans, concerns
+from dsc.dynamic.responses import FreshNames, Responses, States, because, reason_of
+from dsc.dynamic.steps import Plots, Step, about_step, answerable, answers_in_plans, concerns
 from dsc.events import DONE, GAVE_UP, NO_CANDIDATE
 from dsc.model.actions import Assign, Emit
 from dsc.model.plot import ActionPlot, Scope, initial_of

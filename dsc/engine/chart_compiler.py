@@ -7,10 +7,9 @@ from itertools import chain, combinations, islice
 from typing import Any
 
 from dsc.engine.tables import CompiledPlot, Default, StateNode, TimedEdge, TransitionEdge
-from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import AnyState, CompositeState, FinalState, HistoryState, OrthogonalState, Region, State
-from dsc.model.transitions import Transition
+from dsc.model.transitions import Connector, Transition
 from knowledge_base.errors import SchemaError, UnknownNameError
 
 

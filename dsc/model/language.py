@@ -10,12 +10,12 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import ConfigDict, Discriminator, PlainSerializer, PlainValidator, WithJsonSchema
+from pydantic import ConfigDict, Discriminator, PlainSerializer, PlainValidator, PrivateAttr, WithJsonSchema
 
-from dsc.model.reading import UNKNOWN_FORM, Form
-from knowledge_base.errors import InputError
+from dsc.model.reading import UNKNOWN_FORM, Form, FormPath
+from knowledge_base.errors import InputError, Place
 from knowledge_base.facts import Value
 from knowledge_base.language.syntax.effect import AllOf, Effect, check_depth
 from knowledge_base.language.syntax.expression import Constant, Expression, Term
@@ -33,6 +33,27 @@ class Frozen(Form):
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, arbitrary_types_allowed=True, allow_inf_nan=False
     )
+
+
+class Written(Frozen):
+    """Base of the values of whole files: remembers the places of its parts in the text it was read from."""
+
+    _places: Mapping[FormPath, Place] = PrivateAttr(default_factory=dict)
+
+    def written_at(self, places: Mapping[FormPath, Place]) -> Self:
+        """Return this value with the places of its parts."""
+        self._places = places
+        return self
+
+    def place(self, path: FormPath) -> Place | None:
+        """Return the place in the text of the part at `path`, or of the closest known part around it."""
+        known: FormPath = ()
+        for element in path:
+            if (*known, element) in self._places:
+                known = (*known, element)
+            elif not isinstance(element, int):  # the short form of a list has no position
+                break
+        return self._places.get(known)
 
 
 def by_key(*keys: str) -> Discriminator:

@@ -11,9 +11,9 @@ from typing import Any, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-from dsc.model.language import ConditionField, Frozen, Setting, TermField, constant
+from dsc.model.language import ConditionField, Frozen, Setting, TermField, Written, constant
 from dsc.model.ranges import Range, Who, refuse_change
-from dsc.model.reading import LOCATED
+from dsc.model.reading import LOCATED, FormPath
 from dsc.model.rules import Handler, Rule
 from dsc.model.states import (
     AnyState,
@@ -24,10 +24,10 @@ from dsc.model.states import (
     Region,
     SubmachineState,
 )
-from knowledge_base.errors import Place, UnknownNameError
+from knowledge_base.errors import UnknownNameError
 from knowledge_base.spelling import is_plain_name
 
-Path = tuple[str | int, ...]
+Path = FormPath
 """Path of a part in a plot's form, e.g. `("states", "look", "on", "recognised")`."""
 
 
@@ -83,7 +83,7 @@ class PlotVariable(Frozen):
         return {"type": value} if isinstance(value, str) else value
 
 
-class ActionPlot(Frozen):
+class ActionPlot(Written):
     """An action plot.
 
     Attributes:
@@ -124,7 +124,6 @@ class ActionPlot(Frozen):
     handlers: tuple[Handler, ...] = ()
     generated: bool = Field(default=False, strict=True)
     dialect: Literal["dsc", "scxml"] = "dsc"
-    _places: Mapping[Path, Place] = PrivateAttr(default_factory=dict)
     _text: str | None = PrivateAttr(default=None)
 
     def with_default(self, name: str, value: object, who: Who) -> ActionPlot:
@@ -140,21 +139,6 @@ class ActionPlot(Frozen):
         refuse_change(full, who, parameter.changed_by)
         changed = parameter.model_copy(update={"default": constant(parameter.range.check(full, value))})
         return self.model_copy(update={"parameters": {**self.parameters, name: changed}})
-
-    def written_at(self, places: Mapping[Path, Place]) -> ActionPlot:
-        """Return the plot with the places of its parts in the text it was read from."""
-        self._places = places
-        return self
-
-    def place(self, path: Path) -> Place | None:
-        """Return the place in the text of the part at `path`, or of the closest known part around it."""
-        known: Path = ()
-        for element in path:
-            if (*known, element) in self._places:
-                known = (*known, element)
-            elif not isinstance(element, int):  # the short form of a list has no position
-                break
-        return self._places.get(known)
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> ActionPlot:

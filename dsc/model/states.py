@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from dsc.model.actions import Action, InternalAction
-from dsc.model.connectors import ChoiceState, SelectState
 from dsc.model.language import ConditionField, Frozen, TermField
 from dsc.model.reading import FormPath
 from dsc.model.transitions import (
+    ChoiceState,
     CyclicTransitions,
     Duration,
+    Redirect,
+    SelectState,
     TimedTransitions,
     Transition,
     Transitions,
     TransitionSource,
     as_tuple,
+    redirected,
 )
 
 Actions = Annotated[tuple[Action, ...], BeforeValidator(as_tuple)]
@@ -65,6 +68,15 @@ class State(TransitionSource):
             yield ("every", number), "every", cyclic
         for number, transition in enumerate(self.always):
             yield ("always", number), "always", transition
+
+    def redirected(self, change: Redirect) -> Self:
+        """See `TransitionSource`."""
+        return self.model_copy(update={
+            "on": {event: redirected(ways, change) for event, ways in self.on.items()},
+            "after": redirected(self.after, change),
+            "every": redirected(self.every, change),
+            "always": redirected(self.always, change),
+        })  # fmt: skip
 
 
 class CompositeState(State):

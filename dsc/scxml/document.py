@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from dsc.text.text_files import check_size
+from dsc.text.yaml import check_size
 from knowledge_base.errors import ParseError, Place
 
 NAMESPACE = "http://www.w3.org/2005/07/scxml"

@@ -26,8 +26,7 @@ from dsc.scxml.ecmascript import condition
 from dsc.scxml.elements import STATES, check
 from dsc.scxml.executable_content import Form, actions, assigned, fired, needed, set_at_first, variable
 from dsc.scxml.value_kinds import BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, Scope, work_out
-from dsc.text.form import read_model
-from dsc.text.yaml import Document
+from dsc.text.yaml import Document, read_model
 from knowledge_base.errors import InputError, Place
 from knowledge_base.language.syntax.expression import Constant, Term, free_variables
 from knowledge_base.spelling import is_plain_name

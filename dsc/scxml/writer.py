@@ -9,7 +9,6 @@ from xml.etree import ElementTree as ET
 from dsc.engine.membership import asked_states
 from dsc.errors import NotExpressibleError
 from dsc.model.actions import Assign, Block, Choose, Emit, ExternalAction, Internal, Log, Withdraw
-from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.states import (
     AnyState,
@@ -22,10 +21,10 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from dsc.model.transitions import Transition
+from dsc.model.transitions import Connector, Transition
 from dsc.scxml.document import NAMESPACE
 from dsc.scxml.value_kinds import NO_VALUE
-from dsc.text.targets import require_targets
+from dsc.text.text_diagrams import require_targets
 from knowledge_base.language.syntax.expression import (
     ARITHMETIC,
     And,

@@ -10,17 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dsc.dynamic.candidate_selection import ACHIEVE
-from dsc.dynamic.library import Library
-from dsc.dynamic.substitution import require_stand_in
+from dsc.dynamic.knowledge_situation import ACHIEVE
+from dsc.dynamic.library import Library, require_stand_in
 from dsc.model.plot import ActionPlot
 from dsc.model.plot import Path as FormPath
-from dsc.model.profile import Profile
 from dsc.model.states import DynamicState
-from dsc.text.plot_files import load_plot, parse_plot, plot_to_yaml
-from dsc.text.plot_folder import Neighbours
-from dsc.text.profile_files import load_profile, profile_to_yaml
-from dsc.text.text_files import read_file
+from dsc.text.plot_files import Neighbours, load_plot, parse_plot, plot_to_yaml
+from dsc.text.profiles import Profile, load_profile, profile_to_yaml
+from dsc.text.yaml import read_file
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.output_files import Output, write_all
 

@@ -1,16 +1,18 @@
-"""Plot files: conversion between YAML and `ActionPlot`s."""
+"""Plot files: conversion between YAML and `ActionPlot`s, their JSON Schema, and related plots of a folder."""
 
 from __future__ import annotations
 
+import os
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from dsc.dynamic.library import Library
-from dsc.model.connectors import case_value
 from dsc.model.plot import ActionPlot
-from dsc.text.form import read_model
-from dsc.text.text_files import path_of, read_file
-from dsc.text.yaml import dump, load_document
+from dsc.model.states import DynamicState
+from dsc.model.transitions import case_value
+from dsc.text.yaml import dump, load_document, path_of, read_file, read_model
 from knowledge_base.errors import InputError, Place
 
 
@@ -47,67 +49,17 @@ def plot_to_yaml(plot: ActionPlot) -> str:
 
 
 _ORDER = (
-    "plot",
-    "about",
-    "generated",
-    "implements",
-    "effects",
-    "confirm",
-    "parameters",
-    "variables",
-    "outputs",
-    "receives",
-    "emits",
-    "seconds",
-    "set",
-    "switch",
-    "send",
-    "to",
-    "pass",
-    "before",
-    "when",
-    "of",
-    "interrupt",
-    "listen",
-    "trigger",
-    "use",
-    "dynamic",
-    "assign",
-    "tell",
-    "emit",
-    "command",
-    "with",
-    "as",
-    "within",
-    "goal",
-    "budget",
-    "clear",
-    "do",
-    "then",
-    "limit",
-    "rule",
-    "choice",
-    "select",
-    "cases",
-    "else",
-    "entry",
-    "at_least",
-    "initial",
-    "final",
-    "states",
-    "regions",
-    "on",
-    "after",
-    "every",
-    "always",
-    "exit",
-    "on_break",
-    "rules",
-    "handlers",
-)
+    "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs", "receives",
+    "emits", "seconds", "set", "switch", "send", "to", "pass", "before", "when", "of", "interrupt", "listen", "trigger",
+    "use", "dynamic", "assign", "tell", "emit", "command", "with", "as", "within", "goal", "budget", "clear", "do",
+    "then", "limit", "rule", "choice", "select", "cases", "else", "entry", "at_least", "initial", "final", "states",
+    "regions", "on", "after", "every", "always", "exit", "on_break", "rules", "handlers",
+)  # fmt: skip
+"""Keys in reading order."""
 _SINGLE = frozenset({
     "entry", "exit", "on_break", "before", "after", "every", "always", "event", "clear", "command",
 })  # fmt: skip
+"""Lists whose only element is written in place of the list; `event` stands for the transitions of an event."""
 _NAMES = {
     "on": "event", "states": "state", "connectors": "state", "regions": "region", "cases": "transition",
     "parameters": "declaration", "variables": "declaration", "outputs": "declaration",
@@ -142,3 +94,114 @@ def _key(name: str, role: str) -> str | int | float:
 
 def _rank(key: str) -> int:
     return _ORDER.index(key) if key in _ORDER else 0
+
+
+_DECLARES = re.compile(r"""\bplot["']?\s*:\s*["']?([\w\-#.]+)""")
+
+
+class Neighbours:
+    """Folders of plots; each file is read once for all plots of its folder."""
+
+    def __init__(self) -> None:
+        self._folders: dict[Path, dict[Path, str | InputError]] = {}
+        self._plots: dict[Path, ActionPlot | InputError] = {}
+
+    def of(self, file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
+        """Return the plot with its related plots, and the errors of files that could not be read.
+
+        Related plots are the used ones, directly or not, and with rules or plans also the implementations of planning
+        actions. If one of them is missing, all plots of the folder are read: its name may be a misspelt one.
+        """
+        library, broken = Library([plot]), list[InputError]()
+        planned = any(isinstance(state, DynamicState) for _, state, _ in plot.walk())
+        if not (plot.uses() or plot.rules or planned):
+            return library, broken
+        here, texts = os.path.realpath(file), self._texts(file.parent)
+        left = {other: text for other, text in texts.items() if os.path.realpath(other) != here}
+        actions = bool(plot.rules) or planned
+        while True:
+            missing = {name for known in library for name in known.uses() if name not in library}
+            next_ = list(_holding(left, missing, actions=actions)) or (list(left) if missing else [])
+            if not next_:
+                return library, broken
+            for other in next_:
+                found = self._plot(other, left.pop(other))
+                try:
+                    if isinstance(found, InputError):
+                        raise found
+                    library.add(found)
+                except InputError as error:
+                    broken.append(error)
+
+    def _texts(self, folder: Path) -> dict[Path, str | InputError]:
+        if folder not in self._folders:
+            self._folders[folder] = {file: _text(file) for file in sorted(folder.glob("*.yaml"))}
+        return self._folders[folder]
+
+    def _plot(self, file: Path, text: str | InputError) -> ActionPlot | InputError:
+        if file not in self._plots:
+            try:
+                self._plots[file] = parse_plot(text, str(file)) if isinstance(text, str) else text
+            except InputError as error:
+                self._plots[file] = error
+        return self._plots[file]
+
+
+def _holding(texts: dict[Path, str | InputError], names: set[str], *, actions: bool) -> Iterator[Path]:
+    """Yield the files that seem to contain one of these plots, or an implementation of a planning action."""
+    for file, text in texts.items():
+        if isinstance(text, str) and (
+            not names.isdisjoint(_DECLARES.findall(text)) or (actions and "implements" in text)
+        ):
+            yield file
+
+
+def _text(file: Path) -> str | InputError:
+    try:
+        return read_file(file)
+    except InputError as error:
+        return error
+
+
+_BY_NAME = frozenset({"Transition", "PlotParameter", "PlotVariable"})
+"""Values with a short form: only their target or type."""
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of plot files, for editors; it accepts every spelling of every plot."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "action plot",
+        **_with_short_forms(ActionPlot.model_json_schema(by_alias=True)),
+    }
+
+
+def _with_short_forms(node: Any) -> Any:
+    """Return the schema with short forms as alternatives to the long ones."""
+    if isinstance(node, list):
+        return [_with_short_forms(one) for one in node]
+    if not isinstance(node, dict):
+        return node
+    if str(node.get("$ref", "")).rsplit("/", 1)[-1] in _BY_NAME:
+        return {"anyOf": [node, {"type": "string"}]}
+    # Distinctive keys determine the kind; a form without one matches several of the alternatives.
+    schema = {"anyOf" if key == "oneOf" else key: _with_short_forms(value) for key, value in node.items()}
+    if isinstance(schema.get("properties"), dict):
+        schema["properties"] = {name: _property(name, one) for name, one in schema["properties"].items()}
+    return schema
+
+
+def _property(name: str, schema: dict[str, Any]) -> dict[str, Any]:
+    inner = schema.get("additionalProperties")
+    if name in _SINGLE | {"choice", "of"}:
+        return _alone(schema)
+    if name == "on" and isinstance(inner, dict):
+        return {**schema, "additionalProperties": _alone(inner)}
+    if name == "states" and isinstance(inner, dict):  # `over:` without a value is a simple state
+        return {**schema, "additionalProperties": {"anyOf": [inner, {"type": "null"}]}}
+    return schema
+
+
+def _alone(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a list, or of its only element."""
+    return {"anyOf": [schema, schema["items"]]} if "items" in schema else schema

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from dsc.drawing.captions import block_texts, full_text, labelled, seconds_text
-from dsc.model.connectors import Connector
-from dsc.model.plot import ActionPlot, Scope, initial_of
+from dsc.model.plot import ActionPlot, Path, Scope, initial_of
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -17,8 +16,8 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from dsc.model.transitions import TransitionSource
-from dsc.text.targets import require_targets
+from dsc.model.transitions import Connector, TransitionSource
+from knowledge_base.errors import UnknownNameError
 
 
 def to_mermaid(plot: ActionPlot) -> str:
@@ -120,3 +119,27 @@ def _title(name: str, state: AnyState) -> str:
 def _safe(text: str) -> str:
     """Replace special characters of these forms in a text: quotes, colons, line ends."""
     return " ".join(text.split()).replace('"', "'").replace(":=", "=").replace(":", ".").replace(";", ",")
+
+
+def require_targets(plot: ActionPlot) -> None:
+    """Raise `UnknownNameError` if an initial state or target is not a state of the plot."""
+    names = [name for name, _, _ in plot.walk()]
+    for target, path in _named(plot):
+        if target not in names:
+            place = plot.place(path)
+            raise UnknownNameError(f"there is no state '{target}'", place=place, found=target, valid=names)
+
+
+def _named(plot: ActionPlot) -> Iterator[tuple[str, Path]]:
+    """Yield the names of states that occur in the plot, each with its path."""
+    yield initial_of(plot), ("initial",)
+    for _, state, path in plot.walk():
+        if isinstance(state, CompositeState):
+            yield initial_of(state), (*path, "initial")
+        elif isinstance(state, OrthogonalState):
+            yield from ((initial_of(one), (*path, "regions", key, "initial")) for key, one in state.regions.items())
+        elif isinstance(state, HistoryState):
+            yield state.target, (*path, "to")
+        if isinstance(state, TransitionSource):
+            for inside, _, transition in state.placed_transitions():
+                yield from ((target, (*path, *inside, "to")) for target in transition.targets)

@@ -11,9 +11,12 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from io import StringIO
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
+from pydantic import BaseModel, TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.events import (
@@ -31,10 +34,10 @@ from ruamel.yaml.reader import ReaderError
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 from ruamel.yaml.scanner import Scanner, ScannerError
 
-from dsc.model.reading import FormPath
-from dsc.text.text_files import check_size
-from knowledge_base.errors import ParseError, Place
-from knowledge_base.language.checking.inputs import require_text
+from dsc.model.reading import FormPath, in_yaml, misread
+from knowledge_base.errors import InputError, ParseError, Place
+from knowledge_base.language.checking.inputs import require_text, shown
+from knowledge_base.pddl.files import read_text, require_size
 
 MAX_DEPTH = 128
 MAX_PARTS = 18_000
@@ -297,3 +300,54 @@ def _parse_error(error: MarkedYAMLError, source: str | None) -> ParseError:
         problem = re.sub(jargon, plainer, problem)
     since = f" (of what begins in line {begun.line + 1})" if begun and mark and begun.line != mark.line else ""
     return ParseError(f"not readable as YAML: {problem}{since}", place=place)
+
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+def read_model(model: type[_Model], document: Document) -> _Model:
+    """Return the document as a value of `model`.
+
+    Raises:
+        InputError: the document does not match; the message has file, line, and the nearest valid key.
+    """
+    if not isinstance(document.data, Mapping):
+        found = in_yaml(document.data)
+        raise InputError(f"a mapping of keys was expected; found {found}", place=document.place(()))
+    try:
+        read: _Model = _adapter(model).validate_python(document.data)
+    except ValidationError as error:
+        wrong, path = misread(error, model, document.data)
+        wrong.place = document.place(path)
+        raise wrong from None
+    return read
+
+
+@cache
+def _adapter(model: type[_Model]) -> TypeAdapter[_Model]:
+    return TypeAdapter(model)
+
+
+MAX_BYTES = 250_000
+"""A hundred times the longest plot of this project; a larger file would delay its author's error message."""
+
+
+def read_file(path: Path | str) -> str:
+    """Return the text of a file.
+
+    Raises:
+        InputError: it cannot be read, is not UTF-8, or has more than `MAX_BYTES`; as `knowledge_base.pddl.files`.
+    """
+    return read_text(path_of(path), most=MAX_BYTES)
+
+
+def path_of(path: object) -> Path:
+    """Return the path of that name; raise `InputError` for any value except a text or path."""
+    if not isinstance(path, str | Path):
+        raise InputError(f"a file or folder is named by a text or a Path, not {shown(path)}")
+    return Path(path)
+
+
+def check_size(size: int, place: Place) -> None:
+    """Raise `InputError` for a text of more than `MAX_BYTES`."""
+    require_size(size, MAX_BYTES, place.source)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.step_references import Step, concerns, contents_of, entered_by
+from dsc.dynamic.steps import Step, concerns, contents_of, entered_by
 from dsc.errors import Finding
 from dsc.model.actions import Assign, ExternalAction, Internal, flat
 from dsc.model.plot import ActionPlot, Path, PlotParameter, initial_of

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.plot_outcomes import Outcomes, answerable, outputs_of
-from dsc.dynamic.step_references import Step, concerns, mentioned_in, terms_of
+from dsc.dynamic.steps import Outcomes, Step, answerable, concerns, mentioned_in, outputs_of, terms_of
 from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
@@ -25,11 +24,10 @@ from dsc.model.actions import (
     Trigger,
     Withdraw,
 )
-from dsc.model.connectors import Connector, SelectState
 from dsc.model.plot import ActionPlot, Path, PlotParameter, PlotVariable
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, State, SubmachineState
-from dsc.model.transitions import TimedTransition, Transition
+from dsc.model.transitions import Connector, SelectState, TimedTransition, Transition
 from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.nesting import Nesting
 from dsc.validation.rules import RuleScope, Skills, Types, attributes_of

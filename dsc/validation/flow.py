@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from functools import cache
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.plot_outcomes import answerable, outcomes_of
 from dsc.dynamic.responses import limit_of
-from dsc.dynamic.step_references import Step, answers_in_plans, concerns
+from dsc.dynamic.steps import Step, answerable, answers_in_plans, concerns, outcomes_of
 from dsc.errors import Finding
 from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, TIMERS
 from dsc.model.actions import Trigger
-from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path, initial_of
 from dsc.model.states import (
     AnyState,
@@ -26,7 +24,7 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from dsc.model.transitions import TransitionSource
+from dsc.model.transitions import Connector, TransitionSource
 from dsc.validation.nesting import Nesting
 from dsc.validation.reach import circle_of
 from dsc.validation.rules import Skills

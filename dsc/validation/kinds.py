@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.step_references import Step, contents_of, entered_by
+from dsc.dynamic.steps import Step, contents_of, entered_by
 from dsc.errors import Finding
 from dsc.model.actions import Assign, Emit, ExternalAction, Internal, Trigger, flat
-from dsc.model.connectors import SelectState, case_value
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import Reaction
 from dsc.model.states import FinalState, State
-from dsc.model.transitions import TimedTransition, Transition
+from dsc.model.transitions import SelectState, TimedTransition, Transition, case_value
 from dsc.validation.nesting import Nesting
 from dsc.validation.rules import Attributes, RuleScope, Skills, attributes_of
 from knowledge_base.errors import SchemaError

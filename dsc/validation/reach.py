@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.step_references import Step, concerns
+from dsc.dynamic.steps import Step, concerns
 from dsc.errors import Finding
-from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path, Scope, initial_of
 from dsc.model.rules import ENTER
 from dsc.model.states import AnyState, CompositeState, DynamicState, OrthogonalState, SubmachineState
+from dsc.model.transitions import Connector
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import InputError, SchemaError
 

@@ -6,13 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, combinations, groupby, islice
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.plot_outcomes import answerable
-from dsc.dynamic.step_references import Step, concerns
+from dsc.dynamic.steps import Step, answerable, concerns
 from dsc.errors import Finding
-from dsc.model.connectors import Connector
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, ENTER, REPLAN, RETRY, Handler, Rule
 from dsc.model.states import CompositeState, DynamicState, State
+from dsc.model.transitions import Connector
 from dsc.validation.library import MAX_FINDINGS
 from dsc.validation.nesting import Nesting
 from knowledge_base.errors import SchemaError

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.plot_outcomes import Outcomes, answerable, outcomes_of, outputs_of
-from dsc.dynamic.step_references import Step, concerns, contents_of
+from dsc.dynamic.steps import Outcomes, Step, answerable, concerns, contents_of, outcomes_of, outputs_of
 from dsc.errors import Finding
 from dsc.events import DONE, FAILURES
 from dsc.model.actions import Trigger

@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.plot_outcomes import answerable
-from dsc.dynamic.step_references import Step
+from dsc.dynamic.steps import Step, answerable
 from dsc.engine.chart_compiler import compile_plot
 from dsc.engine.membership import asked_states
 from dsc.errors import Finding

@@ -20,7 +20,7 @@ from domains.clean_up_table.scenario import Scenario
 from dsc.dynamic.library import Library
 from dsc.runs.store import RunStore
 from dsc.sequencer.replay import replay
-from dsc.text.profile_files import find_profile
+from dsc.text.profiles import find_profile
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.errors import InputError, StoreError
 

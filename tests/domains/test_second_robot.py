@@ -11,7 +11,7 @@ from domains.clean_up_table import deploy
 from domains.clean_up_table.deployment import PROFILES, ROBOTS, plots
 from domains.clean_up_table.scenario import Scenario
 from domains.cli import app
-from dsc.text.profile_files import load_profile, parse_profile
+from dsc.text.profiles import load_profile, parse_profile
 from knowledge_base import InputError
 
 SHIPPED = {file.stem: load_profile(file) for file in sorted(PROFILES.glob("*.yaml"))}

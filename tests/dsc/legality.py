@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dsc.model.connectors import Connector
 from dsc.model.states import SubmachineState
+from dsc.model.transitions import Connector
 
 
 def check_legal(frame):

@@ -9,9 +9,9 @@ from __future__ import annotations
 import operator
 from dataclasses import dataclass, field
 
-from dsc.model.connectors import ChoiceState, SelectState
 from dsc.model.plot import initial_of
 from dsc.model.states import CompositeState, FinalState, HistoryState, OrthogonalState, State
+from dsc.model.transitions import ChoiceState, SelectState
 from knowledge_base.language.syntax import effect as eff
 from knowledge_base.language.syntax import expression as lang
 

@@ -16,7 +16,7 @@ import pytest
 from dsc_bombs import BOMBS, FINAL, HEAD
 
 from domains.cli import main
-from dsc.text.text_files import MAX_BYTES
+from dsc.text.yaml import MAX_BYTES
 from dsc.validation.library import MAX_FINDINGS
 
 BROKEN = Path(__file__).parent / "broken"

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from dsc import Library, load_plot, parse_plot
 from dsc.cli.plots import app
 from dsc.text.cloning import clone_files, cloned, cloned_profile
-from dsc.text.profile_files import load_profile, parse_profile, profile_to_yaml
+from dsc.text.profiles import load_profile, parse_profile, profile_to_yaml
 from knowledge_base import InputError
 from knowledge_base.errors import SchemaError, UnknownNameError
 

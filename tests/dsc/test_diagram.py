@@ -13,10 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dsc.drawing import draw, lay_out
+from dsc.drawing.layered.arrange import Net, assign_tracks
 from dsc.drawing.layered.columns import fit
-from dsc.drawing.layered.tracks import Net, assign_tracks
-from dsc.drawing.layout import Box, BoxKind, TextStyle
-from dsc.drawing.measure import pack, shorten, text_width
+from dsc.drawing.layout import Box, BoxKind, TextStyle, pack, shorten, text_width
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.states import State

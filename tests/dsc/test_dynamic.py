@@ -7,10 +7,9 @@ from dsc_charts import FakeSituation, plot
 
 from dsc.calls import Outcome
 from dsc.components.component import Component
-from dsc.dynamic.candidate_selection import ACHIEVE
-from dsc.dynamic.knowledge_situation import KnowledgeSituation
+from dsc.dynamic.knowledge_situation import ACHIEVE, KnowledgeSituation
 from dsc.dynamic.library import MOST_BOUND, Library
-from dsc.dynamic.plot_outcomes import outcomes_of
+from dsc.dynamic.steps import outcomes_of
 from dsc.engine.machine import Machine
 from dsc.engine.situation import Decision
 from dsc.events import Event

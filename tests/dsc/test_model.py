@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from dsc.model.actions import Assign, Configure, Emit, Switch, Trigger
-from dsc.model.connectors import ChoiceState, SelectState, case_value
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.rules import Rule
 from dsc.model.states import (
@@ -23,7 +22,7 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from dsc.model.transitions import Transition
+from dsc.model.transitions import ChoiceState, SelectState, Transition, case_value
 from dsc.text.plot_files import parse_plot, plot_to_yaml
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.effect import Add, When

@@ -13,7 +13,7 @@ from dsc.components.parameters import Parameter
 from dsc.profiles import configure
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import RunEnd
-from dsc.text.profile_files import parse_profile
+from dsc.text.profiles import parse_profile
 from knowledge_base import InputError, KnowledgeBase
 from knowledge_base.world.schema import Schema
 

@@ -9,8 +9,7 @@ import pytest
 from jsonschema import Draft202012Validator
 from test_model import EVERYTHING
 
-from dsc.text.json_schema import json_schema
-from dsc.text.plot_files import plot_to_yaml
+from dsc.text.plot_files import json_schema, plot_to_yaml
 from dsc.text.yaml import load_document
 
 ROOT = Path(__file__).parents[2]

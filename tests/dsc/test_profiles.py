@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from dsc import Component, parse_plot
 from dsc.cli.plots import app
 from dsc.profiles import adapted, configure
-from dsc.text.profile_files import find_profile, parse_profile, profile_schema
+from dsc.text.profiles import find_profile, parse_profile, profile_schema
 from dsc.text.yaml import load_document
 from knowledge_base import InputError
 

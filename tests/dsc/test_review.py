@@ -12,8 +12,7 @@ from typer.testing import CliRunner
 
 from dsc.cli.plots import app
 from dsc.dynamic.library import Library
-from dsc.text.plot_files import load_plot, parse_plot
-from dsc.text.plot_folder import Neighbours
+from dsc.text.plot_files import Neighbours, load_plot, parse_plot
 from dsc.validation import review_plot, validate_plot
 
 ROOT = Path(__file__).parents[2]

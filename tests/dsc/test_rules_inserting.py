@@ -8,7 +8,7 @@ from dsc_charts import Run, plot
 from dsc.dynamic.library import Library
 from dsc.engine.situation import Decision
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
-from dsc.model.connectors import ChoiceState
+from dsc.model.transitions import ChoiceState
 from dsc.text.plot_files import parse_plot, plot_to_yaml
 from knowledge_base.errors import InputError, SchemaError
 from knowledge_base.facts import Fact, fact

@@ -16,7 +16,7 @@ from dsc.scxml.tokens import tokens
 from dsc.scxml.writer import to_scxml
 from dsc.testing import DryRun
 from dsc.text.plot_files import parse_plot, plot_to_yaml
-from dsc.text.text_files import MAX_BYTES
+from dsc.text.yaml import MAX_BYTES
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import to_text

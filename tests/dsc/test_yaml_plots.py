@@ -8,8 +8,7 @@ import pytest
 from dsc_charts import plot
 
 from dsc.text.plot_files import load_library, load_plot, parse_plot, plot_to_yaml
-from dsc.text.text_files import MAX_BYTES
-from dsc.text.yaml import load_document
+from dsc.text.yaml import MAX_BYTES, load_document
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.syntax.expression import Variable
 

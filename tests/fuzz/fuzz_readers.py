@@ -36,9 +36,9 @@ from dsc.sequencer.replay import replay
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.text.plot_files import load_plot, parse_plot, plot_to_yaml
-from dsc.text.profile_files import load_profile, parse_profile, profile_to_yaml
+from dsc.text.profiles import load_profile, parse_profile, profile_to_yaml
 from dsc.text.text_diagrams import to_mermaid, to_plantuml
-from dsc.text.text_files import read_file
+from dsc.text.yaml import read_file
 from dsc.trace import Trace, header
 from dsc.validation import review_plot, validate_plot
 from dsc.viewer.address import PageAddress

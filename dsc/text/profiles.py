@@ -1,15 +1,40 @@
-"""Profile files: YAML, read as plots are."""
+"""Profiles: values of parameters for one robot or simulation, over one set of plots (S2.10, S1.11)."""
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
-from dsc.model.profile import Profile
-from dsc.text.form import read_model
-from dsc.text.text_files import read_file
-from dsc.text.yaml import dump, load_document
+from pydantic import Field
+
+from dsc.model.language import Setting, Written
+from dsc.text.yaml import dump, load_document, read_file, read_model
 from knowledge_base.errors import InputError
+
+Settings = dict[str, dict[str, Setting]]
+
+
+class Profile(Written):
+    """A robot and the values of its parameters.
+
+    Attributes:
+        name: its name (`profile`).
+        robot: one of the world's robots; by default its usual one.
+        components: component -> parameter -> value, within the range that its builder declares.
+        plots: plot -> parameter -> value, as the parameter's new default; users of the plot may set another value.
+    """
+
+    name: str = Field(alias="profile", pattern=r"^[a-zA-Z_][\w\-]*$")
+    about: str | None = None
+    robot: str | None = None
+    components: Settings = Field(default_factory=dict)
+    plots: Settings = Field(default_factory=dict)
+
+    @property
+    def digest(self) -> str:
+        """A hash of the content."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
 
 
 def parse_profile(text: str, source: str | None = None) -> Profile:
