@@ -10,8 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from dsc.dynamic.rule_expansion import expand
-from dsc.engine.chart_compiler import compile_plot
-from dsc.engine.tables import CompiledPlot
+from dsc.engine.tables import CompiledPlot, compile_plot
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import Who
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError

@@ -10,9 +10,8 @@ from dsc.engine.machine_state import NOTHING, FrameState, MachineState, at_rest
 from dsc.engine.macrostep import Macrostep
 from dsc.engine.reaction import CompiledReaction
 from dsc.engine.reaction_choice import Choice, Question
-from dsc.engine.situation import Situation
+from dsc.engine.situation import Chart, Situation
 from dsc.engine.steps import NO_CHANGE, Microstep, Step
-from dsc.engine.tables import Chart
 from dsc.events import Event
 from knowledge_base.errors import InputError
 
@@ -70,9 +69,7 @@ def start(chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situ
         InputError: the plot is unknown, or a parameter is missing or unknown.
         RunawayError: the macrostep does not end.
     """
-    macrostep = Macrostep(chart, situation, MachineState(serials=serials))
-    macrostep.start(plot, arguments)
-    return macrostep.finish(None, handled=True)
+    return Macrostep(chart, situation, MachineState(serials=serials)).start(plot, arguments)
 
 
 def step(chart: Chart, state: MachineState, event: Event | None, situation: Situation) -> Step:
@@ -89,18 +86,14 @@ def step(chart: Chart, state: MachineState, event: Event | None, situation: Situ
         moved = move(state, state.root, event, situation)
         if moved is not None:
             return moved
-    macrostep = Macrostep(chart, situation, state)
-    handled = macrostep.react(event)
-    return macrostep.finish(event, handled=handled)
+    return Macrostep(chart, situation, state).react(event)
 
 
 def leave(chart: Chart, state: MachineState, situation: Situation) -> Step:
     """Exit all active states before the end of the plot; their exit actions stop the skills (S0.15)."""
     if state.root is None:
         return Step(state, None, handled=False)
-    macrostep = Macrostep(chart, situation, state)
-    macrostep.leave()
-    return macrostep.finish(None, handled=False)
+    return Macrostep(chart, situation, state).leave()
 
 
 @dataclass(slots=True)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from itertools import repeat
 from typing import Any
 
-from dsc.engine.configuration import configuration_of
-from dsc.engine.determinisation import reaction_of
 from dsc.engine.execution import Execution
-from dsc.engine.frames import Frame, freeze, thaw
-from dsc.engine.machine_state import FrameState, MachineState, at_rest
-from dsc.engine.reaction import CompiledReaction, ReactionPart, report
+from dsc.engine.frames import Frame
+from dsc.engine.machine_state import FrameState, MachineState, at_rest, configuration_of
+from dsc.engine.performing import Performer
+from dsc.engine.reaction import CompiledReaction, ReactionPart, reaction_of, report
 from dsc.engine.reaction_choice import Question, choice_of, settled
-from dsc.engine.situation import Situation
+from dsc.engine.situation import Chart, Situation
 from dsc.engine.steps import Note, Step
-from dsc.engine.tables import Chart, TransitionEdge
+from dsc.engine.tables import TransitionEdge
 from dsc.engine.transition_selection import Addressed, Enabled, Trigger, select
 from dsc.errors import RunawayError
 from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, Event, goes_outwards
@@ -25,97 +26,92 @@ MAX_MICROSTEPS = 1000
 """Upper bound; a macrostep with more microsteps does not end."""
 
 
-class Macrostep(Execution):
-    """Runs on thawed frames; `finish` freezes them into the next state.
+class Macrostep:
+    """Selects transitions until none is enabled; `Execution` takes them, and `Performer` executes their actions."""
 
-    One object inherits each layer from its own module: separate objects would slow down each step.
-    """
+    __slots__ = ("_broken_guards", "_execution", "_performer", "_root", "_turn")
 
-    __slots__ = ("_broken_guards", "_root", "_turn")
+    _root: Frame
 
     def __init__(self, chart: Chart, situation: Situation, state: MachineState) -> None:
-        super().__init__(chart, situation, state.serials)
-        self._root = thaw(state.root) if state.root else None
+        self._performer = Performer(situation, state.serials)
+        self._execution = Execution(chart, self._performer)
         self._broken_guards: set[tuple[int, TransitionEdge, int]] = set()
         self._turn = 0
+        if state.root is not None:
+            self._root = Frame(state.root)
 
-    def start(self, plot: str, arguments: Mapping[str, Any]) -> None:
+    def start(self, plot: str, arguments: Mapping[str, Any]) -> Step:
         """Enter the outermost plot; raise `InputError` if the plot is unknown or its arguments do not fit."""
-        self._root = self.enter_plot(self.chart.compiled(plot), arguments)
-        self.end_microstep(None, ())
+        self._root = self._execution.enter_plot(self._execution.chart.compiled(plot), arguments)
+        self._performer.end_microstep(None, ())
         self._rest()
+        return self._step(None, handled=True)
 
-    def react(self, event: Event | None) -> bool:
-        """Take the event, then run to completion; return whether a transition took the event, or a state keeps it."""
+    def react(self, event: Event | None) -> Step:
+        """Take the event, then run to completion; a state that keeps the event handles it, too."""
         handled = event is not None and self._take(event)
         if event is not None and event.name == EVERY:
             self._next_period(event)
         self._rest()
-        return handled
+        return self._step(event, handled=handled)
 
-    def leave(self) -> None:
+    def leave(self) -> Step:
         """Exit all active states of all plots."""
-        assert self._root is not None  # noqa: S101  # `start` has set it
-        self.leave_plot(self._root)
-        self.end_microstep(None, ())
-        for event in self.internal:
+        return self._step(None, handled=False, left=True)
+
+    def _step(self, event: Event | None, *, handled: bool, left: bool = False) -> Step:
+        done, execution = self._performer, self._execution
+        if left or execution.finished:
+            self._leave()
+            state = MachineState(None, done.serials, execution.finished)
+        else:
+            state = at_rest(self._root.frozen(), done.serials)
+        return Step(
+            state, event, handled, tuple(done.microsteps), tuple(done.decisions), done.knowledge, tuple(done.output),
+            tuple(done.emitted), tuple(done.errors), execution.outputs,
+        )  # fmt: skip
+
+    def _leave(self) -> None:
+        self._execution.leave_plot(self._root)
+        self._performer.end_microstep(None, ())
+        for event in self._performer.internal:
             if event.name in ERRORS:
                 self._unhandled(event)
-        self._root = None
-
-    def finish(self, event: Event | None, *, handled: bool) -> Step:
-        """Return the step as a value."""
-        if self.finished and self._root is not None:
-            self.leave()
-        root, serials = self._root, self.serials
-        return Step(
-            at_rest(freeze(root), serials) if root else MachineState(None, serials, self.finished),
-            event,
-            handled,
-            tuple(self.microsteps),
-            tuple(self.decisions),
-            self.knowledge,
-            tuple(self.output),
-            tuple(self.emitted),
-            tuple(self.errors),
-            self.outputs,
-        )
 
     def _rest(self) -> None:
-        while not self.finished:
-            if self._take_spontaneous():
+        """Take transitions without trigger, then internal events, until none is left."""
+        internal = self._performer.internal
+        while not self._execution.finished:
+            if self._take_in(self._root.that(_is_spontaneous), None, None):
                 continue
-            if not self.internal:
+            if not internal:
                 return
-            event = self.internal.popleft()
+            event = internal.popleft()
             if not self._take(event) and event.name in ERRORS:
                 self._unhandled(event)
 
     def _unhandled(self, error: Event) -> None:
         """Record an untaken error event: it ends a DSC run; in SCXML it is an ordinary event (SCXML 3.12, 5.10.1)."""
-        if error.name == EXECUTION_ERROR or any(one.compiled.scxml for one in self._that(_is_frame(error.frame))):
-            self.output.append(Note(error.name, _reason(error)))
+        # A chart may fire `error` itself, without a reason.
+        reason = str(error.attributes.get("reason", "the chart fired 'error' without a reason"))
+        if error.name == EXECUTION_ERROR or any(one.compiled.scxml for one in self._root.that(_is_frame(error.frame))):
+            self._performer.output.append(Note(error.name, reason))
         else:
-            self.errors.append(_reason(error))
+            self._performer.errors.append(reason)
 
     # -- one event ---------------------------------------------------------------------------------------
 
     def _take(self, event: Event) -> bool:
         """Run one microstep if a transition on the event is enabled, or keep the event for a waiting state."""
-        self.event = event
+        self._performer.event = event
         if event.name not in ERRORS:  # a guard that fails for its own error event would repeat without end
             self._turn += 1
         if event.to is not None:
             return self._take_addressed(event, event.to)
-        name, scope = event.name, event.frame
-
-        def listens(one: Frame | FrameState) -> bool:
-            return (scope is None or scope == one.serial) and choice_of(one.configuration, name) is not None
-
-        listeners = self._that(listens)
-        if len(listeners) == 1:
-            return self._take_alone(listeners[0], event.name, event)
-        return bool(listeners) and self._take_together(event.name, event)
+        if event.frame is not None:
+            return self._take_in(self._root.that(_is_frame(event.frame)), event.name, event)
+        return self._take_in(self._root.that(partial(choice_of, trigger=event.name)), event.name, event)
 
     def _take_addressed(self, event: Event, activation: int) -> bool:
         found = self._find(activation)
@@ -138,25 +134,22 @@ class Macrostep(Execution):
                 return True
         return False
 
-    def _take_spontaneous(self) -> bool:
-        """Run one microstep if a transition without trigger is enabled."""
-        concerned = self._that(_is_spontaneous)
-        if len(concerned) == 1:
-            return self._take_alone(concerned[0], None, None)
-        return bool(concerned) and self._take_together(None, None)
-
-    def _that(self, wanted: Callable[[Frame | FrameState], bool]) -> list[Frame]:
-        assert self._root is not None  # noqa: S101  # `step` returns early for an ended machine
-        return self._root.that(wanted)
-
     def _find(self, activation: int) -> tuple[Frame, str] | None:
         """Return the frame and state of this serial number, if they are still active."""
-        for frame in self._that(lambda one: activation in one.activations.values()):
-            return frame, next(state for state, serial in frame.activations.items() if serial == activation)
+        for frame in self._root.that(lambda one: activation in one.activations.values()):
+            for state, serial in frame.activations.items():
+                if serial == activation:
+                    return frame, state
         return None
 
+    def _take_in(self, concerned: list[Frame], trigger: Trigger, event: Event | None) -> bool:
+        """Run one microstep if one of these plots has an enabled transition."""
+        if len(concerned) == 1:
+            return self._take_alone(concerned[0], trigger, event)
+        return bool(concerned) and self._take_together(trigger, event)
+
     def _take_alone(self, frame: Frame, trigger: Trigger, event: Event | None) -> bool:
-        choice = choice_of(frame.configuration, trigger)
+        choice = choice_of(frame, trigger)
         while isinstance(choice, Question):
             choice = choice.follow(self._holds(frame, choice.edge, choice.condition))
         if choice is None:
@@ -165,13 +158,12 @@ class Macrostep(Execution):
         if not choice.parts:
             return kept
         self._check_progress()
-        self.take(frame, choice)
-        self.end_microstep(event, choice.taken_in(frame.compiled, frame.prefix))
+        self._execution.take({frame: choice}, [*zip(repeat(frame), choice.parts, strict=False)])
+        self._performer.end_microstep(event, choice.taken_in(frame.compiled, frame.prefix))
         return True
 
     def _take_together(self, trigger: Trigger, event: Event | None) -> bool:
         """Select transitions across several plots: one in an inner plot may preempt one outside (SCXML 3.13)."""
-        assert self._root is not None  # noqa: S101
         taken, late = select(self._root, trigger, self._guard)
         kept = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
         if not taken:
@@ -183,13 +175,13 @@ class Macrostep(Execution):
         reactions = {frame: reaction_of(frame.configuration, tuple(edges)) for frame, edges in by_frame.items()}
         parts = [(one.frame, _part_of(one, reactions[one.frame])) for one in taken]
         reports = tuple([report(one.edge, one.frame.compiled, one.frame.prefix) for one in taken])
-        self.take_together(reactions, parts)
-        self.end_microstep(event, reports)
+        self._execution.take(reactions, parts)
+        self._performer.end_microstep(event, reports)
         return True
 
     def _check_progress(self) -> None:
-        if len(self.microsteps) >= MAX_MICROSTEPS:
-            trail = [path for micro in self.microsteps[-6:] for path in micro.entered]
+        if len(self._performer.microsteps) >= MAX_MICROSTEPS:
+            trail = [path for micro in self._performer.microsteps[-6:] for path in micro.entered]
             raise RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
 
     # -- guards ------------------------------------------------------------------------------------------
@@ -201,7 +193,7 @@ class Macrostep(Execution):
 
     def _holds(self, frame: Frame, edge: TransitionEdge, condition: Expression) -> bool:
         try:
-            return self.holds(frame, condition)
+            return self._performer.holds(frame, condition)
         except InputError as error:
             # A guard's error is reported once in a macrostep: guards without trigger are evaluated after every
             # microstep. In SCXML a guard with a trigger fails for each event (SCXML 5.9.1).
@@ -210,7 +202,7 @@ class Macrostep(Execution):
             if broken not in self._broken_guards:
                 self._broken_guards.add(broken)
                 source = frame.prefix + frame.compiled.nodes[edge.source].name
-                self.fail(frame, f"guard of '{edge.trigger}' in {source}: {error}")
+                self._performer.fail(frame, f"guard of '{edge.trigger}' in {source}: {error}")
             return False
 
     # -- time --------------------------------------------------------------------------------------------
@@ -228,7 +220,7 @@ class Macrostep(Execution):
         waiting = before.waiting - {frame.compiled.index[state]}
         frame.configuration = configuration_of(frame.compiled, before.active, waiting, before.history)
         own = frame.activations[state]
-        self.internal.extend(kept._replace(to=own, exact=True) for name, kept in frame.kept if name == state)
+        self._performer.internal.extend(kept._replace(to=own, exact=True) for name, kept in frame.kept if name == state)
         frame.kept = tuple([one for one in frame.kept if one[0] != state])
         return True
 
@@ -238,7 +230,7 @@ class Macrostep(Execution):
             frame, state = found
             node = frame.compiled.nodes[frame.compiled.index[state]]
             seconds = node.cycles[event.number].seconds
-            self.start_timer(frame, node, event.to or 0, EVERY, event.number, seconds)
+            self._performer.start_timer(frame, node, event.to or 0, EVERY, event.number, seconds)
 
 
 def _is_frame(serial: int | None) -> Callable[[Frame | FrameState], bool]:
@@ -251,8 +243,3 @@ def _is_spontaneous(one: Frame | FrameState) -> bool:
 
 def _part_of(one: Enabled, reaction: CompiledReaction) -> ReactionPart:
     return next(part for part in reaction.parts if part.edge is one.edge)
-
-
-def _reason(error: Event) -> str:
-    # A chart may fire `error` itself, without a reason.
-    return str(error.attributes.get("reason", "the chart fired 'error' without a reason"))

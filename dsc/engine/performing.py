@@ -2,55 +2,105 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from collections.abc import Iterable, Mapping
-from functools import partial
 from typing import Any
 
-from dsc.engine.evaluation import delay_of, evaluate, output_of
 from dsc.engine.frames import Frame
-from dsc.engine.record import MacrostepRecord
+from dsc.engine.machine_state import NOTHING
 from dsc.engine.situation import Situation
-from dsc.engine.steps import Note, Revoke, SendLater, StartTimer
+from dsc.engine.steps import (
+    NO_CHANGE,
+    DecisionMade,
+    Microstep,
+    Note,
+    Output,
+    PlotBound,
+    Revoke,
+    SendLater,
+    SendMessage,
+    SetParameter,
+    Start,
+    StartTimer,
+    SwitchMode,
+    Taken,
+)
 from dsc.engine.tables import StateNode
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, Event
-from dsc.model.actions import Assign, Block, Choose, Emit, ExternalAction, Internal, Log, Tell, Withdraw
+from dsc.model.actions import (
+    Assign,
+    Block,
+    Choose,
+    Configure,
+    Emit,
+    ExternalAction,
+    Internal,
+    Log,
+    Send,
+    Tell,
+    Trigger,
+    Withdraw,
+)
 from dsc.model.language import TermField
-from knowledge_base.errors import InputError
-from knowledge_base.language.syntax.expression import Expression
+from dsc.model.plot import ActionPlot
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable
 
-Action = ExternalAction | Internal
 _EXPONENT_FROM = 1e21
 """ECMAScript writes larger numbers with an exponent."""
 SHORTEST_PERIOD = 0.001
 """Seconds; a shorter period would block all other events."""
 
 
-class Performer(MacrostepRecord):
-    """Executes actions.
+class Performer:
+    """Executes actions and collects the contents of the step.
 
     Attributes:
         situation: the world as the chart sees it.
         event: the last event taken; actions read its attributes.
+        serials: the last serial number given out.
+        internal: pending internal events.
+        exited, entered, bound: changes of the current microstep.
     """
 
-    __slots__ = ("event", "situation")
+    __slots__ = (
+        "bound", "decisions", "emitted", "entered", "errors", "event", "exited", "internal", "knowledge", "microsteps",
+        "output", "serials", "situation",
+    )  # fmt: skip
 
     def __init__(self, situation: Situation, serials: int) -> None:
-        super().__init__(serials)
         self.situation = situation
         self.event: Event | None = None
+        self.serials = serials
+        self.internal: deque[Event] = deque()
+        self.microsteps: list[Microstep] = []
+        self.decisions: list[DecisionMade] = []
+        self.output: list[Output] = []
+        self.emitted: list[Event] = []
+        self.errors: list[str] = []
+        self.knowledge = NO_CHANGE
+        self.exited: list[str] = []
+        self.entered: list[str] = []
+        self.bound: list[PlotBound] = []
 
-    def holds(self, frame: Frame, condition: Expression) -> bool:
-        """Return whether a condition is true in a frame; raise `InputError`."""
-        return self.situation.holds(condition, self.bindings(frame))
+    def next_serial(self) -> int:
+        """Return a number never given out before in this run."""
+        self.serials += 1
+        return self.serials
 
-    def value(self, frame: Frame, term: TermField) -> Any:
-        """Return the value of a term in a frame; raise `InputError`."""
-        return evaluate(term, self.bindings(frame), self.situation)
+    def end_microstep(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
+        """Close a microstep: the exits, entries and bindings since the last one."""
+        bound = tuple(self.bound)
+        self.microsteps.append(Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))
+        self.exited, self.entered, self.bound = [], [], []
 
-    def values(self, frame: Frame, terms: Mapping[str, TermField]) -> dict[str, Any]:
-        """Return the values of several terms; raise `InputError`."""
-        return {name: self.value(frame, term) for name, term in terms.items()}
+    def fail(self, frame: Frame, reason: str) -> None:
+        """Fire an `error` event in the plot for a failed evaluation."""
+        name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
+        self.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
+
+    # -- values ------------------------------------------------------------------------------------------
 
     def bindings(self, frame: Frame) -> Mapping[str, Any]:
         """Return the frame's variables and the event's attributes."""
@@ -58,12 +108,28 @@ class Performer(MacrostepRecord):
             return frame.variables
         return {**frame.variables, **self.event.bindings()}
 
-    def fail(self, frame: Frame, reason: str) -> None:
-        """Fire an `error` event in the plot for a failed evaluation."""
-        name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
-        self.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
+    def holds(self, frame: Frame, condition: Expression) -> bool:
+        """Return whether a condition is true in a frame; raise `InputError`."""
+        return self.situation.holds(condition, self.bindings(frame))
 
-    def act(self, frame: Frame, state: str, actions: Iterable[Action], activation: int = 0, first: int = 0) -> None:
+    def value(self, frame: Frame, term: TermField) -> Any:
+        """Return the value of a term in a frame; raise `InputError`."""
+        return _evaluate(term, self.bindings(frame), self.situation)
+
+    def values(self, frame: Frame, terms: Mapping[str, TermField]) -> dict[str, Any]:
+        """Return the values of several terms; raise `InputError`."""
+        return {name: self.value(frame, term) for name, term in terms.items()} if terms else {}
+
+    # -- actions -----------------------------------------------------------------------------------------
+
+    def act(
+        self,
+        frame: Frame,
+        state: str,
+        actions: Iterable[ExternalAction | Internal],
+        activation: int = 0,
+        first: int = 0,
+    ) -> None:
         """Execute a block of actions of a state, numbered from `first` within its activation.
 
         An action that fails to evaluate fires an error. The other actions still run; in dialect `scxml` the rest of the
@@ -74,8 +140,7 @@ class Performer(MacrostepRecord):
                 if isinstance(action, Internal):
                     self._perform(frame, state, action)
                 else:
-                    value = partial(self.value, frame)
-                    self.output.append(output_of(action, activation, number, value))
+                    self.output.append(self._output_of(frame, action, activation, number))
             except InputError as error:
                 self.fail(frame, f"{frame.prefix}{state}: {error}")
                 if frame.compiled.scxml:
@@ -85,21 +150,37 @@ class Performer(MacrostepRecord):
         """Start all timers of an entered state."""
         if node.at_least is not None:
             self.start_timer(frame, node, activation, AT_LEAST, 0, node.at_least)
-        for index, timed in enumerate(node.timeouts):
-            self.start_timer(frame, node, activation, AFTER, index, timed.seconds)
-        for index, timed in enumerate(node.cycles):
-            self.start_timer(frame, node, activation, EVERY, index, timed.seconds)
+        for event, many in ((AFTER, node.timeouts), (EVERY, node.cycles)):
+            for index, timed in enumerate(many):
+                self.start_timer(frame, node, activation, event, index, timed.seconds)
 
     def start_timer(
         self, frame: Frame, node: StateNode, activation: int, event: str, index: int, seconds: TermField
     ) -> None:
         """Start one timer of a state; a delay that fails to evaluate fires an error."""
         try:
-            delay = delay_of(self.value(frame, seconds), least=SHORTEST_PERIOD if event == EVERY else 0)
+            delay = _delay_of(self.value(frame, seconds), least=SHORTEST_PERIOD if event == EVERY else 0)
         except InputError as error:
             self.fail(frame, f"{frame.prefix}{node.name}: {error}")
         else:
             self.output.append(StartTimer(activation, index, delay, event))
+
+    def _output_of(self, frame: Frame, action: ExternalAction, activation: int, number: int) -> Output:
+        """Return an external action with the values of its arguments."""
+        match action:
+            case Trigger():
+                component, skill = action.trigger.split(".")
+                arguments = self.values(frame, action.arguments)
+                action_id = f"a{activation}.{number}"
+                return Start(action_id, activation, component, skill, arguments, action.names, action.within)
+            case Configure():
+                component, parameter = action.set.split(".")
+                return SetParameter(component, parameter, self.value(frame, action.to))
+            case Send():
+                component, port = action.send.split(".")
+                return SendMessage(component, port, self.values(frame, action.arguments))
+            case _:
+                return SwitchMode(action.switch, action.to)
 
     def _perform(self, frame: Frame, state: str, action: Internal) -> None:
         match action:
@@ -138,7 +219,7 @@ class Performer(MacrostepRecord):
             name = f"{action.emit}.{self.next_serial()}"
             frame.variables = {**frame.variables, action.into: name}
         event = Event(action.emit, attributes, frame=frame.serial)
-        self.output.append(SendLater(event, delay_of(self.value(frame, delay)), name))
+        self.output.append(SendLater(event, _delay_of(self.value(frame, delay)), name))
 
     def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
         if name not in frame.compiled.plot.emits:
@@ -148,6 +229,56 @@ class Performer(MacrostepRecord):
         elif not frame.gone:
             self.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
         # Otherwise another transition of this microstep exited the host, and the outcome is dropped.
+
+
+def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: Situation) -> Mapping[str, Any]:
+    """Return the variables of a new instance: arguments, defaults and initial values.
+
+    Raises:
+        InputError: a parameter is missing or out of its range, or an argument is not a parameter.
+    """
+    if not (arguments or plot.parameters or plot.variables or plot.outputs):
+        return NOTHING
+    for given in arguments:
+        if given not in plot.parameters:
+            raise UnknownNameError(f"plot '{plot.name}' has no parameter '{given}'", found=given, valid=plot.parameters)
+    variables: dict[str, Any] = {}
+    for name, parameter in plot.parameters.items():
+        if name in arguments:
+            value = arguments[name]
+        elif parameter.default is not None:
+            value = _evaluate(parameter.default, variables, situation)
+        else:
+            raise InputError(f"plot '{plot.name}' needs its parameter '{name}'")
+        variables[name] = parameter.range.check(f"{plot.name}.{name}", value) if parameter.bounded else value
+    for name, variable in (*plot.variables.items(), *plot.outputs.items()):
+        variables[name] = None if variable.initial is None else _evaluate(variable.initial, variables, situation)
+    return variables
+
+
+def _evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> Any:
+    """Return the value of a term; a variable may hold a value of any type, such as a plot.
+
+    Raises:
+        InputError: a variable is not bound, or the term is not a number where one is needed.
+    """
+    if isinstance(term, Constant):
+        return term.value
+    if isinstance(term, Variable):
+        if term.name not in bindings:
+            raise UnknownNameError(
+                f"variable '?{term.name}' has no value here", place=term.place, found=term.name, valid=bindings
+            )
+        return bindings[term.name]
+    return situation.value(term, bindings)
+
+
+def _delay_of(seconds: Any, least: float = 0) -> float:
+    """Return the seconds of a timer; raise `InputError` if the value is not a duration or is below `least`."""
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not least <= seconds < math.inf:
+        bound = f" of at least {least:g}" if least else ""
+        raise InputError(f"a timer needs a number of seconds{bound}; found {seconds!r}")
+    return float(seconds)
 
 
 def _shown(value: Any) -> str:

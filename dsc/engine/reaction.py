@@ -1,17 +1,26 @@
-"""Reactions: exits, actions, entries and the next configuration after a set of transitions of one plot.
+"""Reactions, computed once for each configuration and set of transitions (lazy determinisation).
 
-A submachine or dynamic state is one node here; the plot inside it has separate reactions.
+A reaction has the exits, actions, entries and next configuration after a set of transitions of one plot. A submachine
+or dynamic state is one node here; the plot inside it has separate reactions. SCXML 1.0, appendix D: microstep,
+computeExitSet, exitStates, enterStates.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
-from dsc.engine.configuration import Configuration
+from dsc.engine.machine_state import Configuration, configuration_of
+from dsc.engine.situation import settle
 from dsc.engine.steps import Taken
 from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
-from dsc.model.actions import Emit, ExternalAction, Internal
+from dsc.engine.transition_selection import EntrySet, domain, left_by
+from dsc.events import DONE
+from dsc.model.actions import Block, Choose, Emit, ExternalAction, Internal, Trigger
+from dsc.model.states import FinalState, HistoryState, State
 
+_AnyAction = TypeVar("_AnyAction", bound=ExternalAction | Internal)
 Action = ExternalAction | Internal
 MOST_REPORTS = 64
 """Upper bound of host paths with a kept report of a reaction."""
@@ -121,3 +130,184 @@ def report(edge: TransitionEdge, compiled: CompiledPlot, prefix: str = "") -> Ta
     nodes = compiled.nodes
     target = prefix + nodes[edge.targets[0]].name if edge.targets else None
     return Taken(prefix + nodes[edge.source].name, edge.trigger, target, edge.rule, compiled.plot.name, edge.place)
+
+
+def reaction_of(
+    configuration: Configuration, edges: tuple[TransitionEdge, ...], keeps: tuple[str, ...] = ()
+) -> CompiledReaction:
+    """Return the reaction of a configuration when these transitions are taken."""
+    found: CompiledReaction | None = configuration.reactions.get((edges, keeps))
+    if found is None:
+        found = configuration.reactions[edges, keeps] = _Work(configuration).taking(edges, keeps)
+    return found
+
+
+def initial_reaction(compiled: CompiledPlot) -> CompiledReaction:
+    """Return the reaction that enters a plot by default."""
+    found: CompiledReaction | None = compiled.cache.get(None)
+    if found is None:
+        found = _Work(configuration_of(compiled, ())).entering()
+        compiled.cache[None] = found
+    return found
+
+
+def leaving_reaction(configuration: Configuration) -> CompiledReaction:
+    """Return the reaction that exits all states of a plot, as interrupted: its host was exited or the run ends."""
+    found: CompiledReaction | None = configuration.reactions.get(None)
+    if found is None:
+        found = configuration.reactions[None] = _Work(configuration).leaving()
+    return found
+
+
+class _Work:
+    """Working copy of a configuration that changes during a microstep."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        self.configuration = configuration
+        self.compiled = configuration.compiled
+        self.present = set(configuration.active)
+        self.waiting = set(configuration.waiting)
+        self.remembered = dict(configuration.history)
+
+    def taking(self, edges: tuple[TransitionEdge, ...], keeps: tuple[str, ...]) -> CompiledReaction:
+        left_of = [left_by(self.compiled, edge, self.present, self.remembered) for edge in edges]
+        own = {edge.source for edge, left in zip(edges, left_of, strict=True) if edge.source in left}
+        exits = self._exits(set().union(*left_of), own)
+        effects = [self._settled(edge.effect) for edge in edges]
+        for edge in edges:
+            for history in edge.cleared:
+                self.remembered.pop(history, None)
+        parts = [
+            ReactionPart(edge, effect, self._reached(edge), bool(effect or edge.passed))
+            for edge, effect in zip(edges, effects, strict=True)
+        ]
+        return self._reaction(tuple(parts), exits, keeps, tuple([report(edge, self.compiled) for edge in edges]))
+
+    def entering(self) -> CompiledReaction:
+        entrances = self._entrances(0, (self.compiled.nodes[0].initial,))
+        return self._reaction((ReactionPart(None, (), entrances, acts=False),))
+
+    def leaving(self) -> CompiledReaction:
+        return self._reaction((), self._exits(self.present, set()))
+
+    def _reaction(
+        self,
+        parts: tuple[ReactionPart, ...],
+        exits: tuple[Exit, ...] = (),
+        keeps: tuple[str, ...] = (),
+        taken: tuple[Taken, ...] = (),
+    ) -> CompiledReaction:
+        entrances = [entrance for part in parts for entrance in part.entrances]
+        history = tuple(sorted(self.remembered.items()))
+        following = configuration_of(
+            self.compiled, tuple(sorted(self.present)), frozenset(self.waiting), history
+        )  # fmt: skip
+        silent = all(one.quiet for one in exits)
+        stays = not keeps and not self.waiting and not following.spontaneous
+        return CompiledReaction(
+            parts, exits, following, keeps, taken,
+            exited=tuple([one.node.name for one in exits if one.node.state is not None]),
+            entered=tuple([one.node.name for one in entrances if one.node.state is not None]),
+            silent=silent and not parts,
+            still=silent and stays and bool(parts) and all(part.quiet for part in parts),
+        )  # fmt: skip
+
+    def _exits(self, left: set[int], own: set[int]) -> tuple[Exit, ...]:
+        """Order exits inner before outer, later before earlier; nodes outside `own` are interrupted."""
+        ordered = [self.compiled.nodes[index] for index in sorted(left, reverse=True)]
+        for node in ordered:
+            self._remember(node)
+        exits = []
+        for node in ordered:
+            actions = node.exit if node.index in own else node.broken
+            cancels = node.timed or any(isinstance(action, Trigger) for action in node.entry)
+            exits.append(Exit(node, self._settled(actions), cancels))
+            self.present.discard(node.index)
+            self.waiting.discard(node.index)
+        return tuple(exits)
+
+    def _remember(self, node: StateNode) -> None:
+        """Record the active nodes inside a node before its exit, for its histories (SCXML 3.10)."""
+        for history in node.histories:
+            state = self.compiled.nodes[history].state
+            if isinstance(state, HistoryState) and state.history == "deep":
+                kept = [leaf for leaf in self.configuration.leaves if self.compiled.inside(leaf, node.index)]
+            else:
+                kept = [child for child in node.children if child in self.configuration.members]
+            self.remembered[history] = tuple(kept)
+
+    def _reached(self, edge: TransitionEdge) -> tuple[StateEntry, ...]:
+        if not edge.targets:
+            return ()
+        return self._entrances(domain(self.compiled, edge, self.remembered), edge.targets)
+
+    def _entrances(self, around: int, targets: tuple[int, ...]) -> tuple[StateEntry, ...]:
+        entry = EntrySet(self.compiled, self.remembered)
+        entry.reach(around, targets)
+        entrances = []
+        for index in sorted(entry.nodes):
+            node = self.compiled.nodes[index]
+            self.present.add(index)
+            if node.at_least is not None:
+                self.waiting.add(index)
+            actions, after = self._settled(node.entry), self._settled(entry.after.get(index, ()))
+            entrances.append(StateEntry(node, actions, after, tuple(self._completed(node)), _outcome(node)))
+        return tuple(entrances)
+
+    def _settled(self, actions: tuple[_AnyAction, ...]) -> tuple[_AnyAction, ...]:
+        """Replace each `in-state` question in the actions by its present answer."""
+        return tuple(map(self._settled_action, actions)) if self.compiled.scxml else actions
+
+    def _settled_action(self, action: _AnyAction) -> _AnyAction:
+        if isinstance(action, Choose):
+            condition = settle(action.condition, lambda state: self.compiled.index.get(state) in self.present)
+            then, otherwise = self._settled(action.then), self._settled(action.otherwise)
+            update: dict[str, Any] = {"condition": condition, "then": then, "otherwise": otherwise}
+        elif isinstance(action, Block):
+            update = {"block": self._settled(action.block)}
+        else:
+            return action
+        return action.model_copy(update=update)  # type: ignore[return-value]  # of the same class
+
+    def _completed(self, node: StateNode) -> Iterator[int]:
+        """Yield the nodes whose content is complete after this entry, if a transition or a parent depends on it."""
+        nodes, scxml = self.compiled.nodes, self.compiled.scxml
+        return (one for one in self._around_complete(node) if not one or scxml or DONE in nodes[one].edges)
+
+    def _around_complete(self, node: StateNode) -> Iterator[int]:
+        nodes = self.compiled.nodes
+        if not node.final:
+            if type(node.state) is State and not self.compiled.scxml:
+                yield node.index
+            return
+        around = nodes[node.parent]
+        if around.index == 0 or around.state is not None:
+            yield around.index
+        region = around if around.state is None else nodes[around.parent]
+        ends = around.index > 0 and (region is around or region.transparent)
+        while ends and all(map(self._is_finished, nodes[region.parent].children)):
+            yield region.parent
+            # A parallel state is complete when all its children are in final states (SCXML 3.4).
+            region = nodes[nodes[region.parent].parent]
+            ends = region.transparent
+
+    def _is_finished(self, region: int) -> bool:
+        """Return whether a final state is active in the region; a transparent region delegates to its only state.
+
+        SCXML appendix D: isInFinalState.
+        """
+        nodes = self.compiled.nodes
+        inside = nodes[region].children
+        if nodes[region].transparent:
+            within = nodes[inside[0]]
+            if within.orthogonal:
+                return all(map(self._is_finished, within.children))
+            inside = [*inside, *within.children]
+        return any(child in self.present and nodes[child].final for child in inside)
+
+
+def _outcome(node: StateNode) -> Emit | None:
+    final = node.state
+    if not isinstance(final, FinalState) or final.emit is None:
+        return None
+    return Emit(emit=final.emit, arguments=final.arguments)

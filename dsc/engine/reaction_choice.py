@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from dsc.engine.configuration import MOST_TRIGGERS, Configuration
-from dsc.engine.determinisation import reaction_of
 from dsc.engine.frames import Frame
-from dsc.engine.machine_state import NOTHING
-from dsc.engine.membership import FALSE, settle
-from dsc.engine.reaction import CompiledReaction
+from dsc.engine.machine_state import MOST_TRIGGERS, Configuration, FrameState
+from dsc.engine.reaction import CompiledReaction, reaction_of
+from dsc.engine.situation import FALSE, settle
 from dsc.engine.tables import TransitionEdge
 from dsc.engine.transition_selection import Enabled, Trigger, edges_of, select
 from knowledge_base.language.syntax.expression import TRUE, Expression
@@ -50,8 +48,9 @@ Choice = CompiledReaction | Question
 _UNKNOWN = object()
 
 
-def choice_of(configuration: Configuration, trigger: Trigger) -> Choice | None:
+def choice_of(plot: Frame | FrameState, trigger: Trigger) -> Choice | None:
     """Return the reaction to a trigger or the first question; `None` if no active state has a transition on it."""
+    configuration = plot.configuration
     found = configuration.choices.get(trigger, _UNKNOWN)
     if found is _UNKNOWN:
         if len(configuration.choices) >= MOST_TRIGGERS:
@@ -90,7 +89,7 @@ def _work_out(configuration: Configuration, trigger: Trigger, answers: Mapping[T
         return answers[edge]
 
     try:
-        taken, late = select(Frame(0, configuration.compiled, configuration, NOTHING), trigger, guard)
+        taken, late = select(Frame(FrameState(0, configuration.compiled, configuration)), trigger, guard)
     except _Open as question:
         return _ask(configuration, trigger, question, answers)
     return reaction_of(configuration, tuple([one.edge for one in taken]), _keepers(late))

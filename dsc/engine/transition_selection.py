@@ -1,22 +1,24 @@
-"""Selection of transitions: inner before outer, document order, across all nested running plots together.
+"""Selection of transitions, with their exit and entry sets: inner before outer, across nested plots.
 
-SCXML 1.0, section 3.13 (selectTransitions, removeConflictingTransitions). Nested plots form one tree; events have
-scopes (S0.6, S2.5).
+SCXML 1.0, section 3.13 and appendix D (selectTransitions, removeConflictingTransitions, computeExitSet,
+computeEntrySet). Nested plots form one tree; events have scopes (S0.6, S2.5).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dsc.engine.entry_set import effective_targets
 from dsc.engine.frames import Frame
 from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
 from dsc.events import AFTER, EVERY
+from dsc.model.actions import Internal
 
 Guard = Callable[[Frame, TransitionEdge], bool]
 """Returns whether an edge's guard holds in its frame."""
+Remembered = Mapping[int, tuple[int, ...]]
+"""History node -> the nodes that were active when the node around it was last exited."""
 
 
 class Addressed(NamedTuple):
@@ -48,42 +50,24 @@ class Enabled:
         found = {(self.frame, index) for index in indices}
         for child in self.frame.inner():
             if compiled.index[child.host] in indices:
-                found.update(everything(child))
+                found.update((inner, index) for inner in child.frames() for index in inner.configuration.active)
         return found
 
+    def is_inside(self, other: Enabled) -> bool:
+        """Return whether the source is inside the other's source, maybe in a plot inside it."""
+        for frame, index in _outwards(self.frame, self.edge.source):
+            if frame is other.frame:
+                within = frame.compiled.inside(index, other.edge.source)
+                return within or (frame is not self.frame and index == other.edge.source)
+        return False
 
-def left_by(
-    compiled: CompiledPlot, edge: TransitionEdge, active: Iterable[int], remembered: dict[int, tuple[int, ...]]
-) -> set[int]:
-    """Return the active nodes of the edge's own plot that it exits."""
-    if not edge.targets:
-        return set()
-    around = domain(compiled, edge, remembered)
-    return {index for index in active if compiled.inside(index, around)}
+    def preempts(self, other: Enabled) -> bool:
+        """Return whether it is inside the other, and both exit the same state."""
+        return self.is_inside(other) and bool(self.left() & other.left())
 
-
-def domain(compiled: CompiledPlot, edge: TransitionEdge, remembered: dict[int, tuple[int, ...]]) -> int:
-    """Return the index of the innermost composite (or plot) around source and targets.
-
-    SCXML appendix D: getTransitionDomain, findLCCA. The source of an internal transition is its own domain.
-    """
-    known = {history: kept for history, kept in remembered.items() if history not in edge.cleared}
-    real = effective_targets(compiled, edge.targets, known)
-    if edge.internal and all(compiled.inside(target, edge.source) for target in real):
-        return edge.source
-    around = set.intersection(*(set(compiled.nodes[target].around) for target in real))
-    return next(
-        index for index in compiled.nodes[edge.source].around if index in around and _is_scope(compiled.nodes[index])
-    )
-
-
-def _is_scope(node: StateNode) -> bool:
-    return not node.orthogonal and not node.transparent
-
-
-def everything(frame: Frame) -> Iterable[tuple[Frame, int]]:
-    """Return all active states of a frame and of the frames inside it."""
-    return [(inner, index) for inner in frame.frames() for index in inner.configuration.active]
+    def has_to_wait(self) -> bool:
+        """Return whether its source waits for its least time."""
+        return self.edge.source in self.frame.configuration.waiting and bool(self.edge.targets)
 
 
 def select(root: Frame, trigger: Trigger, guard: Guard) -> tuple[list[Enabled], list[Enabled]]:
@@ -92,22 +76,11 @@ def select(root: Frame, trigger: Trigger, guard: Guard) -> tuple[list[Enabled], 
     Returns:
         The transitions to take, free of conflicts; and those whose states wait for their least time.
     """
-    enabled: dict[tuple[Frame, TransitionEdge], Enabled] = {}
-    for frame, leaf in _leaves(root):
-        found = _first_enabled(frame, leaf, trigger, guard)
-        if found is not None:
-            enabled.setdefault((found.frame, found.edge), found)
-    taken = _without_conflicts([one for one in enabled.values() if not _has_to_wait(one)])
-    late = [one for one in enabled.values() if _has_to_wait(one)]
-    return taken, [one for one in late if not any(_preempts(other, one) for other in taken)]
-
-
-def _preempts(one: Enabled, other: Enabled) -> bool:
-    return _is_inside(one, other) and bool(one.left() & other.left())
-
-
-def _has_to_wait(one: Enabled) -> bool:
-    return one.edge.source in one.frame.configuration.waiting and bool(one.edge.targets)
+    found = (_first_enabled(frame, leaf, trigger, guard) for frame, leaf in _leaves(root))
+    enabled = dict.fromkeys(one for one in found if one is not None)
+    taken = _without_conflicts([one for one in enabled if not one.has_to_wait()])
+    late = [one for one in enabled if one.has_to_wait()]
+    return taken, [one for one in late if not any(other.preempts(one) for other in taken)]
 
 
 def _leaves(frame: Frame) -> Iterator[tuple[Frame, int]]:
@@ -135,6 +108,20 @@ def _outwards(frame: Frame, index: int) -> Iterator[tuple[Frame, int]]:
     while frame.parent is not None:
         index, frame = frame.parent.compiled.index[frame.host], frame.parent
         yield frame, index
+
+
+def _without_conflicts(enabled: list[Enabled]) -> list[Enabled]:
+    kept: list[Enabled] = []
+    for candidate in enabled:
+        left = candidate.left()
+        rivals = [other for other in kept if left & other.left()]
+        if all(candidate.is_inside(other) for other in rivals):
+            kept = [other for other in kept if other not in rivals]
+            kept.append(candidate)
+    return kept
+
+
+# -- transitions of a trigger ------------------------------------------------------------------------------
 
 
 def edges_of(compiled: CompiledPlot, index: int, trigger: Trigger) -> tuple[TransitionEdge, ...]:
@@ -168,20 +155,92 @@ def matches(descriptors: str, event: str) -> bool:
     return False
 
 
-def _without_conflicts(enabled: list[Enabled]) -> list[Enabled]:
-    kept: list[Enabled] = []
-    for candidate in enabled:
-        left = candidate.left()
-        rivals = [other for other in kept if left & other.left()]
-        if all(_is_inside(candidate, other) for other in rivals):
-            kept = [other for other in kept if other not in rivals]
-            kept.append(candidate)
-    return kept
+# -- exit set and entry set --------------------------------------------------------------------------------
 
 
-def _is_inside(one: Enabled, other: Enabled) -> bool:
-    for frame, index in _outwards(one.frame, one.edge.source):
-        if frame is other.frame:
-            within = frame.compiled.inside(index, other.edge.source)
-            return within or (frame is not one.frame and index == other.edge.source)
-    return False
+def left_by(compiled: CompiledPlot, edge: TransitionEdge, active: Iterable[int], remembered: Remembered) -> set[int]:
+    """Return the active nodes of the edge's own plot that it exits."""
+    if not edge.targets:
+        return set()
+    around = domain(compiled, edge, remembered)
+    return {index for index in active if compiled.inside(index, around)}
+
+
+def domain(compiled: CompiledPlot, edge: TransitionEdge, remembered: Remembered) -> int:
+    """Return the index of the innermost composite (or plot) around source and targets.
+
+    SCXML appendix D: getTransitionDomain, findLCCA. The source of an internal transition is its own domain.
+    """
+    known = {history: kept for history, kept in remembered.items() if history not in edge.cleared}
+    real = EntrySet(compiled, known).effective(edge.targets)
+    if edge.internal and all(compiled.inside(target, edge.source) for target in real):
+        return edge.source
+    around = set.intersection(*(set(compiled.nodes[target].around) for target in real))
+    return next(
+        index for index in compiled.nodes[edge.source].around if index in around and _is_scope(compiled.nodes[index])
+    )
+
+
+def _is_scope(node: StateNode) -> bool:
+    return not node.orthogonal and not node.transparent
+
+
+class EntrySet:
+    """The nodes to enter to reach targets.
+
+    SCXML appendix D: computeEntrySet, addDescendantStatesToEnter, addAncestorStatesToEnter.
+
+    Attributes:
+        nodes: indices; document order is the order of entry.
+        after: internal actions that follow the entry of a node: the effect of a history's default.
+    """
+
+    def __init__(self, compiled: CompiledPlot, remembered: Remembered) -> None:
+        self._compiled = compiled
+        self._remembered = remembered
+        self.nodes: set[int] = set()
+        self.after: dict[int, tuple[Internal, ...]] = {}
+
+    def reach(self, around: int, targets: Iterable[int]) -> None:
+        """Add all nodes to enter inside `around` to reach all targets."""
+        self._add_ways(around, self.effective(targets))
+        for index in sorted(self.nodes):  # the content of a default already includes its regions
+            self._add_regions(index)
+
+    def effective(self, targets: Iterable[int]) -> list[int]:
+        """Replace each history by the nodes it remembers, or by its default (getEffectiveTargetStates)."""
+        return [real for target in targets for real in self._resolved(target)]
+
+    def _resolved(self, target: int) -> Iterable[int]:
+        """Return the nodes that a target leads to; a history's default may name further histories."""
+        default = self._compiled.defaults.get(target)
+        if default is None:
+            return (target,)
+        if target in self._remembered:
+            return self._remembered[target]
+        self.after[self._compiled.nodes[target].parent] = default.effect
+        return self._resolved(default.target)
+
+    def _add_ways(self, around: int, targets: Sequence[int]) -> set[int]:
+        """Add the ways to the targets, then their default content; return the nodes on the ways."""
+        ways = {index for target in targets for index in self._compiled.way(around, target)}
+        self.nodes |= ways
+        for target in targets:
+            self._add_content(target)
+        return ways
+
+    def _add_content(self, index: int) -> None:
+        """Add the default content of a target, unless another target is inside it."""
+        node = self._compiled.nodes[index]
+        if node.initial >= 0 and not any(child in self.nodes for child in node.children):
+            for inner in self._add_ways(index, self.effective((node.initial,))):
+                self._add_regions(inner)
+
+    def _add_regions(self, index: int) -> None:
+        """Add the regions of an orthogonal state that no target has reached."""
+        node = self._compiled.nodes[index]
+        for child in node.children if node.orthogonal else ():
+            if child not in self.nodes:
+                self.nodes.add(child)
+                self._add_regions(child)
+                self._add_content(child)

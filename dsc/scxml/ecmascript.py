@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from dsc.engine.membership import IN_STATE
+from dsc.engine.situation import IN_STATE
 from dsc.errors import NotExpressibleError
 from dsc.scxml.tokens import Token, tokens
 from dsc.scxml.value_kinds import ANY, BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, WHOLE, Scope

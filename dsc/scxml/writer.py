@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree as ET
 
-from dsc.engine.membership import asked_states
+from dsc.engine.situation import asked_states
 from dsc.errors import NotExpressibleError
 from dsc.model.actions import Assign, Block, Choose, Emit, ExternalAction, Internal, Log, Withdraw
 from dsc.model.plot import ActionPlot, Scope, initial_of

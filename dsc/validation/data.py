@@ -7,7 +7,7 @@ from functools import cached_property
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Outcomes, Step, answerable, concerns, mentioned_in, outputs_of, terms_of
-from dsc.engine.membership import asked_states, settle
+from dsc.engine.situation import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model.actions import (

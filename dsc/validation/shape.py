@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Step, answerable
-from dsc.engine.chart_compiler import compile_plot
-from dsc.engine.membership import asked_states
+from dsc.engine.situation import asked_states
+from dsc.engine.tables import compile_plot
 from dsc.errors import Finding
 from dsc.model.actions import Block, Choose, Emit, ExternalAction, Internal, Log, Withdraw, flat
 from dsc.model.plot import ActionPlot, Path

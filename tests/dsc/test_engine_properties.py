@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from legality import check_legal, check_serials
 from random_charts import Grower, happenings, in_place, libraries
 
-from dsc.engine import configuration, macrostep, reaction, reaction_choice
+from dsc.engine import machine_state, macrostep, reaction, reaction_choice
 from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import StartTimer
 from dsc.errors import RunawayError
@@ -202,7 +202,7 @@ def test_a_mere_move_is_looked_up_as_it_would_be_worked_out(seed):
 def test_a_step_does_not_depend_on_how_much_is_kept(plots, happened, most):
     plain = [*Played(*plots).steps(happened)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(configuration, "MOST_CONFIGURATIONS", most)
+        patch.setattr(machine_state, "MOST_CONFIGURATIONS", most)
         patch.setattr(reaction_choice, "MOST_TRIGGERS", most)
         patch.setattr(reaction_choice, "MOST_QUESTIONS", most)
         patch.setattr(reaction, "MOST_REPORTS", most)
