@@ -24,7 +24,7 @@ from planning import Executive, PlanStep
 from planning.domain import PlanningAction
 from planning.engines import planner as asking
 from planning.engines.race import PlannerRace
-from planning.execution import plotting, search
+from planning.execution import repair, search
 from planning.plan import PlanFound, PlanningOutcome
 from planning.strips import Problem
 
@@ -36,8 +36,8 @@ _HERE = tuple(part for part in OURS if part != "translate")  # the engine's proc
 _WRAPPED = (
     (search, "local_repair", "mend"), (search, "build_problem", "pose"), (search, "deordered", "validate, de-order"),
     (asking, "written", "write"),
-    (plotting, "deordered", "validate, de-order"), (plotting, "laid_out", "generate"),
-    (plotting, "plot_of", "generate"),
+    (repair, "deordered", "validate, de-order"), (repair, "laid_out", "generate"),
+    (repair, "plot_of", "generate"),
 )  # fmt: skip
 
 

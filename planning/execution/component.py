@@ -14,13 +14,11 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition
-from planning.execution.escalation import Choices, Escalation
 from planning.execution.monitoring import Monitoring
 from planning.execution.plan_records import PlanRecords
-from planning.execution.plan_run import PlanRun, PlanRuns
-from planning.execution.plotting import Plotting
+from planning.execution.plan_run import Attempt, PlanRun, PlanRuns
 from planning.execution.progress import PlanProgress
-from planning.execution.repair import Attempt
+from planning.execution.repair import Choices, Escalation, Plotting
 from planning.execution.search import NotFound, Search
 from planning.problem.derived import derivation
 
@@ -81,11 +79,9 @@ class PlanningComponent(Component):
         self._records = PlanRecords(trace)
         self._search = Search(domain, knowledge, planner, clock, self._records, foresight)
         self._runs = PlanRuns()
-        self._plotting = Plotting(self._derivation, library, knowledge, parallel, {self.name, *shared})
+        plotting = Plotting(self._derivation, library, knowledge, parallel, {self.name, *shared})
         self._choices = Choices(self._derivation.domain, library)
-        self._escalation = Escalation(
-            self._derivation, self._plotting, self._runs, self._choices, self._search, self._records
-        )
+        self._escalation = Escalation(plotting, self._runs, self._choices, self._search, self._records)
         self._cancelled: set[asyncio.Task[None]] = set()  # searches that have not ended
         self._answers: dict[str, Outcome] = {}  # by action, until `forget`
 
@@ -221,7 +217,7 @@ class PlanningComponent(Component):
         after_crash="repeat",
     )
     async def repair(self, call: SkillCall, plan: str, why: str) -> Outcome:  # noqa: ARG002
-        """Answer the failure of the plan of that name, see `planning.execution.repair.EscalationStep`.
+        """Answer the failure of the plan of that name, see `planning.execution.plan_run.EscalationStep`.
 
         `plan_found` continues without a planner call, `replan` requests one.
         """
@@ -241,17 +237,16 @@ class PlanningComponent(Component):
                 return self._none(found.kind, found.reason)
             now = self._derivation.at(self._knowledge)
             known = found.order if found.version == self._knowledge.version else None
-            order = self._plotting.order(found.answer.plan, wanted, known)
-            progress = PlanProgress(found.steps, now.domain, now.condition(wanted), order.before)
+            progress = PlanProgress(found.steps, now.domain, now.condition(wanted))
             attempt = Attempt() if before is None else before.attempt
             run = PlanRun(self._runs.new_name(), wanted, progress, attempt, holder, seconds, replans, found.better)
-            form = self._plotting.form(run, order)
+            order, form = self._escalation.plotting.plotted(run, found.answer.plan, known)
         except InputError as error:
             return self._none("failed", str(error))
         self._records.found(found.answer, run.name)
         if before is not None:
             self._records.replaced(before.name, run.name, found.kept)
-        return self._escalation.found(run, order, form)
+        return self._escalation.bound(run, order, form)
 
     def _none(self, kind: str, reason: str) -> Outcome:
         self._records.none(kind, reason)

@@ -13,13 +13,11 @@ from typing import Any
 from knowledge_base.conditions.condition import Condition, Firing
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Change
-from knowledge_base.language.evaluation.evaluator import holds
-from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.expression import Atom, Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.execution.progress import PlanProgress, shortest_end, thinned
+from planning.execution.progress import PlanProgress, is_true, shortest_end, thinned
 from planning.execution.regression import conjuncts
 from planning.generation.carried_steps import expectation
 from planning.plan import Plan, PlanStep
@@ -114,7 +112,7 @@ class Monitor:
         """Validate the plan as a whole after a change by `author`."""
         self.update()
         progress, world = self._progress, self._knowledge
-        if _true(progress.goal, world):
+        if is_true(progress.goal, world):
             self._hear(GoalReached(author))
         elif len(progress.running) > 1:  # a shorter plan interrupts no step
             if not progress.stands(world):
@@ -148,7 +146,7 @@ class Monitor:
             needed = later = {}
         self._keep(self._links, {**later, **needed}, self._link_fired)
         bring = (part for step in progress.coming() for part in _brought(step, self._domain))
-        fresh = [fact for fact in bring if fact not in self._links and not _true(fact, self._knowledge)]
+        fresh = [fact for fact in bring if fact not in self._links and not is_true(fact, self._knowledge)]
         self._keep(self._to_come, dict.fromkeys(fresh), self._came)
 
     def _keep(
@@ -189,7 +187,7 @@ class Monitor:
 
     def _link_fired(self, e: Expression, firing: Firing) -> None:
         author = None if firing.truth else self._foreign(firing)
-        if author is None or _true(
+        if author is None or is_true(
             self._progress.goal, self._knowledge
         ):  # the condition of the goal reports a reached goal
             return
@@ -216,7 +214,7 @@ class Monitor:
         now, later = progress.needed() or {}, progress.needed_later() or {}
         needed = {**now, **{one: user for one, user in later.items() if one not in now}}
         if fallen is None:
-            fallen = next((one for one in needed if not _true(one, world)), None)
+            fallen = next((one for one in needed if not is_true(one, world)), None)
         why = validate(Plan(progress.remaining_steps), self._domain, world, progress.goal).why
         if fallen is None:
             return Broken(why, "", len(progress.steps) + 1, author, version)
@@ -227,10 +225,3 @@ def _brought(step: PlanStep, domain: PlanningDomain) -> list[Expression]:
     """The facts that a step adds in every world."""
     expected = conjuncts(expectation(domain.action(step).effect, domain.bindings(step)))
     return [part for part in expected if isinstance(part, Atom)]
-
-
-def _true(e: Expression, world: World) -> bool:
-    try:
-        return holds(e, world)
-    except InputError:
-        return False

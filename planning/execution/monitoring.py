@@ -22,8 +22,8 @@ from planning.plan import PlanFound
 if TYPE_CHECKING:
     from dsc.sequencer.clock import LoopClock
     from knowledge_base.facts import Change
-    from planning.execution.escalation import Escalation
     from planning.execution.planner_call import Improvements
+    from planning.execution.repair import Escalation
     from planning.plan import Plan, PlanStep
     from planning.problem.derived import Settled
 
@@ -52,7 +52,7 @@ class Monitoring:
         self._clock = clock
         self._is_own = is_own
         self._cancelled = cancelled
-        self._derivation = escalation.derivation
+        self._derivation = escalation.plotting.derivation
         self._knowledge = escalation.plotting.knowledge
         self._records = escalation.records
         self._new = asyncio.Event()

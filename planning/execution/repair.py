@@ -1,108 +1,246 @@
-"""Attempt chooses the escalation step for a failed plan, after the rules of a plot and before `gave_up` (S1.4, S4.2).
-
-The same failure in the same situation never gets the same answer twice. Each answer and their number are bounded.
-"""
+"""Escalation answers a failed plan, one `EscalationStep` after another; Plotting makes the plots of plans."""
 
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import Any
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
+from dsc.calls import Outcome
 from knowledge_base.language.syntax.effect import effect_conditions
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.identity_cache import IdentityCache
-from knowledge_base.view import View
-from planning.domain import PlanningDomain
-from planning.plan import PlanStep
+from planning.execution.plan_run import EscalationStep, Failure, PlanRun, PlanRuns, PlanState
+from planning.execution.progress import PlanProgress, is_true, shortest_end
+from planning.generation.carried_steps import expectation, implementing
+from planning.generation.plan_to_plot import laid_out, plot_of
+from planning.ordering.partial_order import PartialOrder, deordered, in_sequence
+from planning.ordering.timed_links import linked
+from planning.plan import Plan, PlanStep
 from planning.problem.relevance import names_of, relevant
 
-MOST_RESUMED = 3
-"""The number of times that one attempt resumes at the same step without a new plan."""
+if TYPE_CHECKING:
+    from dsc.dynamic.library import Library
+    from dsc.engine.steps import Step
+    from knowledge_base.store import KnowledgeBase
+    from knowledge_base.view import View
+    from planning.domain import PlanningDomain
+    from planning.execution.plan_records import PlanRecords
+    from planning.execution.search import Search
+    from planning.problem.derived import Derivation
 
 
-class EscalationStep(Enum):
-    """The answers to a failed plan, in the order in which they are tried."""
+class Choices:
+    """The last chosen plot for each planning action and its arguments, so that another candidate can follow a failure.
 
-    RESUME = "the same plan goes on"
-    OTHER_CANDIDATE = "the same plan goes on, the step done in another way"
-    REPLAN = "a new plan"
-    EXCLUDE = "a new plan without the step"
-    GIVE_UP = "giving up"
+    Args:
+        domain: has the planning actions.
+        library: has the plots.
+    """
+
+    def __init__(self, domain: PlanningDomain, library: Library) -> None:
+        self._domain = domain
+        self._library = library
+        self._chosen: dict[tuple[str, frozenset[tuple[str, Any]]], str] = {}
+
+    def note(self, step: Step) -> None:
+        """Note the choices of a macrostep."""
+        for made in step.decisions:
+            decision = made.decision
+            plot = None if decision.chosen is None else self._library.plot(decision.chosen)
+            if plot is not None and plot.implements:
+                self._chosen[plot.implements, frozenset(decision.arguments.items())] = plot.name
+
+    def of(self, step: PlanStep) -> str | None:
+        """The last plot chosen for a step."""
+        bindings = self._domain.bindings(step)
+        for plot in implementing(step, self._library):
+            own = frozenset((name, value) for name, value in bindings.items() if name in plot.parameters)
+            if (step.action, own) in self._chosen:
+                return self._chosen[step.action, own]
+        return None
+
+    def remember(self) -> list[Any]:
+        """Plain data."""
+        return [[action, dict(sorted(arguments)), plot] for (action, arguments), plot in self._chosen.items()]
+
+    def recall(self, memory: Iterable[Any]) -> None:
+        """The inverse of `remember`."""
+        self._chosen = {(action, frozenset(arguments.items())): plot for action, arguments, plot in memory}
 
 
 @dataclass(frozen=True, slots=True)
-class Failure:
-    """A step that failed.
+class Plotting:
+    """Makes plots of plans.
 
     Attributes:
-        step: the step.
-        why: the outcome, or the condition that did not hold.
-        situation: digest of the world then; see `situation`.
+        derivation: of the planning domain.
+        library: plots that implement its actions, and the holders whose rules are inherited.
+        knowledge: the world that a plan is for.
+        parallel: whether independent steps run in parallel.
+        shared: names of components that can execute several skills concurrently.
     """
 
-    step: PlanStep
-    why: str
-    situation: str
+    derivation: Derivation
+    library: Library
+    knowledge: KnowledgeBase
+    parallel: bool
+    shared: Collection[str]
 
-
-@dataclass(slots=True)
-class Attempt:
-    """The answers given so far on the way to one goal, over all plans for it.
-
-    Attributes:
-        replans: the number of plans that replaced a failed one.
-        failures: the number of times that each failure occurred in the same situation.
-        resumed: the number of times that a plan resumed at a step.
-    """
-
-    replans: int = 0
-    failures: Counter[Failure] = field(default_factory=Counter)
-    resumed: Counter[PlanStep] = field(default_factory=Counter)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        failures = [[one.step.to_json(), one.why, one.situation, often] for one, often in self.failures.items()]
-        resumed = [[step.to_json(), often] for step, often in self.resumed.items()]
-        return {"replans": self.replans, "failures": failures, "resumed": resumed}
-
-    @classmethod
-    def from_json(cls, form: Mapping[str, Any]) -> Attempt:
-        """The inverse of `to_json`."""
-        failures = {
-            Failure(PlanStep.from_json(step), why, where): often for step, why, where, often in form["failures"]
-        }
-        resumed = {PlanStep.from_json(step): often for step, often in form["resumed"]}
-        return cls(form["replans"], Counter(failures), Counter(resumed))
-
-    def failed(self, failure: Failure, *, stands: bool, others: bool) -> EscalationStep:
-        """Count a failure and return the answer to it.
+    def plotted(
+        self, run: PlanRun, plan: Plan, known: PartialOrder | None = None, instead_of: str | None = None
+    ) -> tuple[PartialOrder, dict[str, Any]]:
+        """Return the order of a plan's steps, which its progress takes over, and its plot as data.
 
         Args:
-            failure: the failed step and its reason.
-            stands: whether the plan still leads to the goal, the step included.
-            others: whether another candidate implements the step.
+            run: the plan in execution.
+            plan: its steps, maybe with a schedule.
+            known: the order of the steps, if it is known.
+            instead_of: the candidate that the first step tries last.
         """
-        self.failures[failure] += 1
-        if stands and self.resumed[failure.step] < MOST_RESUMED:
-            answers = [
-                EscalationStep.RESUME,
-                *([EscalationStep.OTHER_CANDIDATE] if others else []),
-                EscalationStep.EXCLUDE,
-            ]
-        else:
-            answers = [EscalationStep.REPLAN, EscalationStep.EXCLUDE]
-        tried = self.failures[failure] - 1
-        return answers[tried] if tried < len(answers) else EscalationStep.GIVE_UP
+        order = self._order(plan, run.goal, known)
+        rules = self.library.plot(run.holder).rules if run.holder in self.library else ()
+        plan = Plan(plan.steps)
+        layout = laid_out(plan, run.progress.domain, self.library, rules, order, self.shared)
+        run.progress.take_order(layout.before)
+        plot = plot_of(plan, layout, run.name, watched=True)
+        self.library.expect(plot)
+        form = plot.to_form()
+        if instead_of is not None:
+            state: Any = form
+            for key in next(path for name, _, path in plot.walk() if name == "step_1"):
+                state = state[key]
+            state["dynamic"].sort(key=lambda name: name == instead_of)  # the others stay in their order
+        return order, form
 
-    def interrupted(self, step: PlanStep | None) -> EscalationStep:
-        """Return the answer for a plan that its monitor stopped; `step` is the one at which it could resume."""
-        return (
-            EscalationStep.RESUME if step is not None and self.resumed[step] < MOST_RESUMED else EscalationStep.REPLAN
-        )
+    def _order(self, plan: Plan, goal: Expression, known: PartialOrder | None) -> PartialOrder:
+        if plan.schedule:
+            return linked(plan, self.derivation.original, self.knowledge, goal)
+        order = known or deordered(plan, self.derivation.original, self.knowledge, goal)
+        return order if self.parallel else replace(order, before=in_sequence(plan).before)
+
+
+@dataclass(frozen=True, slots=True)
+class Escalation:
+    """Continues a plan without a planner call, requests a new plan, or abandons the goal.
+
+    Attributes:
+        plotting, runs, choices, search, records: parts of the planning component.
+    """
+
+    plotting: Plotting
+    runs: PlanRuns
+    choices: Choices
+    search: Search
+    records: PlanRecords
+
+    @property
+    def _knowledge(self) -> KnowledgeBase:
+        return self.plotting.knowledge
+
+    def answer(self, run: PlanRun, why: str) -> Outcome:
+        """Answer the failure of a plan.
+
+        Returns:
+            The outcome of the skill `repair`.
+        """
+        if self._reached(run):
+            return Outcome("goal_holds")
+        progress, attempt = run.progress, run.attempt
+        end = self._end(run)
+        failed = None if run.state is PlanState.STOPPED else self._failed_step(progress)
+        if end is not None and (run.successor is not None if failed is None else failed not in end):
+            return self._continued(run, end, why)
+        step, choice = self._chosen(run, failed, end, why)
+        if end is not None and step in (EscalationStep.RESUME, EscalationStep.OTHER_CANDIDATE):
+            attempt.resumed[end[0]] += 1
+            return self._continued(run, end, why, choice if step is EscalationStep.OTHER_CANDIDATE else None)
+        if step is EscalationStep.GIVE_UP:
+            return self._give_up(run, f"{failed} has failed before, in the same way and the same situation: {why}")
+        if attempt.replans >= run.replans:
+            return self._give_up(run, f"the budget of {run.replans} new plans is used up: {why}")
+        attempt.replans += 1
+        if step is EscalationStep.EXCLUDE and failed is not None:
+            self.search.exclude(failed, why)
+        return Outcome("replan")
+
+    def succeeded(self, run: PlanRun, why: str) -> Outcome | None:
+        """Return the outcome with the plot of the successor; `None` if that no longer leads to the goal."""
+        if self._reached(run):
+            return Outcome("goal_holds")
+        end = self._end(run)
+        return None if end is None else self._continued(run, end, why)
+
+    def bound(self, run: PlanRun, order: PartialOrder, form: dict[str, Any]) -> Outcome:
+        """Keep a plan, given the order of its steps and the form of its plot; return the outcome that carries that."""
+        self.runs.add(run)
+        self.records.ordered(run.name, order)
+        return Outcome("plan_found", {"plot": form, "name": run.name, "steps": len(run.progress.steps)})
+
+    def _reached(self, run: PlanRun) -> bool:
+        """Whether the goal holds, so that the plan is over."""
+        if self.plotting.derivation.recursive:
+            run.renew(self.plotting.derivation.at(self._knowledge))
+        reached = is_true(run.progress.goal, self._knowledge)
+        if reached:
+            self.runs.over(run.name)
+        return reached
+
+    def _end(self, run: PlanRun) -> tuple[PlanStep, ...] | None:
+        """The fewest last steps of the successor, or of the plan without one, that lead to the goal."""
+        world, progress = self._knowledge.snapshot(), run.progress  # its reads need no lock
+        if run.successor is None:
+            return progress.shortest_end(world)
+        return shortest_end(run.successor.steps, progress.domain, world, progress.goal)
+
+    def _chosen(
+        self, run: PlanRun, failed: PlanStep | None, end: tuple[PlanStep, ...] | None, why: str
+    ) -> tuple[EscalationStep, str | None]:
+        """The escalation step, and the plot that was chosen for the failed plan step."""
+        attempt, progress = run.attempt, run.progress
+        if failed is None:
+            return attempt.interrupted(end[0] if end else None), None
+        choice = self.choices.of(failed)
+        others = choice is not None and len(implementing(failed, self.plotting.library)) > 1
+        failure = Failure(failed, why, situation(progress.domain, self._knowledge, progress.goal))
+        return attempt.failed(failure, stands=end is not None, others=others), choice
+
+    def _failed_step(self, progress: PlanProgress) -> PlanStep | None:
+        """The running step, unless its expected effects hold."""
+        if len(progress.running) != 1:
+            return None
+        step, domain = progress.steps[progress.running[0] - 1], self.plotting.derivation.domain
+        expected = expectation(domain.action(step).effect, domain.bindings(step))
+        return None if is_true(expected, self._knowledge) else step
+
+    def _continued(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None) -> Outcome:
+        """Continue with `steps` without a planner call; their first one prefers other candidates to `instead_of`."""
+        name = self._recorded(run, steps, why, instead_of)
+        known = None if run.successor is None else run.successor.order(steps, self._knowledge.version)
+        progress = PlanProgress(steps, run.progress.domain, run.progress.goal)
+        again = PlanRun(name, run.goal, progress, run.attempt, run.holder, run.seconds, run.replans, replaces=run.name)
+        return self.bound(again, *self.plotting.plotted(again, Plan(steps), known, instead_of))
+
+    def _recorded(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None) -> str:
+        """Record why other steps continue a plan; return the name of their plot."""
+        successor, remaining = run.successor, run.progress.remaining_steps
+        if successor is not None and successor.name is not None:
+            self.records.replaced(run.name, successor.name, successor.kept)
+            return successor.name
+        name = self.runs.new_name()
+        if successor is not None:
+            return name  # monitoring recorded the shorter plan
+        if len(steps) < len(remaining):
+            self.records.skipped(run.name, [step for step in remaining if step not in steps], why)
+        else:
+            self.records.resumed(run.name, name, steps[0], why, instead_of)
+        return name
+
+    def _give_up(self, run: PlanRun, reason: str) -> Outcome:
+        self.runs.over(run.name)
+        self.records.gave_up(run.name, reason)
+        return Outcome("gave_up", {"reason": reason})
 
 
 def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:

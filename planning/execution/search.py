@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 from knowledge_base.errors import InputError
 from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.engines.registry import timing
-from planning.execution.local_repair import local_repair
 from planning.execution.planner_call import Answer, PlannerCalls
+from planning.execution.progress import local_repair
 from planning.explanation.unsolvability import why_unsolvable
 from planning.ordering.partial_order import deordered
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut

@@ -5,7 +5,8 @@ import pytest
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanningDomain, PlanStep
-from planning.execution.repair import MOST_RESUMED, Attempt, EscalationStep, Failure, situation
+from planning.execution.plan_run import MOST_RESUMED, Attempt, EscalationStep, Failure
+from planning.execution.repair import situation
 from planning.execution.search import without
 from planning.strips import GroundAction, Problem
 
