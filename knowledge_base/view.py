@@ -14,7 +14,7 @@ from knowledge_base.language.evaluation.query_plan import QueryPlan, plan_query
 from knowledge_base.language.evaluation.world import BoundedWorld, Bounds, Meter
 from knowledge_base.language.syntax.expression import TRUE, Expression
 from knowledge_base.pddl.problem_text import Metric
-from knowledge_base.pddl.problem_writer import problem_to_text
+from knowledge_base.pddl.writer import problem_to_text
 from knowledge_base.prepared import Binding, Prepared
 from knowledge_base.questions import Questions
 from knowledge_base.world.graph import Graph, WorldGraph

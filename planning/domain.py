@@ -34,7 +34,7 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.pddl.action_text import ActionText, united
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
-from knowledge_base.pddl.domain_writer import action_to_text, axiom_to_text, domain_to_text
+from knowledge_base.pddl.writer import action_to_text, axiom_to_text, domain_to_text
 from knowledge_base.world.schema import Schema, agreed_names
 from planning.planning_actions import Axiom, PlanningAction, checked, checked_axiom, refuse_changed
 

@@ -6,4 +6,4 @@ from knowledge_base.pddl.problem_text import Metric as Metric
 from knowledge_base.pddl.problem_text import ProblemText as ProblemText
 from knowledge_base.pddl.problem_text import parse_problem as parse_problem
 from knowledge_base.pddl.problem_text import read_problem as read_problem
-from knowledge_base.pddl.problem_writer import problem_to_text as problem_to_text
+from knowledge_base.pddl.writer import problem_to_text as problem_to_text

@@ -13,9 +13,8 @@ from knowledge_base.language.syntax.expression import Expression, TypedVariable
 from knowledge_base.language.syntax.sexpr import Group, Node, TypedName, Word, parse_names, read, typed_variables
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.pddl.action_text import ACTION, DURATIVE_ACTION, ActionText, read_actions
-from knowledge_base.pddl.beyond import OBJECT_FLUENTS, refuse_forms, refused
+from knowledge_base.pddl.definition import OBJECT_FLUENTS, read_definition, refuse_forms, refused, word
 from knowledge_base.pddl.files import text_and_source
-from knowledge_base.pddl.sections import read_definition, word
 
 _SECTIONS = (
     ":requirements",

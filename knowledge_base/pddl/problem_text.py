@@ -25,9 +25,8 @@ from knowledge_base.language.syntax.expression import (
 )
 from knowledge_base.language.syntax.sexpr import Group, Node, TypedName, Word, parse_names
 from knowledge_base.language.syntax.text import parse_condition, parse_term
-from knowledge_base.pddl.beyond import TIMED_INITIAL, refuse_forms, refused
+from knowledge_base.pddl.definition import TIMED_INITIAL, Definition, read_definition, refuse_forms, refused, word
 from knowledge_base.pddl.files import text_and_source
-from knowledge_base.pddl.sections import Definition, read_definition, word
 from knowledge_base.spelling import is_number
 
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")

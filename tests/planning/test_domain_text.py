@@ -11,7 +11,7 @@ from random_domains import ACTIONS, domain_of
 
 from knowledge_base import InputError, Schema, UnsupportedConstructError
 from knowledge_base.pddl import parse_domain
-from knowledge_base.pddl.domain_writer import domain_to_text
+from knowledge_base.pddl.writer import domain_to_text
 from planning import PlanningDomain
 
 ROOT = Path(__file__).parents[2]
